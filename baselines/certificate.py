@@ -19,7 +19,8 @@ is bounded above the ticks that are to be beaten (McCormick 1976; Horst & Tuy 19
   part for each, as the first that is. The part in which none is is bounded already.
 
 Each of these leaves no solution out. The part with the least bound is next, so that the search
-can end at any time: the least bound of the open parts is then what is proven.
+can end at any time: the least bound of the open parts is then what is proven, or the bound from
+how fast a hand can be (:func:`ticks_for_distance`), whichever is more.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -35,7 +37,8 @@ import numpy as np
 from coartic import MotionModel, Task
 from coartic.baselines.relaxation import Hands, Lagrangian, Relaxation
 from coartic.baselines.whole_ticks import mergeable
-from coartic.robot import HANDS, Array
+from coartic.motion.initial import too_many_sequences
+from coartic.robot import HANDS, Array, Hand
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
 _APART = 16  # hand sequences that are bounded one by one: few are proven sooner so
@@ -58,6 +61,43 @@ class Certificate:
     """Bound on the path before any split, length unit and rad."""
     iterations: int
     """Iterations of the conic solver."""
+
+
+def fastest_hand(task: Task, hand: Hand) -> float:
+    """Largest norm of the hand's Jacobian: its way per joint-space way, length unit.
+
+    The column of a joint is at right angles to its lever, which is no longer than the links beyond
+    it; a base that moves has the unit vectors as its columns. The square of the norm is the largest
+    eigenvalue of J Jᵀ, a sum of the columns' dyads, and so at most 1, where the base moves at all,
+    plus the sum of the squared levers. A straight arm at right angles to a free axis has just that.
+    Source: Craig (2004), the Jacobian of a planar chain.
+    """
+    levers = np.cumsum(task.robot.arm(hand).links[::-1])
+    return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
+
+
+def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]]) -> int:
+    """Ticks that every solution takes with one of these hand sequences: by Cauchy and Schwarz.
+
+    A hand that is in one disc and then in another goes at least the distance of their centres less
+    both radii, from the start that of the first goal less one. Per tick it goes no farther than
+    ``step`` times :func:`fastest_hand`, and one movement at least is made on the way, whose arrival
+    takes a tick beyond its steps. So a goal is hit no earlier than the goal before it, nor than
+    that many ticks after the goal that the same hand hit last. ``step`` is in joint space.
+    """
+    speed = {hand: step * fastest_hand(task, hand) for hand in task.hands}
+    start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
+    least = None
+    for sequence in hands:
+        where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
+        for hand, goal in zip(sequence, task.goals, strict=True):
+            place, radius, ticks = where[hand]
+            way = math.dist(place, goal) - radius - task.radius - _TOLERANCE
+            if way > 0.0:
+                when = max(when, ticks + math.ceil(way / speed[hand]) + 1)
+            where[hand] = np.array(goal), task.radius, when
+        least = when if least is None else min(least, when)
+    return least or 0
 
 
 @dataclass(frozen=True)
@@ -102,9 +142,13 @@ def certify(
     search = _Search(task, ticks, still, model.step)
     search.begin()
     root_length = search.heap[0].length if search.heap else search.longest(0)
-    while search.heap and search.solved < most_nodes:
+    least = 0
+    if too_many_sequences(task, len(task.hands)) is None:
+        sequences = itertools.product(task.hands, repeat=len(task.goals))
+        least = ticks_for_distance(task, model.step, sequences)
+    while search.heap and search.solved < most_nodes and least < ticks:
         search.branch(heapq.heappop(search.heap))
-    least = math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks
+    least = max(least, math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks)
     return Certificate(
         ticks=min(least, ticks),
         proven=least >= ticks,

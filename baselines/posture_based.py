@@ -3,32 +3,22 @@
 For every goal a posture is planned first, then the straight joint-space movement to it
 (Rosenbaum, Meulenbroek, Vaughan & Jansen 2001):
 
-1. *Instance retrieval.* The stored postures go through elimination by aspects: first the
-   hand must be at the goal, then the cost of travel must be least. The survivor is the
-   most promising posture.
-2. *Instance generation.* Postures that resemble it are generated and evaluated in the
-   same way until a deadline; the best one found becomes the goal posture. What a
-   generated posture lacks in accuracy, feedforward correction makes up for (Rosenbaum,
-   Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
+1. *Instance retrieval.* Of the stored postures first those survive whose hand is at the goal, then
+   the one with the least cost of travel.
+2. *Instance generation.* Postures that resemble it are generated and evaluated in the same way
+   until a deadline. What a generated posture lacks in accuracy, feedforward correction makes up for
+   (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
 3. An internal simulation says where the movement ends; the posture joins the store.
 
-With a horizon of two goals the cost of travel includes the way on to a posture for the
-next goal. Both postures are planned together, only the first movement is made, and the
-second posture is planned anew from there. The authors name anticipation as an extension
-of the theory (1995); this form of it is ours.
+With a horizon of two goals the cost of travel includes the way on to a posture for the next goal.
+Only the first movement is made; the second posture is planned anew from there. The authors name
+anticipation as an extension (1995); this form of it is ours.
 
-Where this differs from the theory, and why:
-
-- The theory weighs the travel of each joint by its expense. Here the cost of travel is
-  the joint-space distance, because that is what the tasks charge.
-- There are no obstacles and nothing to grasp, so the hierarchy has two levels.
-- The store is filled with random postures about the start, where the theory has those
-  adopted lately. What is stored is the posture of an arm; the base stands wherever that
-  takes the hand to the goal. Otherwise hardly any would survive the first aspect.
-- The theory's diffusion gets wider until the deadline; this one gets narrower, about a
-  weighted sum of the better postures (a weighted sum is the rule of 1995), so that it
-  converges. The deadline is a number of postures and does not adapt.
-- The hand is planned with the posture: each is planned for, the cheapest one is taken.
+Where this differs from the theory: the cost of travel is the joint-space distance, which the tasks
+charge, not each joint's expense. The hierarchy has two levels, as there are no obstacles. The store
+is filled with random postures of the arms about the start, with the base wherever that takes the
+hand to the goal. Diffusion gets narrower until the deadline, about a weighted sum of the better
+postures (the rule of 1995), so that it converges. The hand is planned with the posture.
 """
 
 from __future__ import annotations
@@ -46,8 +36,8 @@ from pydantic import Field
 from coartic import Movement, Task
 from coartic.baselines.posture_graph import cheapest_chains
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.compiled import entry, inner
-from coartic.robot import BASE_DOF, Array, Hand, chain, lever
+from coartic.motion.compiled import entry, inner, joint_lever
+from coartic.robot import BASE_DOF, Array, Hand, chain
 from coartic.tasks.task import hands_of
 
 Mask = NDArray[np.bool_]
@@ -68,12 +58,10 @@ _TOGETHER = 16  # plans that are made side by side: more take memory, and no les
 class PostureBasedParameters(Parameters):
     """Parameters of posture-based planning.
 
-    Tried by hand. Over 5 seeds on each shipped task, 50, 300 and 1000 stored postures
-    (mean rewards within 3 of each other). Over 6 seeds on the first two goals of three
-    tasks, against the least cost: 60 and 100 rounds of 60, 40 of 100, a first SD of 0.1
-    and 0.3, a last SD of 0.001 and 0.01 of the first (all within 3 ticks, most within
-    1); equal weights in the weighted sum, and diffusion at all widths in each round
-    without a weighted sum (up to 4 ticks, the latter after 120 rounds).
+    Tried by hand. Over 5 seeds on each shipped task, 50, 300 and 1000 stored postures (mean rewards
+    within 3 of each other). Over 6 seeds on the first two goals of three tasks, 60 and 100 rounds
+    of 60, 40 of 100, first SDs of 0.1 and 0.3, last ones of 0.001 and 0.01 of these (within 3
+    ticks); equal weights, and diffusion at all widths in each round (up to 4 ticks).
     ``hands="every"`` matters where a goal's cheapest hand is the wrong one for the next:
     two-armed-1 with one goal gets -520 so, -624 with hands chosen goal by goal.
     """
@@ -134,15 +122,15 @@ class PostureBased(Method):
             case "given":
                 options = [[(hand,) for hand in hands_of(session.initial_hands)]]
             case _:
-                options = [[(hand,) for hand in hands] for hands in self._every(session)]
+                options = [[(hand,) for hand in hands] for hands in self.sequences(session)]
         with session.building():
-            planner = _Planner(session, self.parameters, self.horizon)
+            planner = Planner(session, self.parameters, self.horizon)
         with session.solving():
             plans = planner.plans(options)
         best = min(plans, key=lambda plan: sum(plan.ticks))
         return Result(tuple(best.movements), {"expected_ticks": best.ticks})
 
-    def _every(self, session: Session) -> Iterable[Hands]:
+    def sequences(self, session: Session) -> Iterable[Hands]:
         """Every hand sequence, or the most promising of too many."""
         most = self.parameters.most_sequences
         if len(session.hands) ** session.goals_count <= most:
@@ -173,11 +161,10 @@ class TwoGoals(PostureBased):
 
 
 _chain = inner(chain)
-_lever = inner(lever)
 
 
 @entry
-def _reach(
+def reach_kernel(
     postures: Any,
     far: Any,
     arm: Any,
@@ -206,7 +193,7 @@ def _reach(
             wanted[left, 0, 0] = miss_x * share
             wanted[left, 1, 0] = miss_y * share
             for k in range(tip):
-                dx, dy = _lever(xs, ys, k, tip)
+                dx, dy = joint_lever(xs, ys, k, tip)
                 jacobian[left, 0, arm.first + k] = dx
                 jacobian[left, 1, arm.first + k] = dy
             far[left] = row
@@ -215,7 +202,7 @@ def _reach(
 
 
 @dataclass
-class _Plan:
+class GrowingPlan:
     """A plan in the making, with hands to choose from for each goal."""
 
     options: list[Hands]
@@ -230,7 +217,7 @@ class _Plan:
     """What each is expected to take."""
 
 
-class _Search(NamedTuple):
+class Search(NamedTuple):
     """What postures for successive goals are generated from."""
 
     q: Array
@@ -241,7 +228,7 @@ class _Search(NamedTuple):
     """Shape ``(rounds, batch, goals, dof)``."""
 
 
-class _Chain(NamedTuple):
+class PostureChain(NamedTuple):
     """Postures for successive goals."""
 
     hands: Hands
@@ -251,7 +238,7 @@ class _Chain(NamedTuple):
     """Joint-space distance through all of them."""
 
 
-class _Planner:
+class Planner:
     """Plans side by side, from one store of postures."""
 
     def __init__(
@@ -277,7 +264,7 @@ class _Planner:
         # Of the better postures, best first: logarithmic in the rank.
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
-    def plans(self, options: list[list[Hands]]) -> list[_Plan]:
+    def plans(self, options: list[list[Hands]]) -> list[GrowingPlan]:
         """The plans that hit every goal; ``options``: hands per goal, of each plan.
 
         Raises MethodError where there is none, for a goal that no posture hits.
@@ -286,51 +273,52 @@ class _Planner:
         failure: MethodError | None = None
         for first in range(0, len(options), _TOGETHER):
             try:
-                plans += self._together(options[first : first + _TOGETHER], len(options) > 1)
+                plans += self.plan_together(options[first : first + _TOGETHER], len(options) > 1)
             except MethodError as error:
                 failure = error
         if failure is not None and not plans:
             raise failure
         return plans
 
-    def _together(self, options: list[list[Hands]], beforehand: bool) -> list[_Plan]:
+    def plan_together(self, options: list[list[Hands]], beforehand: bool) -> list[GrowingPlan]:
         """Plans side by side; noise is drawn ``beforehand``, plan after plan, or as needed."""
         goals = range(len(self.goals))
         plans = [
-            _Plan(
+            GrowingPlan(
                 hands,
-                [self._noise(self._ahead(goal)) for goal in goals if beforehand],
+                [self.draw_noise(self.goals_ahead(goal)) for goal in goals if beforehand],
                 self.store,
                 self.session.q0,
             )
             for hands in options
         ]
         for goal in goals:
-            ahead = self._ahead(goal)
-            retrieved = self._retrieve(plans, ahead)
+            ahead = self.goals_ahead(goal)
+            retrieved = self.retrieve(plans, ahead)
             searches = [
-                self._searches(*entry, ahead) for entry in zip(plans, retrieved, strict=True)
+                self.searches_of(*entry, ahead) for entry in zip(plans, retrieved, strict=True)
             ]
             possible = [bool(own) for own in searches]
             if not any(possible):
-                raise self._out_of_reach(plans[-1], retrieved[-1])
+                raise self.out_of_reach(plans[-1], retrieved[-1])
             plans = list(itertools.compress(plans, possible))
-            chains = iter(self._generate([search for own in searches for search in own], ahead))
+            chains = iter(self.generate([search for own in searches for search in own], ahead))
             for plan, own in zip(plans, filter(None, searches), strict=True):
                 chain = min(itertools.islice(chains, len(own)), key=lambda chain: chain.cost)
-                self._adopt(plan, chain)
+                self.adopt(plan, chain)
         return plans
 
-    def _ahead(self, goal: int) -> range:
+    def goals_ahead(self, goal: int) -> range:
+        """A goal, and as many after it as the horizon has."""
         return range(goal, min(goal + self.horizon, len(self.goals)))
 
-    def _noise(self, goals: range) -> Array:
+    def draw_noise(self, goals: range) -> Array:
         """Standard noise for ``goals``, ``(rounds, batch, goals, dof)``."""
         parameters, session = self.parameters, self.session
         shape = parameters.rounds, parameters.batch, len(goals), session.dof
         return session.rng.standard_normal(shape)
 
-    def _retrieve(self, plans: list[_Plan], goals: range) -> list[Layers]:
+    def retrieve(self, plans: list[GrowingPlan], goals: range) -> list[Layers]:
         """First aspect: stored postures of the arm with the hand at the goal, ``(k, dof)``.
 
         Of each plan, by goal and hand.
@@ -347,23 +335,23 @@ class _Planner:
             postures[..., arm] = stores[..., arm]
             miss = self.goals[goal] - self.session.forward_kinematics(postures, hand)
             postures[..., :BASE_DOF] += miss * self.movable[:BASE_DOF]
-            there = self._correct(postures, goal, hand, _RETRIEVED)
+            there = self.correct(postures, goal, hand, _RETRIEVED)
             for i, found, at in zip(asking, postures, there, strict=True):
                 retrieved[i][goal, hand] = found[at]
         return retrieved
 
-    def _searches(self, plan: _Plan, retrieved: Layers, goals: range) -> list[_Search]:
+    def searches_of(self, plan: GrowingPlan, retrieved: Layers, goals: range) -> list[Search]:
         """A search for each choice of hands that all have a posture."""
         searches = []
         for hands in itertools.product(*(plan.options[goal] for goal in goals)):
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
-                promising = self._most_promising(plan.q, hands, layers)
-                noise = plan.noise.pop(0) if plan.noise else self._noise(goals)
-                searches.append(_Search(plan.q, hands, promising, noise))
+                promising = self.most_promising(plan.q, hands, layers)
+                noise = plan.noise.pop(0) if plan.noise else self.draw_noise(goals)
+                searches.append(Search(plan.q, hands, promising, noise))
         return searches
 
-    def _out_of_reach(self, plan: _Plan, retrieved: Layers) -> MethodError:
+    def out_of_reach(self, plan: GrowingPlan, retrieved: Layers) -> MethodError:
         """Why a plan cannot go on."""
         for goal in sorted({goal for goal, _ in retrieved}):
             hands = plan.options[goal]
@@ -375,23 +363,23 @@ class _Planner:
             f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
         )
 
-    def _adopt(self, plan: _Plan, chain: _Chain) -> None:
+    def adopt(self, plan: GrowingPlan, chain: PostureChain) -> None:
         """Make the first movement of a chain, and store its postures."""
         goal = len(plan.movements)
         hand, target = chain.hands[0], chain.postures[0]
         plan.store = np.vstack([plan.store, chain.postures])
         plan.movements.append(Movement(goal + 1, hand, "planned", target))
-        plan.q, spent = self._simulate(plan.q, target, hand, goal)
+        plan.q, spent = self.simulate(plan.q, target, hand, goal)
         plan.ticks.append(spent)
 
-    def _most_promising(self, q: Array, hands: Hands, layers: list[Array]) -> Array:
+    def most_promising(self, q: Array, hands: Hands, layers: list[Array]) -> Array:
         """Second aspect: of the retrieved postures those that are cheapest, one a goal."""
         first = layers[0]
         cost = np.linalg.norm(first - q, axis=1)
         if len(layers) == 1:
             return first[[np.argmin(cost)]]
         second = layers[1]
-        used = self._base_and_arm(hands[1])
+        used = self.base_and_arm(hands[1])
         # No posture that alone costs more than some pair can be the first of the best pair.
         onward = np.linalg.norm(first[np.argmin(cost)][used] - second[:, used], axis=1)
         near = np.flatnonzero(cost <= cost.min() + onward.min())
@@ -400,20 +388,22 @@ class _Planner:
         i = near[i]
         return np.stack([first[i], np.where(used, second[j], first[i])])
 
-    def _generate(self, searches: list[_Search], goals: range) -> list[_Chain]:
+    def generate(self, searches: list[Search], goals: range) -> list[PostureChain]:
         """The cheapest postures found around the most promising ones by the deadline."""
         parameters = self.parameters
         start = np.stack([search.q for search in searches])[:, None]
         centre = best = np.stack([search.promising for search in searches])
-        costs = _travel(start[:, 0], best)
+        costs = travel(start[:, 0], best)
         sds = parameters.diffusion * np.geomspace(1.0, _FINEST, parameters.rounds)
         for number, sd in enumerate(sds):
             noise = sd * np.stack([search.noise[number] for search in searches])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
-            accurate = self._accurate(start, postures, [search.hands for search in searches], goals)
-            travel = np.where(accurate, _travel(start, postures), np.inf)
-            order = np.argsort(travel, axis=1, kind="stable")
+            accurate = self.correct_generated(
+                start, postures, [search.hands for search in searches], goals
+            )
+            lengths = np.where(accurate, travel(start, postures), np.inf)
+            order = np.argsort(lengths, axis=1, kind="stable")
             centre, best = centre.copy(), best.copy()
             for k, count in enumerate(accurate.sum(axis=1)):
                 better = order[k, : min(len(self.weights), count)]
@@ -421,14 +411,16 @@ class _Planner:
                     continue
                 weights = self.weights[: len(better)]
                 centre[k] = np.tensordot(weights / weights.sum(), postures[k, better], axes=1)
-                if travel[k, better[0]] < costs[k]:
-                    best[k], costs[k] = postures[k, better[0]], travel[k, better[0]]
+                if lengths[k, better[0]] < costs[k]:
+                    best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
         return [
-            _Chain(search.hands, *found)
+            PostureChain(search.hands, *found)
             for search, *found in zip(searches, best, costs.tolist(), strict=True)
         ]
 
-    def _accurate(self, start: Array, postures: Array, hands: list[Hands], goals: range) -> Mask:
+    def correct_generated(
+        self, start: Array, postures: Array, hands: list[Hands], goals: range
+    ) -> Mask:
         """Correct generated postures in place; which have all hands there.
 
         ``start`` (n, 1, dof), ``postures`` (n, batch, goals, dof), ``hands`` of each of n.
@@ -439,12 +431,12 @@ class _Planner:
             for hand in self.session.hands:
                 own = [i for i, chosen in enumerate(hands) if chosen[k] == hand]
                 if own:
-                    posture = np.where(self._free(hand), postures[own, :, k], before[own])
-                    accurate[own] &= self._correct(posture, goal, hand, _GENERATED)
+                    posture = np.where(self.free_joints(hand), postures[own, :, k], before[own])
+                    accurate[own] &= self.correct(posture, goal, hand, _GENERATED)
                     postures[own, :, k] = before[own] = posture
         return accurate
 
-    def _correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
+    def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Feedforward correction of ``(..., dof)`` in place; which have the hand there."""
         shape, postures = postures.shape[:-1], postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
@@ -455,7 +447,7 @@ class _Planner:
         joints = np.empty((2, len(arm.links) + 1))
         x, y = self.goals[goal]
         for step in range(steps + 1):
-            left = _reach(postures, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
+            left = reach_kernel(postures, far, arm, x, y, self.tolerance, wanted, jacobian, *joints)
             self.session.spend(forward_kinematics=len(far))
             far = far[:left]
             if step == steps or not left:
@@ -469,7 +461,7 @@ class _Planner:
         there[far] = False
         return there.reshape(shape)
 
-    def _simulate(self, q: Array, target: Array, hand: Hand, goal: int) -> tuple[Array, int]:
+    def simulate(self, q: Array, target: Array, hand: Hand, goal: int) -> tuple[Array, int]:
         """Where a movement hits its goal, and the ticks that takes."""
         distance = float(np.linalg.norm(target - q))
         step = self.session.model.step
@@ -479,20 +471,21 @@ class _Planner:
         k = int(np.argmax(np.hypot(miss[:, 0], miss[:, 1]) <= self.session.radius))
         return line[k], k + 1
 
-    def _free(self, hand: Hand) -> Mask:
+    def free_joints(self, hand: Hand) -> Mask:
         """What may move towards a posture for ``hand``."""
         if self.parameters.other_arm == "free":
             return self.movable
-        return self.movable & self._base_and_arm(hand)
+        return self.movable & self.base_and_arm(hand)
 
-    def _base_and_arm(self, hand: Hand) -> Mask:
+    def base_and_arm(self, hand: Hand) -> Mask:
+        """The joints of the base and of one arm."""
         mask = np.zeros_like(self.movable)
         mask[:BASE_DOF] = True
         mask[self.session.joints(hand)] = True
         return mask
 
 
-def _travel(q: Array, postures: Array) -> Array:
+def travel(q: Array, postures: Array) -> Array:
     """Joint-space distance from ``q`` (..., dof) through postures ``(..., k, dof)``."""
     start = np.broadcast_to(q[..., None, :], (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)

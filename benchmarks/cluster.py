@@ -10,7 +10,7 @@ from typing import Any
 
 from coartic.benchmarks.pool import Failure, Local
 from coartic.benchmarks.provenance import environment
-from coartic.benchmarks.registry import brief, current_code
+from coartic.benchmarks.registry import current_code, error_line
 from coartic.benchmarks.worker import Answer, Job
 from coartic.errors import CoarticError
 
@@ -66,7 +66,9 @@ class Dask:
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
         except Exception as error:  # Dask's, of many kinds: who answers may be anybody
-            words = f"no Dask scheduler at {self.address} ({brief(error)}). Give the address that "
+            words = (
+                f"no Dask scheduler at {self.address} ({error_line(error)}). Give the address that "
+            )
             raise CoarticError(f"{words}it prints, such as tcp://127.0.0.1:8786.") from None
 
     def _wait_for_workers(self, client: Any) -> None:
@@ -82,7 +84,7 @@ class Dask:
 
     def _lost(self, error: BaseException) -> CoarticError:
         words = f"lost Dask scheduler {self.address}, or its workers cannot work"
-        return CoarticError(f"{words} ({brief(error)}). {_GOES_ON}")
+        return CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}")
 
 
 def _remote(job: Job) -> Answer | Failure:

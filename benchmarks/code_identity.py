@@ -20,23 +20,23 @@ def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
     package, and the data files that it reads. Raises OSError or SyntaxError."""
     root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
     within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
-    model, own, waiting = _model(), dict[Path, None](), [method]
+    model, files, waiting = model_essences(), dict[Path, None](), [method]
     while waiting:
-        if (path := waiting.pop()) not in own and path not in model:
-            own[path] = None
-            waiting += [found for found in _imported(path, root) if within in found.parents]
-    texts = [*model.values(), *map(_essence, sorted(own, key=lambda path: path.name))]
+        if (path := waiting.pop()) not in files and path not in model:
+            files[path] = None
+            waiting += [file for file in imported_files(path, root) if within in file.parents]
+    texts = [*model.values(), *map(essence, sorted(files, key=lambda path: path.name))]
     content = [text.encode() for text in texts] + [path.read_bytes() for path in data]
     return hashlib.sha256(b"".join(content)).hexdigest()[:12]
 
 
 @cache
-def _model() -> dict[Path, str]:
+def model_essences() -> dict[Path, str]:
     """What counts of the model, and of the worker that hands it to methods, file by file."""
-    return {p: _essence(p) for p in [*model_files(), Path(__file__).with_name("worker.py")]}
+    return {p: essence(p) for p in [*model_files(), Path(__file__).with_name("worker.py")]}
 
 
-def _imported(path: Path, root: Path) -> Iterator[Path]:
+def imported_files(path: Path, root: Path) -> Iterator[Path]:
     """The files below ``root`` that a module imports."""
     for node in ast.walk(ast.parse(path.read_bytes())):
         if not isinstance(node, ast.Import | ast.ImportFrom):
@@ -50,7 +50,7 @@ def _imported(path: Path, root: Path) -> Iterator[Path]:
             yield from filter(Path.is_file, (place.with_suffix(".py"), place / "__init__.py"))
 
 
-def _essence(path: Path) -> str:
+def essence(path: Path) -> str:
     """What counts of a module: its syntax tree without docstrings."""
     for node in ast.walk(tree := ast.parse(path.read_bytes())):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):

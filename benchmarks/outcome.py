@@ -36,7 +36,7 @@ _EMPTY = dict.fromkeys(RESULTS)
 
 
 def kept(
-    names: Sequence[Mapping[str, Any]],
+    identities: Sequence[Mapping[str, Any]],
     answer: Answer | Failure,
     task: Task,
     entry: Entry,
@@ -44,36 +44,35 @@ def kept(
 ) -> list[Run]:
     """The runs of a job as they are kept, also of one that failed.
 
-    ``names`` are what identifies each: its id, number, seed and so on.
+    ``identities`` say which each is: its id, number, seed and so on.
     """
     if isinstance(answer, Failure):
         times: dict[str, Any] = {"wall_s": answer.wall_s}
-        return [_run(name, Outcome(answer.status, answer.reason), {}, times) for name in names]
+        outcome = Outcome(answer.status, answer.reason)
+        return [run_of(identity, outcome, {}, times) for identity in identities]
     times = {
-        "wall_s": answer.wall_s / len(names),
-        "cpu_s": answer.cpu_s / len(names),
+        "wall_s": answer.wall_s / len(identities),
+        "cpu_s": answer.cpu_s / len(identities),
         "warm": answer.warm,
-        "together": len(names),
+        "together": len(identities),
         "process_peak_mb": answer.process_peak_mb,
     }
     made_with = environment() if answer.environment is None else Environment(**answer.environment)
-    outcomes = [_believed(outcome, entry) for outcome in answer.outcomes]
+    outcomes = [believed(outcome, entry) for outcome in answer.outcomes]
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
-    found = scored(
-        task, [list(map(_movement, outcomes[n].parts[part])) for n, part in parts], model
-    )
+    solutions = [list(map(movement_from, outcomes[n].parts[part])) for n, part in parts]
     executions: list[dict[str, Execution]] = [{} for _ in outcomes]
-    for (n, part), execution in zip(parts, found, strict=True):
+    for (n, part), execution in zip(parts, scored(task, solutions, model), strict=True):
         if isinstance(execution, Execution):
             executions[n][part] = execution
         elif isinstance(execution, IncompleteError):
-            outcomes[n] = _ended(outcomes[n], "infeasible", str(execution))
+            outcomes[n] = ended(outcomes[n], "infeasible", str(execution))
         else:
             why = f"the solution cannot be executed: {execution}"
-            outcomes[n] = _ended(outcomes[n], "solver-failed", why)
+            outcomes[n] = ended(outcomes[n], "solver-failed", why)
     return [
-        _run(name, outcome, own if outcome.status == "ok" else {}, times, task, made_with)
-        for name, outcome, own in zip(names, outcomes, executions, strict=True)
+        run_of(identity, outcome, parts if outcome.status == "ok" else {}, times, task, made_with)
+        for identity, outcome, parts in zip(identities, outcomes, executions, strict=True)
     ]
 
 
@@ -85,20 +84,19 @@ def scored(
     In place of an execution, a SolutionError for a solution that breaks the task's rules, an
     IncompleteError for one that does not hit every goal.
     """
-    too_long = [_too_long(task, solution, model) for solution in solutions]
-    good = [own for own, error in zip(solutions, too_long, strict=True) if error is None]
-    made = iter(execute_many(task, good, model=model))
-    found: list[Execution | Exception] = []
-    for error in too_long:
-        execution = next(made) if error is None else error
-        if isinstance(execution, Execution) and not execution.completed:
-            found.append(IncompleteError(execution.reason))
-        else:
-            found.append(execution)
-    return found
+    errors = [too_long(task, solution, model) for solution in solutions]
+    short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
+    executions = iter(execute_many(task, short, model=model))
+    outcomes: list[Execution | Exception] = []
+    for error in errors:
+        outcome = next(executions) if error is None else error
+        if isinstance(outcome, Execution) and not outcome.completed:
+            outcome = IncompleteError(outcome.reason)
+        outcomes.append(outcome)
+    return outcomes
 
 
-def _too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
     """What is wrong with a solution that would take very long to execute."""
     if len(solution) > MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
@@ -115,7 +113,7 @@ def _too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> S
     return None
 
 
-def _believed(outcome: Outcome, entry: Entry) -> Outcome:
+def believed(outcome: Outcome, entry: Entry) -> Outcome:
     """An outcome, or what becomes of one that its method cannot have."""
     used = {*outcome.used}
     solution = outcome.parts.get("solution", [])
@@ -135,12 +133,13 @@ def _believed(outcome: Outcome, entry: Entry) -> Outcome:
     return replace(outcome, parts={"solution": [], **outcome.parts})
 
 
-def _ended(outcome: Outcome, status: str, reason: str) -> Outcome:
+def ended(outcome: Outcome, status: str, reason: str) -> Outcome:
     """An outcome whose solution is none."""
     return replace(outcome, status=status, reason=reason, parts={}, bound=None)
 
 
-def _movement(row: PlainMovement) -> Movement:
+def movement_from(row: PlainMovement) -> Movement:
+    """A movement as a worker states it."""
     goal, hand, kind, target, waypoints = row
     return Movement(
         goal,
@@ -151,8 +150,8 @@ def _movement(row: PlainMovement) -> Movement:
     )
 
 
-def _run(
-    name: Mapping[str, Any],
+def run_of(
+    identity: Mapping[str, Any],
     outcome: Outcome,
     executions: Mapping[str, Execution],
     times: Mapping[str, Any],
@@ -164,13 +163,14 @@ def _run(
     rewards = outcome.rewards
     corrections: Any = outcome.details.get(CORRECTIONS)
     counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
+    reason = plain(outcome.reason, LONGEST_REASON) or "it gave no reason"
     row = {
         **_EMPTY,
-        **name,
+        **identity,
         **times,
         **{key: outcome.meter.get(key) for key in vars(Meter())},
         "status": outcome.status,
-        "reason": "" if outcome.status == "ok" else _reason(outcome.reason),
+        "reason": "" if outcome.status == "ok" else reason,
         "early_corrections": corrections[1] if counted else None,
         "late_corrections": corrections[-1] if counted else None,
         "proven_bound": outcome.bound,
@@ -206,14 +206,10 @@ def result_of(
     """
     parts: list[Any] = [row["status"], row["proven_bound"], list(rewards)]
     for part in PARTS:
-        for own in movements.get(part, ()):
-            assert own.target is not None
+        for m in movements.get(part, ()):
+            assert m.target is not None
             # SQLite keeps no sign of zero, and 0.0 is added to lose it here as well.
-            points = None if own.waypoints is None else (own.waypoints + 0.0).tolist()
-            target = (own.target + 0.0).tolist()
-            parts.append([part, own.goal, own.hand, own.kind, own.ticks, target, points])
+            points = None if m.waypoints is None else (m.waypoints + 0.0).tolist()
+            target = (m.target + 0.0).tolist()
+            parts.append([part, m.goal, m.hand, m.kind, m.ticks, target, points])
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
-
-
-def _reason(text: str) -> str:
-    return plain(text, LONGEST_REASON) or "it gave no reason"

@@ -71,20 +71,21 @@ class Local:
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
         """The number of each job with its answer, as they come."""
-        numbered = sorted(enumerate(jobs), key=lambda pair: _owner(pair[1]))
-        for owner, own in groupby(numbered, key=lambda pair: _owner(pair[1])):
-            yield from self._perform(list(own), foreign=bool(owner))
+        numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
+        for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
+            yield from self.perform_together(list(jobs_of_owner), foreign=bool(owner))
 
-    def _perform(
+    def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer | Failure]]:
+        """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
-        tasks = [(task, own) for (_, own), task in kernels.items()]
+        tasks = [(task, learned) for (_, learned), task in kernels.items()]
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
-                workers, initializer=_begin, initargs=(folder, foreign, workers, tasks),
-                context=_context(),
+                workers, initializer=begin_worker, initargs=(folder, foreign, workers, tasks),
+                context=context(),
             )  # fmt: skip
             running: dict[Future[Answer], tuple[int, float]] = {}
             waiting = iter(jobs)
@@ -95,6 +96,10 @@ class Local:
                         running[future] = number, time.monotonic()
                         if len(running) == (1 + _AHEAD) * workers:
                             break
+                    # While a worker compiles the learner: what it hands over is executed here.
+                    with contextlib.suppress(CoarticError):  # workers say the same
+                        prepare((task, False) for task, _ in tasks)
+                    tasks = []
                     if not running:
                         break
                     done, _ = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
@@ -103,26 +108,26 @@ class Local:
                     for future in done:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
-                        yield number, _answer(future, jobs, number, seconds, Path(folder))
+                        yield number, answer_of(future, jobs, number, seconds, Path(folder))
             except RuntimeError:  # the pool's own
-                said = {_last_words(file) for file in Path(folder).glob("*.txt")}
+                messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
-                    f"worker processes cannot begin ({'; '.join(sorted(said))}); finished runs are "
-                    "kept"
+                    f"worker processes cannot begin ({'; '.join(messages)}); finished runs are kept"
                 ) from None
             finally:
                 pool.stop()  # type: ignore[no-untyped-call]
                 pool.join()
 
 
-def _owner(job: Job) -> str:
+def owner_of(job: Job) -> str:
     """Whose workers perform a job: this project's methods share theirs."""
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def _answer(
+def answer_of(
     future: Future[Answer], jobs: list[tuple[int, Job]], number: int, seconds: float, folder: Path
 ) -> Answer | Failure:
+    """The answer to a job, or why there is none."""
     try:
         return future.result()
     except TimeoutError:
@@ -133,7 +138,7 @@ def _answer(
         if error.exitcode is not None and error.exitcode < 0:
             with contextlib.suppress(ValueError):
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
-        reason = f"the worker process ended ({how}): {_last_words(folder / f'{error.pid}.txt')}"
+        reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
         return Failure("crashed", reason, seconds)
     except BrokenProcessPool:
         raise
@@ -141,7 +146,8 @@ def _answer(
         return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
 
 
-def _last_words(file: Path) -> str:
+def last_words(file: Path) -> str:
+    """The last lines that a worker has printed into its file."""
     try:
         lines = file.read_text(errors="replace").strip().splitlines()
     except OSError:
@@ -149,28 +155,26 @@ def _last_words(file: Path) -> str:
     return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
 
 
-def _begin(
+def begin_worker(
     folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
 ) -> None:
     """What a worker does first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    said = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
-    os.dup2(said, 1)
-    os.dup2(said, 2)
+    printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
+    os.dup2(printed, 1)
+    os.dup2(printed, 2)
     if sys.platform == "linux":
         kill_with_parent = 1  # PR_SET_PDEATHSIG
         ctypes.CDLL(None).prctl(kill_with_parent, signal.SIGKILL, 0, 0, 0)
-    _bound_memory(workers)
+    bound_memory(workers)
     prepare(tasks)
     if foreign:
-        own = tempfile.mkdtemp(dir=folder)
-        os.environ["TMPDIR"] = own
-        tempfile.tempdir = own
-        os.chdir(own)
+        tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
+        os.chdir(tempfile.tempdir)
         confine(Path(folder))
 
 
-def _bound_memory(workers: int) -> None:
+def bound_memory(workers: int) -> None:
     """A method that allocates without end gets a MemoryError, not the whole machine."""
     try:
         import resource
@@ -182,15 +186,25 @@ def _bound_memory(workers: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (share, share))
 
 
+def landlock_version() -> int:
+    """Version of the system's Landlock interface; 0 or less where there is none."""
+    if sys.platform != "linux":
+        return 0
+    return int(ctypes.CDLL(None).syscall(444, None, 0, 1))
+
+
 def confine(folder: Path) -> None:
     """Let this process write below a folder alone, for good, where the system can (Linux 5.13 with
     Landlock); nothing where it cannot."""
-    if sys.platform != "linux":
+    if landlock_version() < 1:
         return
     libc = ctypes.CDLL(None, use_errno=True)
     create, add, restrict = 444, 445, 446  # of system calls
-    # Write and remove files, make them of all kinds; not what later versions added.
-    writes = sum(1 << bit for bit in (1, 4, 5, 6, 7, 8, 9, 10, 11, 12))
+    write_file, truncate = 1 << 1, 1 << 14
+    # Remove files and make them of all kinds; a right that a kernel does not know is an error.
+    writes = write_file | sum(1 << bit for bit in (4, 5, 6, 7, 8, 9, 10, 11, 12))
+    if landlock_version() >= 3:
+        writes |= truncate
     rights = ctypes.c_uint64(writes)
     rules = libc.syscall(create, ctypes.byref(rights), ctypes.sizeof(rights), 0)
     if rules < 0:
@@ -198,8 +212,8 @@ def confine(folder: Path) -> None:
     for allowed in (folder, Path("/dev/null"), Path("/dev/shm")):
         with contextlib.suppress(OSError):
             place = os.open(allowed, os.O_PATH | os.O_CLOEXEC)
-            own = writes if allowed.is_dir() else 1 << 1
-            rule = own.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
+            allowed_rights = writes if allowed.is_dir() else writes & (write_file | truncate)
+            rule = allowed_rights.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
             libc.syscall(add, rules, 1, rule, 0)
             os.close(place)
     no_new_privileges = 38
@@ -225,7 +239,7 @@ class WorkerProcess(_Ordinary):  # type: ignore[misc]
             sys.modules["__main__"] = main
 
 
-def _context() -> Any:
+def context() -> Any:
     """How workers begin: forked from a server that has imported what they need, where there is
     such a thing."""
     context: Any = copy(multiprocessing.get_context(_START))

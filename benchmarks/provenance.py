@@ -40,7 +40,7 @@ _LIBRARIES = (
 @cache
 def environment() -> Environment:
     """With what this process makes results: versions, platform, commit."""
-    packages, commit = _versions(), _commit()
+    packages, commit = library_versions(), commit_of_checkout()
     python = platform.python_version()
     return Environment(
         content={
@@ -50,7 +50,7 @@ def environment() -> Environment:
             "python": python,
             "packages": packages,
             "platform": plain(platform.platform(), LONGEST_LINE),
-            "processor": plain(_processor(), LONGEST_LINE),
+            "processor": plain(processor_name(), LONGEST_LINE),
             "cores": threads_for(-1),
             "threads": ONE_THREAD,
         },
@@ -82,12 +82,13 @@ def process_peak_mb() -> float | None:
 
 
 @cache
-def _versions() -> dict[str, str]:
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that results may hang on."""
     return {name: metadata.version(name) for name in _LIBRARIES}
 
 
 @cache
-def _commit() -> dict[str, Any] | None:
+def commit_of_checkout() -> dict[str, Any] | None:
     """Commit of the checkout the code runs from and whether it was changed since."""
     root = PACKAGE.parent
 
@@ -114,7 +115,8 @@ def _commit() -> dict[str, Any] | None:
         return None
 
 
-def _processor() -> str:
+def processor_name() -> str:
+    """The processor's name, as the system has it."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:

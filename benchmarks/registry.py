@@ -109,15 +109,14 @@ class Entry:
         wrong."""
         known = self.method.Parameters.model_fields
         try:
-            built = self.made(parameters).parameters
-            complete: dict[str, Any] = json.loads(json.dumps(built.model_dump(mode="json")))
+            typed = self.with_parameters(parameters).parameters
+            complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
         except ValidationError as error:
-            found = problems_inline(error, known)
-            names = ", ".join(known) or "none"
-            raise CoarticError(f"method {self.name!r}: {found}. Its parameters: {names}.") from None
+            wrong, names = problems_inline(error, known), ", ".join(known) or "none"
+            raise CoarticError(f"method {self.name!r}: {wrong}. Its parameters: {names}.") from None
         return complete
 
-    def made(self, parameters: Mapping[str, Any]) -> Method:
+    def with_parameters(self, parameters: Mapping[str, Any]) -> Method:
         """The method with these parameters."""
         return self.method(self.method.Parameters(**parameters))
 
@@ -128,11 +127,11 @@ class Entry:
         """
         self.complete(parameters or {})
         try:
-            reason = self.made(parameters or {}).why_not(task)
+            reason = self.with_parameters(parameters or {}).why_not(task)
         except Exception as error:
             raise CoarticError(
                 f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
-                f"{brief(error)}"
+                f"{error_line(error)}"
             ) from None
         return None if reason is None else plain(str(reason))
 
@@ -146,18 +145,18 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     A plug-in that cannot be loaded is a warning. Raises MethodFileError for a file that
     cannot be loaded, holds no method, or takes an id that is reserved or already there.
     """
-    found = dict(built_in())
+    entries = dict(built_in())
     for point in metadata.entry_points(group=ENTRY_POINTS):
         origin = f"plug-in {point.dist.name if point.dist else point.value}"
         try:  # a broken plug-in must not take the others with it
-            _add(found, _installed(point, origin))
+            add_entries(entries, entries_of_plugin(point, origin))
         except CoarticError as error:
             warnings.warn(
                 f"{origin}: entry point {point.name!r} cannot be used: {error}", stacklevel=2
             )
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        _add(found, _from_file(path))
-    return found
+        add_entries(entries, entries_of_file(path))
+    return entries
 
 
 @cache
@@ -166,7 +165,7 @@ def built_in() -> Mapping[str, Entry]:
     entries: dict[str, Entry] = {}
     for name in MODULES:
         module = importlib.import_module(name)
-        code = code_of(_file_of(module))  # once for its methods: it takes a while
+        code = code_of(file_of(module))  # once for its methods: it takes a while
         entries |= {method.name: Entry(method, BUILT_IN, name, code) for method in module.METHODS}
     return entries
 
@@ -174,10 +173,9 @@ def built_in() -> Mapping[str, Entry]:
 def method_at(where: str, name: str) -> type[Method]:
     """A method by what :attr:`Entry.where` and its id say, as a worker imports it."""
     module = file_module(Path(where)) if where.endswith(".py") else importlib.import_module(where)
-    for method in [*getattr(module, "METHODS", ()), *_methods_in(module, module.__name__)]:
+    for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
         if method.name == name:
-            found: type[Method] = method
-            return found
+            return method  # type: ignore[no-any-return]
     raise MethodFileError(f"{where} defines no method {name!r}")
 
 
@@ -195,21 +193,15 @@ def file_module(path: Path) -> ModuleType:
     return module
 
 
-def current_code(where: str, name: str) -> str:
-    """Hash of the code of a method that is imported from ``where``."""
-    with _parsing:
-        return _current_code(where, name)
-
-
 _parsing = threading.Lock()  # Python 3.11 cannot parse in two threads at once
 
 
-@cache
-def _current_code(where: str, name: str) -> str:
-    if where.endswith(".py"):
-        found = {entry.name: entry.code for entry in _from_file(Path(where))}
-        return found.get(name, "none")
-    return code_of(_file_of(importlib.import_module(where)))
+def current_code(where: str, name: str) -> str:
+    """Hash of the code of a method that is imported from ``where``; ``none`` where it has none."""
+    with _parsing:
+        if where.endswith(".py"):
+            return {e.name: e.code for e in entries_of_file(Path(where))}.get(name, "none")
+        return code_of(file_of(importlib.import_module(where)))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
@@ -225,54 +217,57 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
 _MOST_NAMED = 40  # in an error
 
 
-def _add(found: dict[str, Entry], entries: Iterable[Entry]) -> None:
+def add_entries(known: dict[str, Entry], entries: Iterable[Entry]) -> None:
+    """Add methods by id. Raises MethodFileError for an id that is reserved or taken."""
     for entry in entries:
         if entry.name.startswith(RESERVED):
             raise MethodFileError(
                 f"{entry.origin}: method id {entry.name!r} is reserved: ids that begin with "
                 f"{' or '.join(map(repr, RESERVED))} are this project's"
             )
-        if entry.name in found:
+        if entry.name in known:
             raise MethodFileError(
                 f"{entry.origin}: method id {entry.name!r} is already taken "
-                f"({found[entry.name].origin})"
+                f"({known[entry.name].origin})"
             )
-        found[entry.name] = entry
+        known[entry.name] = entry
 
 
-def _from_file(path: Path) -> Iterator[Entry]:
+def entries_of_file(path: Path) -> Iterator[Entry]:
+    """The methods of a file. Raises MethodFileError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
     if not path.is_file():
         raise MethodFileError(f"{shown}: there is no such file")
     try:
         module = file_module(path)
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"{shown}: cannot be imported: {brief(error)}") from None
-    yield from _entries(module, _methods_in(module, module.__name__), shown, str(path))
+        raise MethodFileError(f"{shown}: cannot be imported: {error_line(error)}") from None
+    yield from entries_of_module(module, methods_in(module), shown, str(path))
 
 
-def _installed(point: metadata.EntryPoint, origin: str) -> Iterator[Entry]:
+def entries_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[Entry]:
+    """The methods of an installed plug-in. Raises MethodFileError."""
     try:
         target = point.load()
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"cannot be imported: {brief(error)}") from None
+        raise MethodFileError(f"cannot be imported: {error_line(error)}") from None
     if not inspect.isclass(target):
-        yield from _entries(target, _methods_in(target, target.__name__), origin, target.__name__)
+        yield from entries_of_module(target, methods_in(target), origin, target.__name__)
     elif issubclass(target, Method):
         module = sys.modules[target.__module__]
-        yield from _entries(module, [target], origin, module.__name__)
+        yield from entries_of_module(module, [target], origin, module.__name__)
     else:
         raise MethodFileError(f"{target!r} is not a subclass of coartic.method.Method")
 
 
-def _entries(
+def entries_of_module(
     module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
 ) -> Iterator[Entry]:
-    found = False
+    """Methods of a module with their code. Raises MethodFileError where there is none."""
+    methods = list(methods)
     for method in methods:
-        found = True
         check_declaration(method, origin)
-        file = _file_of(module)
+        file = file_of(module)
         data = tuple(file.parent / name for name in method.files)
         try:
             code = code_of(file, data)
@@ -283,10 +278,10 @@ def _entries(
             ) from None
         except (SyntaxError, ValueError) as error:
             raise MethodFileError(
-                f"{origin}: it imports what is no Python: {brief(error)}"
+                f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
         yield Entry(method, origin, where, code)
-    if not found:
+    if not methods:
         unfinished = [
             f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
             for value in vars(module).values()
@@ -316,8 +311,8 @@ def check_declaration(method: type[Method], origin: str) -> None:
         ("secondary", tuple | list, "a tuple of texts"),
         ("files", tuple | list, "a tuple of names"),
     ):
-        if not isinstance(given := getattr(method, attribute), kind):
-            raise MethodFileError(f"{where}: {attribute} must be {what}, not {given!r}")
+        if not isinstance(value := getattr(method, attribute), kind):
+            raise MethodFileError(f"{where}: {attribute} must be {what}, not {value!r}")
     if not inspect.isclass(method.Parameters) or not issubclass(method.Parameters, BaseModel):
         raise MethodFileError(
             f"{where}: Parameters must be a subclass of coartic.method.Parameters"
@@ -327,12 +322,12 @@ def check_declaration(method: type[Method], origin: str) -> None:
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 
 
-def brief(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """An exception in one line."""
     return plain(f"{type(error).__name__}: {error}")
 
 
-def _methods_in(module: ModuleType, name: str) -> list[type[Method]]:
+def methods_in(module: ModuleType) -> list[type[Method]]:
     """The methods that a module itself defines, complete ones."""
     return [
         value
@@ -340,10 +335,11 @@ def _methods_in(module: ModuleType, name: str) -> list[type[Method]]:
         if inspect.isclass(value)
         and issubclass(value, Method)
         and not inspect.isabstract(value)
-        and value.__module__ == name
+        and value.__module__ == module.__name__
     ]
 
 
-def _file_of(module: ModuleType) -> Path:
+def file_of(module: ModuleType) -> Path:
+    """The file of a module."""
     assert module.__file__ is not None
     return Path(module.__file__)

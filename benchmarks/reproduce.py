@@ -29,18 +29,18 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
         raise CoarticError(
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c."
         )
-    found: dict[str, Path] = {}
+    folder_of: dict[str, Path] = {}
     for path in sorted(folder.rglob(FILE)):
         with open_store(path.parent) as store:
-            found |= dict.fromkeys(store.ids(prefix), path.parent)
-    if not found:
+            folder_of |= dict.fromkeys(store.ids(prefix), path.parent)
+    if not folder_of:
         raise CoarticError(
             f"there is no run {prefix!r} in {folder}. Name another folder with --in."
         )
-    if len(found) > 1:
-        shown = ", ".join(sorted(found)[:4]) + (", ..." if len(found) > 4 else "")
-        raise CoarticError(f"{prefix!r} is the beginning of {len(found)} runs: {shown}")
-    ((run_id, place),) = found.items()
+    if len(folder_of) > 1:
+        some = ", ".join(sorted(folder_of)[:4]) + (", ..." if len(folder_of) > 4 else "")
+        raise CoarticError(f"{prefix!r} is the beginning of {len(folder_of)} runs: {some}")
+    ((run_id, place),) = folder_of.items()
     with open_store(place) as store:
         return place, store.run(run_id)
 
@@ -90,9 +90,9 @@ def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str,
         plan = store.plan()
         ids = [
             run_id
-            for cell in plan.cells
+            for position, cell in enumerate(plan.cells)
             if cell.method in known and known[cell.method].code == plan.methods[cell.method].code
-            for run_id in plan.run_ids(cell)
+            for run_id in plan.run_ids(position)
         ]
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
@@ -103,37 +103,41 @@ def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str,
 def differences(a: Run, b: Run) -> list[str]:
     """In what the results of two runs differ; times and surroundings apart."""
     found = [
-        f"{name}: {_shown(a.row[name])} against {_shown(b.row[name])}"
+        f"{name}: {shown(a.row[name])} against {shown(b.row[name])}"
         for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
         if a.row[name] != b.row[name]
     ]
     for part, prefix in zip(PARTS, ("", "initial_", "replay_"), strict=True):
-        first, second = (_plain(run.movements.get(part, ())) for run in (a, b))
+        first, second = (plain_movements(run.movements.get(part, ())) for run in (a, b))
         if first != second:
             scores = [
                 f"{run.row[f'{prefix}reward']} with {run.row[f'{prefix}hands']}" for run in (a, b)
             ]
             found.append(f"{part}: {scores[0]} against {scores[1]}")
     if a.rewards != b.rewards:
-        found.append(f"rewards by trial differ{_first_difference(a.rewards, b.rewards)}")
+        found.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
     return found
 
 
-def _plain(movements: Sequence[Movement]) -> list[Any]:
-    plain = []
-    for own in movements:
-        target = None if own.target is None else own.target.tolist()
-        points = None if own.waypoints is None else own.waypoints.tolist()
-        plain.append((own.goal, own.hand, own.kind, own.ticks, target, points))
-    return plain
+def plain_movements(movements: Sequence[Movement]) -> list[Any]:
+    """Movements as plain data, which can be compared."""
+    return [
+        (
+            *(m.goal, m.hand, m.kind, m.ticks),
+            *(None if q is None else q.tolist() for q in (m.target, m.waypoints)),
+        )
+        for m in movements
+    ]
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value in at most 200 characters."""
     text = repr(value)
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 
-def _first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
+def first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
+    """Where two lists of rewards differ first, in words."""
     for index, (x, y) in enumerate(zip(a, b, strict=False)):
         if x != y:
             return f", first at trial {index}: {x} against {y}"

@@ -41,12 +41,12 @@ _SURE = frozenset({"ok", "infeasible"})  # whoever was beside
 _RETRIED = frozenset({"timeout", "crashed"})
 
 
-def _check_list(name: str, given: object) -> None:
+def check_list(name: str, value: object) -> None:
     """Raises CoarticError for what is no list of names, one text above all."""
-    if isinstance(given, str | Path):
-        raise CoarticError(f"{name} is a list: write {name}=[{str(given)!r}]")
-    if not isinstance(given, Sequence) or not all(isinstance(item, str | Path) for item in given):
-        raise CoarticError(f"{name} is {given!r}; it must be a list of names or paths")
+    if isinstance(value, str | Path):
+        raise CoarticError(f"{name} is a list: write {name}=[{str(value)!r}]")
+    if not isinstance(value, Sequence) or not all(isinstance(item, str | Path) for item in value):
+        raise CoarticError(f"{name} is {value!r}; it must be a list of names or paths")
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Selection:
     method_files: Sequence[str | Path] = ()
 
     def __post_init__(self) -> None:
-        for name, given in vars(self).items():
-            _check_list(name, given)
+        for name, value in vars(self).items():
+            check_list(name, value)
 
 
 ALL_OF_IT = Selection()
@@ -163,9 +163,9 @@ class SuitePlan:
         executor = executor or Local()
         with writing(folder) as store:
             store.ask(self.plan, environment(), command(), now())
-            progress, missing = self._missing(store, retry_failed, redo)
+            progress, missing = self.missing_runs(store, retry_failed, redo)
             watch(progress, "")
-            for position, run in self._performed(missing, executor, store):
+            for position, run in self.perform_lots(missing, executor, store):
                 cell = self.plan.cells[position]
                 progress.done += 1
                 progress.failed += run.status != "ok"
@@ -174,7 +174,7 @@ class SuitePlan:
             crashed = store.statuses().get("crashed", 0)
             return RunReport(folder, progress, wall_s, crashed, store.count() - self.plan.size)
 
-    def _missing(
+    def missing_runs(
         self, store: Store, retry_failed: bool, redo: bool
     ) -> tuple[Progress, dict[int, list[int]]]:
         """What is there, and the numbers of the runs to perform, by the position of the cell."""
@@ -190,17 +190,17 @@ class SuitePlan:
                 progress.failed += status != "ok"
         return progress, {p: sorted(numbers) for p, numbers in missing.items() if numbers}
 
-    def _performed(
+    def perform_lots(
         self, missing: dict[int, list[int]], executor: Executor, store: Store
     ) -> Iterator[tuple[int, Run]]:
         """Each run with the position of its cell, once it is kept."""
-        lots = list(self._lots(missing, executor.workers))
+        lots = list(self.lots(missing, executor.workers))
         while lots:
             alone: list[tuple[int, list[int]]] = []
-            jobs = [self._job(position, numbers) for position, numbers in lots]
+            jobs = [self.job(position, numbers) for position, numbers in lots]
             for index, answer in executor.perform(jobs):
                 position, numbers = lots[index]
-                runs = self._runs(position, numbers, answer)
+                runs = self.runs_of(position, numbers, answer)
                 if len(numbers) > 1:  # one that went wrong beside others may have had it from them
                     alone += [(position, [r.row["run"]]) for r in runs if r.status not in _SURE]
                     runs = [run for run in runs if run.status in _SURE]
@@ -208,7 +208,7 @@ class SuitePlan:
                 yield from ((position, run) for run in runs)
             lots = alone
 
-    def _lots(self, missing: dict[int, list[int]], workers: int) -> Iterator[tuple[int, list[int]]]:
+    def lots(self, missing: dict[int, list[int]], workers: int) -> Iterator[tuple[int, list[int]]]:
         """Runs that are performed side by side; results do not depend on which these are.
 
         A run beside many takes a fraction of its time alone, so lots are as large as methods take
@@ -221,15 +221,16 @@ class SuitePlan:
         for position, numbers in missing.items():
             cell = self.plan.cells[position]
             entry = self.entries[cell.method]
-            most = entry.made(cell.complete).most_together() if entry.is_ours else 1
-            lots += [(position, part) for part in _in_parts(numbers, min(most, share))]
-        whole = len(lots) - len(lots) % workers
-        yield from lots[:whole]
-        for position, numbers in lots[whole:]:
-            size = max(math.ceil(len(numbers) * (len(lots) - whole) / workers), LEAST_TOGETHER)
-            yield from ((position, part) for part in _in_parts(numbers, size))
+            most = entry.with_parameters(cell.complete).most_together() if entry.is_ours else 1
+            lots += [(position, part) for part in in_parts(numbers, min(most, share))]
+        rest = len(lots) % workers
+        yield from lots[: len(lots) - rest]
+        for position, numbers in lots[len(lots) - rest :]:
+            size = max(math.ceil(len(numbers) * rest / workers), LEAST_TOGETHER)
+            yield from ((position, part) for part in in_parts(numbers, size))
 
-    def _job(self, position: int, numbers: list[int]) -> Job:
+    def job(self, position: int, numbers: list[int]) -> Job:
+        """Runs of a cell that are performed side by side."""
         cell, plan = self.plan.cells[position], self.plan
         return job_of(
             self.entries[cell.method],
@@ -241,11 +242,11 @@ class SuitePlan:
             time_limit_s=plan.time_limit_s,
         )
 
-    def _runs(self, position: int, numbers: list[int], answer: Answer | Failure) -> list[Run]:
+    def runs_of(self, position: int, numbers: list[int], answer: Answer | Failure) -> list[Run]:
         """The runs of a job as they are kept."""
         cell, plan = self.plan.cells[position], self.plan
-        asked, code = plan.asked(cell), plan.methods[cell.method].code
-        names = [
+        asked, code = plan.asked[position], plan.methods[cell.method].code
+        identities = [
             {
                 "run_id": run_id(asked, plan.seed, number, code),
                 "suite_seed": plan.seed,
@@ -255,7 +256,9 @@ class SuitePlan:
             }
             for number in numbers
         ]
-        return kept(names, answer, self.tasks[cell.task], self.entries[cell.method], plan.model)
+        return kept(
+            identities, answer, self.tasks[cell.task], self.entries[cell.method], plan.model
+        )
 
 
 def run_suite(
@@ -297,7 +300,7 @@ def plan_suite(
     """
     if not isinstance(select, Selection):
         raise CoarticError(f"select is {select!r}; it must be a Selection")
-    _check_list("readings", readings)
+    check_list("readings", readings)
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
     cells = select_cells(
@@ -355,10 +358,10 @@ def plan_cells(
         name, defaults = cell.task.name, entry.defaults
         if name not in tasks:
             tasks[name] = checked_task(task_under(chosen, cell.task), model)
-        own = {key: value for key, value in read.items() if key in defaults}
-        own |= dict(cell.parameters)
-        given = {"trials": trials} if trials is not None and "trials" in defaults else {}
-        complete = entry.complete(given | own)
+        parameters = {key: value for key, value in read.items() if key in defaults}
+        parameters |= dict(cell.parameters)
+        default_trials = {"trials": trials} if trials is not None and "trials" in defaults else {}
+        complete = entry.complete(default_trials | parameters)
         if trials_in(complete) > MOST_TRIALS:
             raise CoarticError(
                 f"{name} x {cell.label}: {trials_in(complete):_} trials a run; "
@@ -366,21 +369,21 @@ def plan_cells(
             )
         # What is asked for of all cells goes before what the suite says of one.
         count = runs or cell.runs or suite.runs
-        made = PlannedCell(
+        planned_cell = PlannedCell(
             task=name,
             method=entry.name,
-            variant=variant_of(own, defaults),
-            parameters=own,
+            variant=variant_of(parameters, defaults),
+            parameters=parameters,
             complete=complete,
             runs=count if entry.method.stochastic else 1,
         )
-        first = names.setdefault(hash_of([name, entry.name, complete]), made)
-        if first is not made:
+        first = names.setdefault(hash_of([name, entry.name, complete]), planned_cell)
+        if first is not planned_cell:
             raise CoarticError(
-                f"{first.label!r} and {made.label!r} on task {name!r} are the same runs; leave "
-                "one of them out"
+                f"{first.label!r} and {planned_cell.label!r} on task {name!r} are the same runs; "
+                "leave one of them out"
             )
-        planned.append(made)
+        planned.append(planned_cell)
     if (count := sum(cell.runs for cell in planned)) > MOST_PLANNED:
         raise CoarticError(
             f"{count:_} runs are planned; at most {MOST_PLANNED:_} can be run at once"
@@ -400,6 +403,7 @@ def plan_cells(
     return SuitePlan(plan, entries, tasks)
 
 
-def _in_parts(numbers: list[int], size: int) -> Iterator[list[int]]:
+def in_parts(numbers: list[int], size: int) -> Iterator[list[int]]:
+    """Runs in parts of so many, the last one of what is left."""
     for first in range(0, len(numbers), size):
         yield numbers[first : first + size]

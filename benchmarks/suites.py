@@ -39,6 +39,7 @@ from coartic.inputs import (
     brief_value,
     problems,
     read_toml,
+    sentence,
 )
 from coartic.learner.learning import METHOD_PREFIX
 from coartic.robot import Finite
@@ -60,38 +61,42 @@ MOST_PARAMETERS = 50
 Scalar = bool | int | float | str
 
 
-def _scalar(value: Any) -> Scalar:
+def plain_scalar(value: Any) -> Scalar:
     """A value that prints in one way, on one line, and reads as what was written."""
     match value:
         case bool():
-            right = True
+            is_plain = True
         case int():
-            right = abs(value) <= LARGEST_INTEGER
+            is_plain = abs(value) <= LARGEST_INTEGER
         case float():
-            right = math.isfinite(value)
+            is_plain = math.isfinite(value)
         case str():
-            right = plain(value, LONGEST_WORD) == value
+            is_plain = plain(value, LONGEST_WORD) == value
         case _:
-            right = False
-    if not right:
+            is_plain = False
+    if not is_plain:
         raise PydanticCustomError(
             "scalar",
             "should be true, false, a finite number (integers up to 2^53), "
             "or one line of up to {most} printable characters",
             {"most": LONGEST_WORD},
         )
-    found: Scalar = value
-    return found
+    scalar: Scalar = value
+    return scalar
 
 
-_Value = Annotated[Scalar, PlainValidator(_scalar)]
+_Value = Annotated[Scalar, PlainValidator(plain_scalar)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
-class _Move(BaseModel):
-    """A family of tasks that differ in where one goal is."""
+class SuitePart(BaseModel):
+    """A part of a suite file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Move(SuitePart):
+    """A family of tasks that differ in where one goal is."""
 
     goal: Annotated[int, Field(ge=1, strict=True)]
     """Which goal, from 1."""
@@ -99,14 +104,12 @@ class _Move(BaseModel):
     """Displacements in x and y, length unit; one task each."""
 
 
-class _Block(BaseModel):
+class Block(SuitePart):
     """Some methods on some tasks, under all combinations of some parameters."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     tasks: _Names
     methods: _Names
-    move: _Move | None = None
+    move: Move | None = None
     free_base: Annotated[bool, Field(strict=True)] = False
     """Whether the base moves in both directions, whatever the task locks."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
@@ -118,16 +121,13 @@ class _Block(BaseModel):
     ] = {}
 
     @model_validator(mode="after")
-    def _says_everything_once(self) -> _Block:
+    def says_everything_once(self) -> Block:
+        """Refuses a parameter that is there twice, or has a value twice."""
         for name, values in self.grid.items():
-            text = None
             if name in self.parameters:
-                text = "stands among the parameters and in the grid"
-            elif len(set(values)) < len(values):
-                text = "has the same value twice in the grid"
-            if text is not None:
-                context = {"name": brief_value(name), "text": text}
-                raise PydanticCustomError("twice", "{name} {text}", context)
+                raise sentence(f"{brief_value(name)} stands among the parameters and in the grid")
+            if len(set(values)) < len(values):
+                raise sentence(f"{brief_value(name)} has the same value twice in the grid")
         return self
 
     def methods_among(self, known: Iterable[str]) -> Iterable[str]:
@@ -143,22 +143,20 @@ class _Block(BaseModel):
         every = [*builtin_tasks(), *own]
         names: dict[str, None] = {}
         for name in dict.fromkeys(self.tasks):
-            names |= dict.fromkeys(every if name == ALL else _each_of(name))
+            if name == ALL:
+                stands_for = every
+            elif name.endswith(_MEMBERS):
+                stands_for = list(members(name.removesuffix(_MEMBERS)))
+            else:
+                stands_for = named_by(name)
+            names |= dict.fromkeys(stands_for)
             if len(names) > MOST_CELLS:  # which is said where all blocks are counted
                 break
         return list(names)
 
 
-def _each_of(name: str) -> list[str]:
-    if name.endswith(_MEMBERS):
-        return list(members(name.removesuffix(_MEMBERS)))
-    return named_by(name)
-
-
-class Suite(BaseModel):
+class Suite(SuitePart):
     """A suite as its file states it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
     title: Line
@@ -170,7 +168,7 @@ class Suite(BaseModel):
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
     readings: tuple[Line, ...] = ()
     """How the paper is read, as ``ties=right``; what is not named is the default."""
-    cells: Annotated[tuple[_Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
+    cells: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
 @dataclass(frozen=True)
@@ -189,16 +187,6 @@ class Cell:
         return self.entry.name
 
     @property
-    def stochastic(self) -> bool:
-        """Whether the seed matters to the method."""
-        return self.entry.method.stochastic
-
-    @property
-    def defaults(self) -> dict[str, Any]:
-        """The method's parameters with their defaults."""
-        return self.entry.defaults
-
-    @property
     def all_parameters(self) -> dict[str, Any]:
         """All parameters, defaults included, as the method reads them; CoarticError for bad."""
         return self.entry.complete(dict(self.parameters))
@@ -206,7 +194,7 @@ class Cell:
     @property
     def variant(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-        return variant_of(dict(self.parameters), self.defaults)
+        return variant_of(dict(self.parameters), self.entry.defaults)
 
     @property
     def label(self) -> str:
@@ -216,7 +204,7 @@ class Cell:
 
 def suites() -> dict[str, Suite]:
     """The shipped suites by name."""
-    return {path.stem: _read(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
+    return {path.stem: read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
 def load_suite(name: str) -> Suite:
@@ -225,7 +213,7 @@ def load_suite(name: str) -> Suite:
     Raises CoarticError for an unknown name or a file that cannot be used.
     """
     if name.endswith(".toml"):
-        return _read(Path(name))
+        return read_suite(Path(name))
     known = suites()
     if name not in known:
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
@@ -233,12 +221,13 @@ def load_suite(name: str) -> Suite:
     return known[name]
 
 
-def _read(path: Path) -> Suite:
+def read_suite(path: Path) -> Suite:
+    """A suite from its file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
-        keys = [*Suite.model_fields, *_Block.model_fields, *_Move.model_fields]
+        keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
         raise CoarticError(problems(str(path), error, keys)) from None
 
 
@@ -267,18 +256,18 @@ def select_cells(
     methods = [method for name in methods for method in methods_named(name, known)]
     files = [Path(name) for name in tasks if name.endswith(".toml")]
     named = [name for name in tasks if not name.endswith(".toml")]
-    own = _own_tasks(files)
+    own = tasks_of_files(files)
     tasks = [*itertools.chain(*map(named_by, named)), *own]
-    own = _own_tasks([*task_files, *files])
+    own = tasks_of_files([*task_files, *files])
     there = {name for block in suite.cells for name in block.tasks_among(own)}
     own |= {
         name: load_task(name)
         for name in tasks
         if (address_of(name) or task_of(name)) and name not in there | set(own)
     }
-    _check_size(suite, known, own)
-    cells = [cell for block in suite.cells for cell in _block_cells(suite, block, known, own)]
-    added, refused = _added_cells(cells, known, methods, own)
+    check_size(suite, known, own)
+    cells = [cell for block in suite.cells for cell in cells_of_block(suite, block, known, own)]
+    added, refused = added_cells(cells, known, methods, own)
     cells = distinct([*cells, *added])
     known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
     for name in tasks:
@@ -313,7 +302,7 @@ def methods_named(name: str, known: Registry) -> list[str]:
     return found
 
 
-def _own_tasks(paths: Iterable[Path]) -> dict[str, Task]:
+def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
     """The user's tasks by name, which no other task may have."""
     files: dict[str, Path] = {}
     own: dict[str, Task] = {}
@@ -328,7 +317,7 @@ def _own_tasks(paths: Iterable[Path]) -> dict[str, Task]:
     return own
 
 
-def _check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
+def check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
     """Refuse a suite of too many cells before they are made."""
     count = sum(
         len(block.tasks_among(own))
@@ -344,7 +333,7 @@ def _check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
         )
 
 
-def _added_cells(
+def added_cells(
     cells: Sequence[Cell], known: Registry, methods: Sequence[str], own: Mapping[str, Task]
 ) -> tuple[list[Cell], list[str]]:
     """What named methods and the user's tasks add to a suite's cells, and why not more."""
@@ -388,8 +377,8 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
     return list(found.values())
 
 
-def _block_cells(
-    suite: Suite, block: _Block, known: Registry, own: Mapping[str, Task]
+def cells_of_block(
+    suite: Suite, block: Block, known: Registry, own: Mapping[str, Task]
 ) -> list[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
@@ -399,44 +388,33 @@ def _block_cells(
     for name in block.tasks_among(own):
         if block.move is not None and ALL in block.tasks and name in own:
             continue
-        plain = own.get(name) or load_task(name)
+        task = own.get(name) or load_task(name)
         if block.free_base:
-            plain = _with_free_base(suite, plain)
-        for task in _family(suite, plain, block.move):
-            cells += _cells_of(suite, block, known, task)
-    return cells
-
-
-def _cells_of(suite: Suite, block: _Block, known: Registry, task: Task) -> list[Cell]:
-    """The cells of a block on one task."""
-    every = ALL in block.methods
-    cells = []
-    for name in block.methods_among(known):
-        reason = known[name].why_not(task, block.parameters)
-        if reason is not None:
-            if every or ALL in block.tasks:
+            task = with_free_base(suite, task)
+        variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
+        for variant, method in itertools.product(variants, block.methods_among(known)):
+            reason = known[method].why_not(variant, block.parameters)
+            if reason is not None and ALL not in (*block.methods, *block.tasks):
+                raise CoarticError(f"suite {suite.name!r}: {reason}")
+            if reason is not None:
                 continue  # "all that applies"
-            raise CoarticError(f"suite {suite.name!r}: {reason}")
-        for combination in itertools.product(*block.grid.values()):
-            point = dict(zip(block.grid, combination, strict=True))
-            parameters = {**block.parameters, **point}
-            cell = Cell(task, known[name], tuple(parameters.items()), block.runs)
-            cell.entry.complete(parameters)
-            cells.append(cell)
+            for values in itertools.product(*block.grid.values()):
+                point = dict(zip(block.grid, values, strict=True))
+                parameters = {**block.parameters, **point}
+                known[method].complete(parameters)
+                cells.append(Cell(variant, known[method], tuple(parameters.items()), block.runs))
     return cells
 
 
-def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
-    """The task itself, or its variants with one goal moved."""
-    if move is None:
-        return [task]
+def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:
+    """The variants of a task with one goal moved."""
     if move.goal > len(task.goals):
         raise CoarticError(
             f"suite {suite.name!r}: task {task.name!r} has no goal {move.goal} to move"
         )
     variants: dict[Any, Task] = {}
     for by in move.by:
-        dx, dy = map(_exact, by)
+        dx, dy = map(exact, by)
         goals = [list(goal) for goal in task.goals]
         goals[move.goal - 1][0] += by[0]
         goals[move.goal - 1][1] += by[1]
@@ -455,7 +433,7 @@ def _family(suite: Suite, task: Task, move: _Move | None) -> list[Task]:
     return list(variants.values())
 
 
-def _with_free_base(suite: Suite, task: Task) -> Task:
+def with_free_base(suite: Suite, task: Task) -> Task:
     """The task without its lock, by a name of its own."""
     if not task.locked_base:
         raise CoarticError(
@@ -473,7 +451,7 @@ def _with_free_base(suite: Suite, task: Task) -> Task:
     return parse_task(content, f"suite {suite.name!r}")
 
 
-def _exact(value: float) -> str:
+def exact(value: float) -> str:
     """A number in few digits, or in all of them where few would name another number."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)

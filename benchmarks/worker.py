@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from coartic.benchmarks.provenance import process_peak_mb
-from coartic.benchmarks.registry import Entry, brief, method_at
+from coartic.benchmarks.registry import Entry, error_line, method_at
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.learner.learning import METHOD_PREFIX, warm_up
 from coartic.method import (
@@ -134,11 +134,11 @@ def perform(job: Job) -> Answer:
     _performed.add(job.method)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        results = _results(job, task, sessions)
+        results = results_of(job, task, sessions)
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    outcomes = [_outcome(*pair) for pair in zip(results, sessions, strict=True)]
+    outcomes = [outcome_of(*pair) for pair in zip(results, sessions, strict=True)]
     return Answer(outcomes, wall, cpu, warm, process_peak_mb())
 
 
@@ -162,7 +162,10 @@ _performed: set[str] = set()
 _method = cache(method_at)
 
 
-def _results(job: Job, task: Task, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
+def results_of(
+    job: Job, task: Task, sessions: Sequence[Session]
+) -> Sequence[Result | BaseException]:
+    """What the method returns in each session."""
     method_class = _method(job.where, job.method)
     method = method_class(method_class.Parameters(**job.parameters))
     reason_not = method.why_not(task)
@@ -173,61 +176,64 @@ def _results(job: Job, task: Task, sessions: Sequence[Session]) -> Sequence[Resu
     return method.solve_together(sessions)
 
 
-def _outcome(result: Any, session: Session) -> Outcome:
+def outcome_of(result: Any, session: Session) -> Outcome:
     """A result as plain data, or how the run failed."""
-    meter = session.meter.as_dict()
-    own: dict[str, Any] = {
+    spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
-        "meter": meter,
+        "meter": session.meter.as_dict(),
         "rewards": session.rewards,
     }
     try:
         if isinstance(result, MethodError):
-            details = _details(result.details)
-            return Outcome(result.outcome, str(result), details=details, **own)
+            details = plain_details(result.details)
+            return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **own, **_stated(result, session))
+        return Outcome("ok", **spent, **stated(result, session))
     except UndeclaredError as error:
-        return Outcome("crashed", str(error), **own)
+        return Outcome("crashed", str(error), **spent)
     except BudgetError as error:
         reason = f"the method did not keep to its budget: {error}"
-        return Outcome("crashed", reason, **own)
+        return Outcome("crashed", reason, **spent)
     except (_ResultError, SolutionError) as error:
-        return Outcome("solver-failed", str(error), **own)
+        return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:
-        return Outcome("infeasible", str(error), **own)
+        return Outcome("infeasible", str(error), **spent)
     except BaseException as error:
-        return Outcome("crashed", brief(error), **own)
+        return Outcome("crashed", error_line(error), **spent)
 
 
 class _ResultError(ValueError):
     """What a method returned is no result."""
 
 
-def _stated(result: Any, session: Session) -> dict[str, Any]:
+def stated(result: Any, session: Session) -> dict[str, Any]:
+    """What a result says, as plain data. Raises for what cannot be kept."""
     if not isinstance(result, Result):
         raise _ResultError(f"the method returned {type(result).__name__}, not a Result")
     try:
         session.check_solution(tuple(result.solution))
-        parts = {part: [_plain(movement) for movement in getattr(result, part)] for part in PARTS}
-        details = _details(result.details)
+        parts = {
+            part: [plain_movement(movement) for movement in getattr(result, part)] for part in PARTS
+        }
+        details = plain_details(result.details)
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise _ResultError(f"the method's result cannot be kept: {brief(error)}") from None
+        raise _ResultError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {
-        "parts": {part: made for part, made in parts.items() if made},
+        "parts": {part: movements for part, movements in parts.items() if movements},
         "details": details,
         "bound": bound,
     }
 
 
-def _details(given: Any) -> dict[str, Any]:
+def plain_details(details: Any) -> dict[str, Any]:
     """As plain data."""
-    return dict(json.loads(json.dumps(given, allow_nan=False)))
+    return dict(json.loads(json.dumps(details, allow_nan=False)))
 
 
-def _plain(movement: Movement) -> PlainMovement:
+def plain_movement(movement: Movement) -> PlainMovement:
+    """A movement as plain data."""
     target, waypoints = movement.target, movement.waypoints
     return (
         int(movement.goal),

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import Counters, LearningRun, learn, learn_many
-    from coartic.learner.rows import learning_table, runs_table, solutions_table
     from coartic.model import PAPER, MotionModel
     from coartic.motion.corrective import Correction, correct
     from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
@@ -58,13 +57,10 @@ __all__ = [
     "initial_hands",
     "learn",
     "learn_many",
-    "learning_table",
     "load_task",
     "move",
     "objective",
     "parse_task",
-    "runs_table",
-    "solutions_table",
     "trajectory",
 ]
 
@@ -72,7 +68,6 @@ _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("Counters", "LearningRun", "learn", "learn_many"),
-    "learner.rows": ("learning_table", "runs_table", "solutions_table"),
     "model": ("PAPER", "MotionModel"),
     "motion.corrective": ("Correction", "correct"),
     "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pydantic_core import PydanticCustomError
 
 from coartic.errors import CoarticError
 from coartic.text import did_you_mean, plain
@@ -72,19 +74,14 @@ def brief_value(value: object) -> str:
         return "a number of more than 4300 digits"
 
 
-def problems(
-    source: str,
-    error: ValidationError,
-    known: Iterable[str] = (),
-    explain: Callable[[ErrorDetails], str | None] = lambda detail: None,
-) -> str:
+def problems(source: str, error: ValidationError, known: Iterable[str] = ()) -> str:
     """One line for each problem of a file, the first :data:`_SHOWN` of them.
 
-    In words of :func:`explained`, or of ``explain`` where it has some.
+    ``known`` are the keys that it may have, wherever they belong.
     """
-    details, shown = _causes(error), plain(source)
-    texts = (explain(detail) or explained(detail, known) for detail in details[:_SHOWN])
-    lines = list(dict.fromkeys(f"{shown}: {plain(text)}" for text in texts))
+    details, shown, known = causes(error), plain(source), list(known)
+    sentences = (plain(explained(detail, known)) for detail in details[:_SHOWN])
+    lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
     if len(details) > _SHOWN:
         lines.append(f"{shown}: has {len(details) - _SHOWN} more problems")
     return "\n".join(lines)
@@ -92,23 +89,19 @@ def problems(
 
 def problems_inline(error: ValidationError, known: Iterable[str] = (), most: int = 3) -> str:
     """The same as part of a sentence, the first ``most`` of them."""
-    details, known = _causes(error), list(known)
-    found = "; ".join(plain(explained(detail, known)) for detail in details[:most])
-    return found + (f" and {len(details) - most} more" if len(details) > most else "")
+    details, known = causes(error), list(known)
+    shown = "; ".join(plain(explained(detail, known)) for detail in details[:most])
+    return shown + (f" and {len(details) - most} more" if len(details) > most else "")
 
 
-def _causes(error: ValidationError) -> list[ErrorDetails]:
+def causes(error: ValidationError) -> list[ErrorDetails]:
     """The errors, without a list counted too short because of its bad entries."""
     details = error.errors(include_url=False)
-    return [
-        detail
-        for detail in details
-        if detail["type"] != "too_short"
-        or not any(
-            other["loc"] != detail["loc"] and other["loc"][: len(detail["loc"])] == detail["loc"]
-            for other in details
-        )
-    ]
+
+    def has_bad_entry(place: tuple[int | str, ...]) -> bool:
+        return any(d["loc"] != place and d["loc"][: len(place)] == place for d in details)
+
+    return [d for d in details if d["type"] != "too_short" or not has_bad_entry(d["loc"])]
 
 
 def key_of(location: tuple[int | str, ...]) -> str:
@@ -117,68 +110,26 @@ def key_of(location: tuple[int | str, ...]) -> str:
     for part in location:
         name = brief(str(part))
         text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
-    return text or "the whole"
+    return text
 
 
-_WANTED = {
-    "finite_number": "a finite number",
-    "float_type": "a number",
-    "float_parsing": "a number",
-    "int_type": "an integer",
-    "int_parsing": "an integer",
-    "int_parsing_size": "an integer that is not that long",
-    "int_from_float": "an integer",
-    "bool_type": "true or false",
-    "bool_parsing": "true or false",
-    "string_type": "a text",
-    "tuple_type": "a list",
-    "list_type": "a list",
-    "dict_type": "a table",
-    "model_type": "a table",
-    "model_attributes_type": "a table",
-    "dataclass_type": "a table",
-    "greater_than": "greater than {gt}",
-    "greater_than_equal": "at least {ge}",
-    "less_than": "less than {lt}",
-    "less_than_equal": "at most {le}",
-    "literal_error": "{expected}",
-    "enum": "{expected}",
-}
-_TYPE_TOLD = {"float_type", "int_type", "string_type", "tuple_type", "list_type"}
-"""Where the type of a value may not be seen from how it is written."""
+def sentence(text: str) -> PydanticCustomError:
+    """An error of a validator that says all by itself."""
+    return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def explained(detail: ErrorDetails, known: Iterable[str] = ()) -> str:
+def explained(detail: ErrorDetails, known: Sequence[str] = ()) -> str:
     """One sentence for a thing that is wrong; ``known`` is what an unknown key may have meant."""
-    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    key, shown = key_of(detail["loc"]), brief_value(value)
-    if kind in _WANTED:
-        found = f"{shown} ({type(value).__name__})" if kind in _TYPE_TOLD else shown
-        return f"{key} is {found}; it must be {_WANTED[kind].format(**context)}"
-    match kind:
+    key, message = key_of(detail["loc"]), detail["msg"]
+    match detail["type"]:
+        case "sentence":
+            return message
         case "missing":
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":
-            return f"{key} is an unknown key{did_you_mean(str(detail['loc'][-1]), known)}"
-        case "string_pattern_mismatch":
-            return f"{key} is {shown}; {_letters(context['pattern'])}"
-        case "string_too_long":
-            return f"{key} has {len(value)} characters; it takes {context['max_length']}"
-        case "too_short":
-            return f"{key} has too few entries; it needs at least {context['min_length']}"
-        case "too_long":
-            count = context["actual_length"] or "more"
-            return f"{key} has {count} entries; it takes {context['max_length']}"
-        case "not_plain" | "scalar":
-            return f"{key} {detail['msg']}"
-    message = detail["msg"]
-    return f"{key}: {message[:1].lower()}{message[1:]} (found {shown})"
-
-
-def _letters(pattern: str) -> str:
-    """What a pattern of names lets through, of one that ends in a set of characters."""
-    marks = re.search(r"0-9([^]]*)\]\*\$$", pattern)
-    if marks is None:
-        return f"it must match {pattern}"
-    *some, last = map(repr, marks[1])
-    return f"use letters, digits, {', '.join(some)} and {last} only"
+            name, table = str(detail["loc"][-1]), str(detail["loc"][0])
+            if len(detail["loc"]) > 1 and name in known:
+                return f"{key} is an unknown key; {name!r} belongs above the line [{table}]"
+            return f"{key} is an unknown key{did_you_mean(name, known)}"
+    message = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value error,) ", "", message)
+    return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"

@@ -199,20 +199,15 @@ class Robot:
         """Hand position as a CasADi expression, 2 x 1, for a CasADi ``q`` (dof x 1)."""
         import casadi
 
-        xs, ys = self._symbolic_chain(q, hand)
+        arm = self.arm(hand)
+        if q.numel() != self.dof:
+            raise ValueError(f"symbolic q has {q.numel()} entries; this robot needs {self.dof}")
+        xs: list[Any] = [None] * (len(arm.links) + 1)
+        ys: list[Any] = [None] * (len(arm.links) + 1)
+        # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
+        plain = arm._replace(links=[float(length) for length in arm.links])
+        chain(q, plain, xs, ys, casadi.cos, casadi.sin)
         return casadi.vertcat(xs[-1], ys[-1])
-
-    def symbolic_jacobian(self, q: Any, hand: Hand) -> Any:
-        """Jacobian of :meth:`symbolic_hand` as a CasADi expression, 2 x dof."""
-        import casadi
-
-        xs, ys = self._symbolic_chain(q, hand)
-        arm, tip = self.arm(hand), len(xs) - 1
-        columns: list[tuple[Any, Any]] = [(1.0, 0.0), (0.0, 1.0)]
-        columns += [(0.0, 0.0)] * (self.dof - BASE_DOF)
-        for k in range(tip):
-            columns[arm.first + k] = lever(xs, ys, k, tip)
-        return casadi.horzcat(*(casadi.vertcat(dx, dy) for dx, dy in columns))
 
     def _configuration(self, q: ArrayLike) -> Array:
         array = np.asarray(q, dtype=np.float64)
@@ -236,19 +231,6 @@ class Robot:
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
-
-    def _symbolic_chain(self, q: Any, hand: Hand) -> tuple[list[Any], list[Any]]:
-        import casadi
-
-        arm = self.arm(hand)
-        if q.numel() != self.dof:
-            raise ValueError(f"symbolic q has {q.numel()} entries; this robot needs {self.dof}")
-        xs: list[Any] = [None] * (len(arm.links) + 1)
-        ys: list[Any] = [None] * (len(arm.links) + 1)
-        # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
-        plain = arm._replace(links=[float(length) for length in arm.links])
-        chain(q, plain, xs, ys, casadi.cos, casadi.sin)
-        return xs, ys
 
 
 def directions(angles: ArrayLike) -> Array:

@@ -9,12 +9,9 @@ through :func:`one_line` wherever it comes from: each language escapes its own m
 from __future__ import annotations
 
 import difflib
-import os
 import re
-import shlex
 import unicodedata
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
@@ -63,25 +60,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     by_letters = {each.lower(): each for each in known}
     close = difflib.get_close_matches(name.lower(), by_letters, n=1)
     return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
-
-
-def shell_line(*arguments: str | Path) -> str:
-    """A command to paste: its arguments quoted for a shell, on one line that prints.
-
-    No path is taken for an option.
-    """
-    return " ".join(map(_quoted, arguments))
-
-
-def _quoted(argument: str | Path) -> str:
-    if isinstance(argument, Path):
-        argument = f"./{argument}" if str(argument).startswith("-") else str(argument)
-    if _printable_line(argument):
-        return shlex.quote(argument)
-    # bash, zsh and ksh read $'...', of which every other byte may be written by its number.
-    safe = frozenset(b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 @%+=:,./_-")
-    octets = (chr(b) if b in safe else f"\\{b:03o}" for b in os.fsencode(argument))
-    return f"$'{''.join(octets)}'"
 
 
 def _printable_line(text: str) -> bool:

@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
-from coartic.baselines.certificate import certify
+from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
 from coartic.baselines.relaxation import Multipliers, Relaxation, _normals, _support
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement
+from coartic.motion.trials import make_trials
 from coartic.robot import directions
-from coartic.tasks.task import hands_of
-from tests.support.strategies import changed
+from coartic.tasks.task import hands_of, letters_of
+from tests.support.strategies import UNEVEN, changed, uneven_task
 
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 
@@ -273,6 +274,64 @@ def test_two_goals_hit_at_once_count_once():
     assert found.ticks == 0
     assert not found.proven
     assert certify(task, 0, still=False, model=PAPER, most_nodes=50).proven
+
+
+@pytest.mark.parametrize("locked", [[], ["y"], ["x", "y"]])
+def test_no_hand_is_faster_than_the_fastest(locked):
+    """Of no configuration has the Jacobian a larger norm, and that of a straight arm has it."""
+    goals = [[1.0, 0.3], [1.0, 0.6]]
+    task = uneven_task([0.5], [0.5] * 4, goals=goals, locked_base=locked)
+    q = np.random.default_rng(5).uniform(-3, 3, (2000, UNEVEN.dof))
+    q[0, 2:] = 0.0
+    q[0, [task.robot.arm(hand).first for hand in task.hands]] = math.pi / 2  # at right angles to x
+    moving = np.ones(UNEVEN.dof)
+    moving[["xy".index(axis) for axis in locked]] = 0.0
+    for hand in task.hands:
+        norms = np.linalg.norm(UNEVEN.jacobian(q, hand) * moving, ord=2, axis=(1, 2))
+        assert fastest_hand(task, hand) == pytest.approx(norms.max(), rel=1e-12)
+
+
+def on_a_circle(start, angles):
+    """Both hands on one circle about a locked base, which each follows with a joint of its own."""
+    arm = {"left_links": (1.0,), "right_links": (1.0,)}
+    return Task(
+        name="circle",
+        robot=Robot(**arm, left_shoulder=(0.0, 0.0), right_shoulder=(0.0, 0.0)),
+        locked_base=("x", "y"),
+        start={"left": (start,), "right": (0.0,)},
+        goals=tuple(map(tuple, directions(angles).round(6).tolist())),
+        radius=0.02,
+        initial_hands="best-of-all",
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_takes_fewer_ticks_than_the_distances_say(seed):
+    """All hand sequences, and the waiting arm anywhere between where it was and will be."""
+    rng = np.random.default_rng(seed)
+    angles, start = rng.uniform(-1, 1, 3), rng.uniform(-1, 1)
+    task, ratios = on_a_circle(start, angles), []
+    for hands in itertools.product(task.hands, repeat=3):
+        targets = np.tile(task.q0, (500, 3, 1))
+        for hand, joint in (("left", 2), ("right", 3)):
+            used = [g for g in range(3) if hands[g] == hand]
+            targets[:, used, joint] = angles[used]
+            for g in set(range(3)) - set(used):
+                before = targets[:, g - 1, joint] if g else task.q0[joint]
+                after = angles[min((u for u in used if u > g), default=g)]
+                ahead = rng.random(500) * any(u > g for u in used)
+                targets[:, g, joint] = before + ahead * (after - before)
+        trials = make_trials(task, letters_of(hands), targets)
+        best = trials.ticks[trials.completed].min()
+        ratios.append(ticks_for_distance(task, PAPER.step, [hands]) / best)
+        assert ratios[-1] <= 1.0
+    assert max(ratios) > 0.8  # one hand goes as fast as it can; a chord is shorter than its arc
+
+
+def test_the_larger_bound_is_proven():
+    """On this instance few cone programmes prove less than the distances alone."""
+    task = load_task("one-armed/v1/i028")
+    assert certify(task, 813, still=True, model=PAPER, most_nodes=20).ticks == 520
 
 
 def test_a_goal_out_of_reach_leaves_no_path():

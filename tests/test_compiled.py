@@ -50,10 +50,10 @@ def test_a_user_without_a_home(monkeypatch, tmp_path):
     monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     monkeypatch.chdir(tmp_path)
-    assert compiled._cache_folder() is None
+    assert compiled.cache_folder() is None
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert compiled._cache_folder().parent == tmp_path / "cache" / "coartic"
+    assert compiled.cache_folder().parent == tmp_path / "cache" / "coartic"
 
 
 def test_a_change_in_a_called_module_is_noticed(tmp_path):
@@ -94,12 +94,12 @@ def test_machine_code_that_nobody_uses_is_removed(monkeypatch, tmp_path):
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    current = compiled._cache_folder()
+    current = compiled.cache_folder()
     old, other = (current.with_name(f"kernel-{16 * name}") for name in "ab")
     for folder, days in ((old, 40), (other, 20), (current, 40)):
         (folder / "code").mkdir(parents=True)
         os.utime(folder, 2 * (time.time() - days * 24 * 3600,))
-    assert compiled._cache_folder() == current  # used now
+    assert compiled.cache_folder() == current  # used now
     assert {*current.parent.iterdir()} == {current, other}
 
 
@@ -122,7 +122,7 @@ def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(compiled.FunctionCache, "_save_overload", full)
 
     @compiled.entry

@@ -10,7 +10,7 @@ from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
 from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.suites import Cell
 from coartic.motion.compiled import entry
-from coartic.motion.corrective import _errors
+from coartic.motion.corrective import find_fates
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.movement import Goal
 from coartic.motion.trigonometry import LARGEST
@@ -104,11 +104,11 @@ def test_lanes_do_not_mix(count, far):
 def _seen(at, count, goal, square):
     """As corrections begin each of their steps; all of one takes seconds to compile."""
     place(at, count, near(at, count))
-    _errors(at, count, goal, square)
+    find_fates(at, count, goal, square)
 
 
 def vectors():
-    """The widest registers with doubles that Numba may use, as the listing names them."""
+    """The widest registers with doubles that Numba may use, as a listing for x86 names them."""
     has = (config.CPU_FEATURES or get_host_cpu_features()).split(",")
     for feature, register in (("+avx512f", "zmm"), ("+avx", "ymm"), ("+sse2", "xmm")):
         if feature in has:
@@ -116,7 +116,7 @@ def vectors():
     return None
 
 
-@pytest.mark.skipif(not vectors(), reason="no vector instructions that this test knows")
+@pytest.mark.skipif(not vectors(), reason="the test reads the names of x86 vector registers alone")
 def test_the_listing_holds_vector_instructions():
     """More links than four, where LLVM's own bound on unrolling would end it."""
     robot, task = Robot(left_links=(0.8,) * 5, right_links=(0.8,) * 5), load_task("ascending")
@@ -170,7 +170,7 @@ def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
 
 
 def test_long_runs_are_fewer_side_by_side():
-    made = LEARNER.entry.made
+    made = LEARNER.entry.with_parameters
     most = [made({"trials": n}).most_together() for n in (10, 10_000, 1_000_000, 10**7)]
     assert most == [LANES, LANES, 4, 1]
 

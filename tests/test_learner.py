@@ -398,21 +398,12 @@ def test_errors():
         learn(load_task("ascending"), "EC3", seed=0)
     with pytest.raises(ValueError, match="at least 1"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
-    with pytest.raises(ValueError, match="not a probability"):
-        ExplorationCondition("x", ("left",), True, True, "none", epsilon=1.5)
-    for field, value, message in [
-        ("nullspace_gain", 1.5, "not within 0 to 1"),
-        ("nullspace_gain", float("nan"), "not within 0 to 1"),
-        ("bias", -1.0, "bias -1.0 is not within 0 to 100"),
-        ("noise_sd", 1e20, "not within 0 to 100"),
-        ("discount", 1.5, "discount 1.5 is not within 0 to 1"),
-        ("discount", float("nan"), "not within 0 to 1"),
-        ("discount", 0.5, "set credit to 'subtask'"),
-        ("credit", "goal", "credit is 'goal'; it must be 'overall' or 'subtask'"),
-    ]:
-        with pytest.raises(ValueError, match=message):
+    for field, value in [
+        ("epsilon", 1.5), ("nullspace_gain", float("nan")), ("bias", -1.0), ("noise_sd", 1e20),
+        ("discount", 1.5), ("discount", 0.5), ("credit", "goal"),
+    ]:  # fmt: skip
+        with pytest.raises(ValueError, match=field):
             replace(CONDITIONS["EC1"], **{field: value})
-
     for seed, kind in [(-1, ValueError), (None, TypeError), (True, TypeError), ([3], TypeError)]:
         with pytest.raises(kind, match="seed is"):
             learn(load_task("ascending"), "EC1", seed=seed, trials=1)

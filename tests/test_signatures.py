@@ -41,7 +41,6 @@ from coartic.analysis.signatures.subtasks import (
     sacrifices,
 )
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
-from coartic.learner.rows import movement_rows
 from tests.support.made_up import MadeUp, study_of
 from tests.support.strategies import as_released, changed, tiny_task
 
@@ -546,7 +545,11 @@ def solved_study(solved):
             rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
                          "status": "ok", "run": run, "reward": execution.reward,
                          "hands": execution.hands})  # fmt: skip
-            movements[run_id] = pd.DataFrame(movement_rows(task, execution.movements))
+            movements[run_id] = pd.DataFrame(
+                {"order": order, "goal": m.goal, "hand": m.hand, "kind": m.kind, "ticks": m.ticks}
+                | dict(zip(task.robot.joint_names, m.target, strict=True))
+                for order, m in enumerate(execution.movements)
+            )
         if not solutions:
             rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
                          "variant": "", "status": "infeasible", "run": 0})  # fmt: skip

@@ -87,7 +87,7 @@ def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
     assert group_of(alone, "corrective-alone/given") == BY_TRIAL  # ten trials in made-up rows
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
-    again = MadeUp(alone, sequences=SEQUENCES, optima=made_up_optima("ascending", "two-armed-1"))
+    again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
     assert group_of(again, "corrective-alone/given") == UNTOLD
     assert group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
 

@@ -9,8 +9,8 @@ Who is compared is decided before any reward is read:
   does so too. Searches for the optimum are references, no methods to compare with.
 
 So is the test. Conditions are compared as in the paper: a one-tailed bootstrap test that more
-exploration is better, as independent samples. All other pairs are paired by seed where runs share
-seeds, and tested two-tailed by sign flips.
+exploration is better, as independent samples. All other pairs are paired by seed where all runs of
+both have a partner, and tested two-tailed by sign flips.
 """
 
 from __future__ import annotations
@@ -117,7 +117,8 @@ def compared(kind: str, first: CellRuns, second: CellRuns) -> dict[str, Any]:
     samples = first.rewards, float(second.rewards[0]) if once else second.rewards
     better = probability_of_improvement(*samples)
     x, y = paired_by_seed(first.good, second.good)
-    shared = len(x) if kind != "conditions" and not once else 0
+    all_paired = len(x) == len(first.rewards) == len(second.rewards) > 0
+    shared = len(x) if all_paired and kind != "conditions" and not once else 0
     if shared:
         samples = x - y, 0.0
     difference = difference_of_means(*samples)

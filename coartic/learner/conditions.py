@@ -13,8 +13,11 @@ the paper calls crucial. Suite ablations measures what each does to learning.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError, need
 from coartic.robot import HANDS, Hand
@@ -34,22 +37,27 @@ Update = Literal["greater", "not-less"]
 Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
 State = Literal["previous-hand", "goal"]
+Share = Annotated[float, Field(ge=0, le=1)]
+Noise = Annotated[float, Field(ge=0, le=MOST_NOISE)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
-    """What the learner explores. Source: paper, section *Experiments*."""
+    """What the learner explores. Source: paper, section *Experiments*.
+
+    Raises pydantic.ValidationError, a ValueError, for what cannot be.
+    """
 
     id: str
-    hands: tuple[Hand, ...]
+    hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     modify_chosen: bool  # AModChosen
     modify_other: bool  # AModOther
     hand_exploration: HandExploration  # "random" is DASel
-    epsilon: float = 0.2  # ε
-    noise_sd: float = 0.05  # SD of η, length unit (base) or rad (joints)
-    nullspace_gain: float = 0.0
-    """β of the corrective process, 0 to 1 (:func:`coartic.motion.corrective.correct`)."""
-    bias: float = 0.0
+    epsilon: Share = 0.2  # ε
+    noise_sd: Noise = 0.05  # SD of η, length unit (base) or rad (joints)
+    nullspace_gain: Share = 0.0
+    """β of the corrective process (:func:`coartic.motion.corrective.correct`)."""
+    bias: Noise = 0.0
     """Mean of η along the step that **A** would make from q*, on the explored joints, in
     SDs of η. Its mean across that direction stays zero."""
     corrects: bool = True
@@ -70,33 +78,14 @@ class ExplorationCondition:
     """What Q and q* are learned for: a goal and the hand before it, or a goal alone."""
     learned: Learned = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
-
     credit: Credit = "overall"
     """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return from
     that goal on, the reward of its own subtask first."""
-    discount: float = 0.0
-    """γ, 0 to 1: the return is r_g + γ r_{g+1} + γ² r_{g+2} + …, with r_g the reward of the
-    movements to goal g. 0 is the reward of the subtask alone. With credit "subtask" only."""
+    discount: Share = 0.0
+    """γ: the return is r_g + γ r_{g+1} + γ² r_{g+2} + …, with r_g the reward of the movements to
+    goal g. 0 is the reward of the subtask alone. With credit "subtask" only."""
 
     def __post_init__(self) -> None:
-        if not self.hands or any(hand not in HANDS for hand in self.hands):
-            raise ValueError(f"hands {self.hands!r}: name 'left', 'right' or both")
-        if not 0.0 <= self.epsilon <= 1.0:
-            raise ValueError(f"epsilon {self.epsilon} is not a probability")
-        if not 0.0 <= self.noise_sd <= MOST_NOISE:
-            raise ValueError(f"noise_sd {self.noise_sd} is not within 0 to {MOST_NOISE:g}")
-        if not 0.0 <= self.nullspace_gain <= 1.0:
-            raise ValueError(f"nullspace_gain {self.nullspace_gain} is not within 0 to 1")
-        if not 0.0 <= self.bias <= MOST_NOISE:
-            raise ValueError(f"bias {self.bias} is not within 0 to {MOST_NOISE:g}")
-        if not 0.0 <= self.discount <= 1.0:
-            raise ValueError(f"discount {self.discount} is not within 0 to 1")
-        for name, options in _CHOICES.items():
-            if getattr(self, name) not in options:
-                *others, last = map(repr, options)
-                raise ValueError(
-                    f"{name} is {getattr(self, name)!r}; it must be {', '.join(others)} or {last}"
-                )
         if self.discount and self.credit == "overall":
             raise ValueError(
                 f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
@@ -120,13 +109,6 @@ class ExplorationCondition:
         return None
 
 
-_CHOICES: dict[str, tuple[str, ...]] = {
-    name: get_args(kind)
-    for name, kind in get_type_hints(ExplorationCondition).items()
-    if get_origin(kind) is Literal
-}
-"""What each field that is a choice may be."""
-
 CONDITIONS = {
     condition.id: condition
     for condition in (
@@ -136,23 +118,18 @@ CONDITIONS = {
         ExplorationCondition("EC4", HANDS, True, True, "random"),
     )
 }
-
-
 NULLSPACE_GAIN = 0.05  # β of the nullspace variants
 BIAS = 0.25  # of the biased variants, SDs of η
-
-
-def _variants(base: str) -> tuple[ExplorationCondition, ...]:
-    plain = CONDITIONS[base]
-    return (
-        replace(plain, id=f"{base}-nullspace", nullspace_gain=NULLSPACE_GAIN),
-        replace(plain, id=f"{base}-biased", bias=BIAS),
-        replace(plain, id=f"{base}-uncorrected", corrects=False),
-        replace(plain, id=f"{base}-subtask", credit="subtask"),
-    )
-
-
-VARIANTS = {condition.id: condition for base in ("EC1", "EC4") for condition in _variants(base)}
+VARIANTS = {
+    f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **changes)  # type: ignore[arg-type]
+    for base in ("EC1", "EC4")
+    for name, changes in {
+        "nullspace": {"nullspace_gain": NULLSPACE_GAIN},
+        "biased": {"bias": BIAS},
+        "uncorrected": {"corrects": False},
+        "subtask": {"credit": "subtask"},
+    }.items()
+}
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:

@@ -194,7 +194,8 @@ def work_for(runs: int, task: Task) -> Work:
 
 
 @inlined
-def _goal_distance(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
+def distance_to_goal(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
+    """How far a hand of run ``n`` is from the centre of a goal, length unit."""
     arm = arm_of(problem, hand)
     scratch = work.scratch
     joint_chain(work.runs[n].q, arm, scratch.xs, scratch.ys)
@@ -206,7 +207,7 @@ def _goal_distance(n: int, number: int, hand: int, problem: Any, work: Any) -> f
 
 
 @inner
-def _greedy(entries: Any, hands: Any) -> int:
+def greedy_hand(entries: Any, hands: Any) -> int:
     """Hand of the highest value; the first of equals."""
     best = hands[0]
     for hand in hands[1:]:
@@ -216,51 +217,53 @@ def _greedy(entries: Any, hands: Any) -> int:
 
 
 @inner
-def _equal(entries: Any, hands: Any) -> bool:
+def have_equal_values(entries: Any, hands: Any) -> bool:
     """Whether there are two hands, of equal value."""
     return len(hands) > 1 and bool(entries[hands[0]].value == entries[hands[1]].value)
 
 
 @inner
-def _random_hand(hands: Any, rng: Any) -> int:
+def random_hand(hands: Any, rng: Any) -> int:
+    """One of the hands, each as likely."""
     return int(hands[int(rng.random() * len(hands))])
 
 
 @inlined
-def _closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+def closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+    """The hand closest to a goal, a random one of equally close ones."""
     nearest = rules.hands[0]
-    nearest_distance = _goal_distance(n, number, nearest, problem, work)
+    nearest_distance = distance_to_goal(n, number, nearest, problem, work)
     tie = False
     for hand in rules.hands[1:]:
-        distance = _goal_distance(n, number, hand, problem, work)
+        distance = distance_to_goal(n, number, hand, problem, work)
         tie = abs(distance - nearest_distance) <= rules.rounding
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
-    return int(_random_hand(rules.hands, rng)) if tie else int(nearest)
+    return int(random_hand(rules.hands, rng)) if tie else int(nearest)
 
 
 @inlined
-def _untied(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+def hand_of_equals(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
     """Which of two hands of equal value, where it is not always the left one."""
     hand = 1
     if rules.ties == 2:
-        hand = _random_hand(rules.hands, rng)
+        hand = random_hand(rules.hands, rng)
     elif rules.ties == 3:
-        left = _goal_distance(n, number, 0, problem, work)
-        hand = 1 if _goal_distance(n, number, 1, problem, work) < left else 0
+        left = distance_to_goal(n, number, 0, problem, work)
+        hand = 1 if distance_to_goal(n, number, 1, problem, work) < left else 0
     elif rules.ties == 4:
         hand = 1 if work.trials[n].previous == 1 else 0
     return hand
 
 
 @inlined
-def _before(trial: Any, rules: Any) -> int:
+def previous_hand(trial: Any, rules: Any) -> int:
     """What the tables know of the goal before: its hand, or nothing."""
     return NO_HAND if rules.goal_alone else int(trial.previous)
 
 
 @inlined
-def _choose_hands(
+def choose_hands(
     number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
 ) -> None:
     """The hand of every run: greedy, or with probability ε an explored one."""
@@ -273,19 +276,19 @@ def _choose_hands(
             rng = generator_at(rngs, n)
             if rng.random() < rules.epsilon:
                 if rules.exploration == 1:
-                    hand = _random_hand(rules.hands, rng)
+                    hand = random_hand(rules.hands, rng)
                 else:
-                    hand = _closest_hand(n, number, problem, rules, rng, work)
+                    hand = closest_hand(n, number, problem, rules, rng, work)
         if hand < 0:
-            entries = tables[n, number, _before(trial, rules)]
-            hand = _greedy(entries, rules.hands)
-            if rules.ties != 0 and _equal(entries, rules.hands):
-                hand = _untied(n, number, problem, rules, generator_at(rngs, n), work)
+            entries = tables[n, number, previous_hand(trial, rules)]
+            hand = greedy_hand(entries, rules.hands)
+            if rules.ties != 0 and have_equal_values(entries, rules.hands):
+                hand = hand_of_equals(n, number, problem, rules, generator_at(rngs, n), work)
         trial.hand = hand
 
 
 @inlined
-def _set_target(
+def set_target(
     target: Any, q: Any, stored: Any, hand: int, explore: bool, rules: Any, rng: Any
 ) -> None:
     """q^t = q*(s, a) + η; joints that are not to be modified keep their current values."""
@@ -296,7 +299,7 @@ def _set_target(
 
 
 @inlined
-def _aim(
+def aim(
     number: int,
     first: bool,
     explore: bool,
@@ -314,16 +317,16 @@ def _aim(
         if not trial.going:
             continue
         hand = trial.hand
-        known = tables[n, number, _before(trial, rules), hand]
+        known = tables[n, number, previous_hand(trial, rules), hand]
         stored = known.target
         trial.stored = trial.aimed = known.value > -math.inf
         if not trial.stored and rules.explores_unknown and explore and not first:
             trial.aimed = True
             stored = run.q
         if not trial.aimed:
-            run.hit = _goal_distance(n, number, hand, problem, work) <= problem.radius
+            run.hit = distance_to_goal(n, number, hand, problem, work) <= problem.radius
             continue
-        _set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
+        set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
         if explore and rules.bias > 0.0:
             # The mean of η moves into the direction in which **A** would step from q*(s, a).
             arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
@@ -335,7 +338,10 @@ def _aim(
 
 
 @inlined
-def _record(log: Any, n: int, number: int, hand: int, kind: int, ticks: int, q: Any) -> None:
+def record_movement(
+    log: Any, n: int, number: int, hand: int, kind: int, ticks: int, q: Any
+) -> None:
+    """Log a movement of run ``n``."""
     movement = log.movements[n, log.count[n]]
     movement.goal = number
     movement.hand = hand
@@ -346,7 +352,7 @@ def _record(log: Any, n: int, number: int, hand: int, kind: int, ticks: int, q: 
 
 
 @inlined
-def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
+def move_runs(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
     """Move the acting runs to their targets and log it."""
     count = 0
     for n in range(len(work.runs)):
@@ -363,14 +369,14 @@ def _move(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
         if run.acting:
             trial.total += run.ticks
             trial.counts[COUNT.ticks] += run.ticks
-            _record(log, n, number, trial.hand, kind, run.ticks, run.target)
+            record_movement(log, n, number, trial.hand, kind, run.ticks, run.target)
             if kind == CORRECTIVE and not run.hit:
                 trial.counts[COUNT.failed] += 1
                 trial.going = False
 
 
 @inlined
-def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
+def correct_runs(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
     """Set the targets of runs that missed to what **A** finds; trials fail where it does not."""
     count = 0
     for n in range(len(work.runs)):
@@ -380,7 +386,7 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
             continue
         if run.hit:
             if not trial.aimed:
-                _record(log, n, number, trial.hand, CORRECTIVE, 0, run.q)
+                record_movement(log, n, number, trial.hand, CORRECTIVE, 0, run.q)
         elif trial.stored and not rules.corrects:
             trial.counts[COUNT.failed] += 1
             trial.going = False
@@ -400,7 +406,7 @@ def _correct(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None
 
 
 @inner
-def _trial(
+def make_trial(
     first: bool,
     explore: bool,
     first_hands: Any,
@@ -425,12 +431,12 @@ def _trial(
             for n in range(len(work.trials)):
                 work.trials[n].hand = first_hands[number]
         else:
-            _choose_hands(number, explore, problem, rules, tables, rngs, work)
-        _aim(number, first, explore, problem, rules, tables, rngs, work)
+            choose_hands(number, explore, problem, rules, tables, rngs, work)
+        aim(number, first, explore, problem, rules, tables, rngs, work)
         for kind in range(2):
             if kind == CORRECTIVE:
-                _correct(number, problem, rules, log, work)
-            _move(number, kind, problem, log, work)
+                correct_runs(number, problem, rules, log, work)
+            move_runs(number, kind, problem, log, work)
         for n in range(len(work.runs)):
             trial = work.trials[n]
             if trial.going:
@@ -442,7 +448,7 @@ def _trial(
 
 
 @inlined
-def _update(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
+def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
     """Credit what was visited with the reward of the trial, or each goal with its return."""
     row = log.count[n]
     later = 0.0
@@ -464,14 +470,15 @@ def _update(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
 
 
 @inlined
-def _copy(n: int, source: Any, destination: Any) -> None:
+def copy_movements(n: int, source: Any, destination: Any) -> None:
+    """Copy the logged movements of run ``n``."""
     for row in range(source.count[n]):
         destination.movements[n, row] = source.movements[n, row]
     destination.count[n] = source.count[n]
 
 
 @inner
-def _learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
+def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial after so many; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)
     part = 0 if earlier == 0 else 1 + (earlier - 1) * PARTS // others
@@ -484,13 +491,13 @@ def _learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work
         if not trial.going:
             continue
         if earlier == 0:
-            _copy(n, log, kept.first)
+            copy_movements(n, log, kept.first)
         if earlier > 0 or rules.first_learns:
-            _update(n, float(reward), rules, tables, log)
+            update_tables(n, float(reward), rules, tables, log)
         best = kept.best_trial[n]
         if best < 0 or reward > kept.rewards[n, best]:
             kept.best_trial[n] = earlier
-            _copy(n, log, kept.best)
+            copy_movements(n, log, kept.best)
 
 
 @entry
@@ -514,9 +521,9 @@ def learn_kernel(
         replay = trial == trials
         for n in range(len(work.trials) if replay else 0):  # which is not part of the runs
             fill_row(kept.counts[n], work.trials[n].counts)
-        _trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
+        make_trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
         if not replay:
-            _learn_from(trial, rules, tables, kept, log, work)
+            learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
         kept.replayed[n] = work.trials[n].going
-        _copy(n, log, kept.replay)
+        copy_movements(n, log, kept.replay)

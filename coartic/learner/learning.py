@@ -35,7 +35,7 @@ from coartic.motion.initial import InitialSearch, search_initial_hands
 from coartic.motion.lanes import LANES
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
-from coartic.motion.solution import Execution, Movement, execute
+from coartic.motion.solution import Execution, Movement, execute, hands_in
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of, letters_of
@@ -153,7 +153,7 @@ class LearningRun:
     @property
     def hands(self) -> str | None:
         """Hand sequence of what was learned."""
-        return _hands(self.learned) if self.learned else None
+        return hands_in(self.learned) if self.learned else None
 
     @property
     def initial_reward(self) -> int | None:
@@ -170,7 +170,7 @@ class LearningRun:
     @property
     def replay_hands(self) -> str | None:
         """Hand sequence of the replay."""
-        return _hands(self.replay) if self.replay_completed else None
+        return hands_in(self.replay) if self.replay_completed else None
 
     def execute(self) -> Execution:
         """Execute what was learned again, apart from the learner."""
@@ -223,19 +223,19 @@ def learn_many(
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
     search = search_initial_hands(task, condition.hands, model=model)
-    ordered: Sequence[int] = list(map(_checked_seed, seeds))
+    ordered: Sequence[int] = list(map(checked_seed, seeds))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
-    def perform(seeds: Sequence[int]) -> list[LearningRun]:
-        runs = _Learning(task, condition, model, search, seeds, trials).perform()
+    def perform(lot: Sequence[int]) -> list[LearningRun]:
+        runs = learn_together(task, condition, model, search, lot, trials)
         if on_done is not None:
             for run in runs:
                 on_done(run)
         return runs
 
-    _compile_for(task, condition, model, search)
+    compile_learner(task, condition, model, search)
     if threads == 1:
         return [run for lot in lots for run in perform(lot)]
     with ThreadPoolExecutor(threads) as pool:
@@ -246,7 +246,8 @@ _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
 
 
-def _checked_seed(seed: Any) -> int:
+def checked_seed(seed: Any) -> int:
+    """A seed as a number. Raises TypeError for what is none, ValueError for a negative one."""
     if not isinstance(seed, Integral) or isinstance(seed, bool):
         raise TypeError(f"seed is {seed!r}; it must be a whole number, the same for the same run")
     if seed < 0:
@@ -263,79 +264,78 @@ def threads_for(jobs: int) -> int:
     return os.cpu_count() or 1
 
 
-class _Learning:
-    """Runs side by side: the arguments of one call of the kernel, and what it fills."""
+def learn_together(
+    task: Task,
+    condition: ExplorationCondition,
+    model: MotionModel,
+    search: InitialSearch,
+    seeds: Sequence[int],
+    trials: int,
+) -> list[LearningRun]:
+    """All trials of runs side by side, one a seed, which differ in nothing else.
 
-    def __init__(
-        self,
-        task: Task,
-        condition: ExplorationCondition,
-        model: MotionModel,
-        search: InitialSearch,
-        seeds: Sequence[int],
-        trials: int,
-    ) -> None:
-        runs = len(seeds)
-        self._task, self._condition, self._model = task, condition, model
-        self._search, self._seeds = search, seeds
-        codes = [HANDS.index(hand) for hand in hands_of(search.hands)]
-        if len(codes) != len(task.goals):
-            raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
-        self._tables = empty_tables(runs, task)
-        self._kept = Kept(
-            rewards=np.zeros((runs, trials), dtype=np.int64),
-            completed=np.zeros((runs, trials), dtype=np.bool_),
-            best_trial=np.full(runs, -1),
-            replayed=np.zeros(runs, dtype=np.bool_),
-            counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
-            corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
-            first=empty_log(runs, task),
-            best=empty_log(runs, task),
-            replay=empty_log(runs, task),
-        )
-        self._work = work_for(runs, task)
-        self._generators = [np.random.default_rng(seed) for seed in seeds]
-        self._arguments = (
-            np.array(codes, dtype=np.int64),
-            problem_of(task, model, nullspace_gain=condition.nullspace_gain),
-            rules_of(task, condition),
-            self._tables,
-            self._kept,
-            empty_log(runs, task),
-            addresses(self._generators),
-            self._work,
-        )
-
-    def perform(self) -> list[LearningRun]:
-        """Make all trials of all runs."""
-        wall, cpu = time.perf_counter(), time.thread_time()
-        learn_kernel(*self._arguments)
-        wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
-        return [self._run(number, wall, cpu) for number in range(len(self._seeds))]
-
-    def _run(self, number: int, wall: float, cpu: float) -> LearningRun:
-        kept, tables, runs = self._kept, self._tables[number], len(self._seeds)
-        dof = self._task.robot.dof
-        best_trial = int(kept.best_trial[number])
-        return LearningRun(
-            task=self._task,
-            condition=self._condition,
-            model=self._model,
-            seed=self._seeds[number],
-            initial_search=self._search,
-            rewards=np.ma.array(kept.rewards[number], mask=~kept.completed[number]),
-            best_trial=best_trial if best_trial >= 0 else None,
-            initial=_movements(kept.first, number, dof),
-            solution=_movements(kept.best, number, dof),
-            replay=_movements(kept.replay, number, dof),
-            replay_completed=bool(kept.replayed[number]),
-            values=np.ascontiguousarray(tables["value"]),
-            targets=np.ascontiguousarray(tables["target"][..., :dof]),
-            corrections=np.diff(np.maximum.accumulate(kept.corrections[number]), prepend=0),
-            counters=_counters(kept.rewards.shape[1], kept.counts[number]),
+    Raises ValueError for more runs than there are lanes, and for initial hands that do not fit.
+    """
+    runs, dof = len(seeds), task.robot.dof
+    first_hands = [HANDS.index(hand) for hand in hands_of(search.hands)]
+    if len(first_hands) != len(task.goals):
+        raise ValueError(f"{len(first_hands)} initial hands for {len(task.goals)} goals")
+    tables = empty_tables(runs, task)
+    kept = Kept(
+        rewards=np.zeros((runs, trials), dtype=np.int64),
+        completed=np.zeros((runs, trials), dtype=np.bool_),
+        best_trial=np.full(runs, -1),
+        replayed=np.zeros(runs, dtype=np.bool_),
+        counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
+        corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
+        first=empty_log(runs, task),
+        best=empty_log(runs, task),
+        replay=empty_log(runs, task),
+    )
+    generators = [np.random.default_rng(seed) for seed in seeds]
+    arguments = (
+        np.array(first_hands, dtype=np.int64),
+        problem_of(task, model, nullspace_gain=condition.nullspace_gain),
+        rules_of(task, condition),
+        tables,
+        kept,
+        empty_log(runs, task),
+        addresses(generators),
+        work_for(runs, task),
+    )
+    wall, cpu = time.perf_counter(), time.thread_time()
+    learn_kernel(*arguments)
+    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    return [
+        LearningRun(
+            task=task,
+            condition=condition,
+            model=model,
+            seed=seed,
+            initial_search=search,
+            rewards=np.ma.array(kept.rewards[n], mask=~kept.completed[n]),
+            best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
+            initial=logged_movements(kept.first, n, dof),
+            solution=logged_movements(kept.best, n, dof),
+            replay=logged_movements(kept.replay, n, dof),
+            replay_completed=bool(kept.replayed[n]),
+            values=np.ascontiguousarray(tables[n]["value"]),
+            targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
+            corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),
+            counters=Counters(
+                trials=trials,
+                movement_ticks=int(kept.counts[n, COUNT.ticks]),
+                forward_kinematics=int(kept.counts[n, COUNT.evaluations]),
+                jacobians=int(kept.counts[n, [COUNT.iterations, COUNT.biased]].sum()),
+                corrective_iterations=int(kept.counts[n, COUNT.iterations]),
+                corrections=int(kept.counts[n, COUNT.corrections]),
+                failed_trials=int(kept.counts[n, COUNT.failed]),
+            ),
             wall_s=wall / runs,
             cpu_s=cpu / runs,
         )
+        for n, seed in enumerate(seeds)
+    ]
 
 
 def warm_up(task: Task, *, learns: bool = True) -> None:
@@ -348,48 +348,31 @@ def warm_up(task: Task, *, learns: bool = True) -> None:
     hands = letters_of([hand] * len(task.goals))
     if learns:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        _compile_for(task, condition, PAPER, InitialSearch(hands))
+        compile_learner(task, condition, PAPER, InitialSearch(hands))
     move(task.robot, task.q0, task.q0, hand, goal, task.radius)
     correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
     make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
 
 
-def _compile_for(
+def compile_learner(
     task: Task, condition: ExplorationCondition, model: MotionModel, search: InitialSearch
 ) -> None:
     """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
     links = task.robot.most_links
     if links not in _compiled_for:
-        _Learning(task, condition, model, search, [0], 0).perform()
+        learn_together(task, condition, model, search, [0], 0)
         _compiled_for.add(links)
 
 
-def _counters(trials: int, counts: NDArray[np.int64]) -> Counters:
-    iterations = int(counts[COUNT.iterations])
-    return Counters(
-        trials=trials,
-        movement_ticks=int(counts[COUNT.ticks]),
-        forward_kinematics=int(counts[COUNT.evaluations]),
-        jacobians=iterations + int(counts[COUNT.biased]),
-        corrective_iterations=iterations,
-        corrections=int(counts[COUNT.corrections]),
-        failed_trials=int(counts[COUNT.failed]),
-    )
-
-
-def _movements(log: Log, run: int, dof: int) -> tuple[Movement, ...]:
+def logged_movements(log: Log, run: int, dof: int) -> tuple[Movement, ...]:
+    """The movements of a run in a log of the kernel."""
     return tuple(
         Movement(
-            goal=int(made["goal"]) + 1,
-            hand=HANDS[made["hand"]],
-            kind="learned" if made["kind"] == LEARNED else "corrective",
-            target=np.array(made["target"][:dof]),
-            ticks=int(made["ticks"]),
+            goal=int(row["goal"]) + 1,
+            hand=HANDS[row["hand"]],
+            kind="learned" if row["kind"] == LEARNED else "corrective",
+            target=np.array(row["target"][:dof]),
+            ticks=int(row["ticks"]),
         )
-        for made in log.movements[run, : log.count[run]]
+        for row in log.movements[run, : log.count[run]]
     )
-
-
-def _hands(movements: tuple[Movement, ...]) -> str:
-    by_goal = {movement.goal: movement.hand for movement in movements}
-    return letters_of([by_goal[goal] for goal in sorted(by_goal)])

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import numba
 import numpy as np
@@ -31,6 +31,7 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
+_LONGEST_COMPILATION_S, _LOOK_S = 120.0, 0.05
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -52,7 +53,7 @@ def source_fingerprint() -> str:
     return hashlib.sha256(model_source()).hexdigest()[:16]
 
 
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     """A writable folder for compiled code, or None where there is none."""
     roots = [Path(numba.config.CACHE_DIR) / "coartic"] if numba.config.CACHE_DIR else []
     roots.append(PACKAGE / "__pycache__")
@@ -69,12 +70,12 @@ def _cache_folder() -> Path | None:
         except OSError:
             continue
         if os.access(folder, os.W_OK):
-            _prune(root, folder)
+            remove_old(root, folder)
             return folder
     return None
 
 
-def _prune(root: Path, current: Path) -> None:
+def remove_old(root: Path, current: Path) -> None:
     """Remove machine code of older sources that nobody has begun with for a month."""
     with contextlib.suppress(OSError):
         os.utime(current)
@@ -93,7 +94,7 @@ _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 
 def inner(function: F) -> F:
     """Compile a function that only other compiled functions call."""
-    compiled: F = _for_any_number(njit(**_INNER)(function))
+    compiled: F = for_any_number(njit(**_INNER)(function))
     return compiled
 
 
@@ -106,11 +107,11 @@ def inlined(function: F) -> F:
 
 def lanewise(function: F) -> F:
     """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
-    compiled: F = _for_any_number(njit(**_INNER, error_model="numpy")(function))
+    compiled: F = for_any_number(njit(**_INNER, error_model="numpy")(function))
     return compiled
 
 
-def _for_any_number(dispatcher: Any) -> Any:
+def for_any_number(dispatcher: Any) -> Any:
     """Compile it once, not once more for a number whose value the compiler knows: ``count = 0``
     before a loop is one."""
     template = dispatcher.get_call_template
@@ -120,49 +121,88 @@ def _for_any_number(dispatcher: Any) -> Any:
     return dispatcher
 
 
-class _Kept(FunctionCache):
-    """Machine code on disk. A file that cannot be read, such as one that a full disk has cut
-    short, is dropped, and what cannot be kept is compiled again in the next process."""
+class MachineCode(FunctionCache):
+    """Machine code on disk.
 
-    def load_overload(self, *asked: Any) -> Any:
+    Of processes that lack the same code one compiles it and the others wait for it. A file that
+    cannot be read, such as one that a full disk has cut short, is dropped, and what cannot be kept
+    is compiled again in the next process.
+    """
+
+    lock: IO[str] | None = None
+    """Held while this process compiles."""
+
+    def load_overload(self, *wanted: Any) -> Any:
+        """The code of a signature; None where there is none, and this process is to compile it."""
+        self.unlock()
+        code = self.load(*wanted)
+        if code is None and self.wait_for_lock():
+            code = self.load(*wanted)  # somebody may have compiled it meanwhile
+            if code is not None:
+                self.unlock()
+        return code
+
+    def load(self, *wanted: Any) -> Any:
+        """The code of a signature, or None."""
         try:
-            return super().load_overload(*asked)
+            return super().load_overload(*wanted)
         except Exception:  # an unpickler may say anything
             with contextlib.suppress(OSError):
                 self.flush()
             return None
 
-    def save_overload(self, *made: Any) -> None:
+    def save_overload(self, *compiled: Any) -> None:
+        """Keep what was compiled, where that can be."""
         with contextlib.suppress(Exception):
-            super().save_overload(*made)
+            super().save_overload(*compiled)
+        self.unlock()
+
+    def wait_for_lock(self) -> bool:
+        """Lock this function's code; False where the system has no locks, or nobody lets go."""
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl
+
+            file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "w")  # noqa: SIM115
+            for _ in range(round(_LONGEST_COMPILATION_S / _LOOK_S)):
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    self.lock = file
+                    return True
+                time.sleep(_LOOK_S)
+            file.close()
+        return False
+
+    def unlock(self) -> None:
+        """Let other processes compile this function."""
+        if self.lock is not None:
+            self.lock.close()
+            self.lock = None
 
 
 def entry(function: F) -> F:
-    """Compile a function that Python calls, and keep its machine code on disk.
-
-    Processes that compile it at the same time each do so; the last one's files stay.
-    """
+    """Compile a function that Python calls, and keep its machine code on disk."""
     compiled: Any = njit(**_OPTIONS)(function)
-    folder = _cache_folder()
+    folder = cache_folder()
     if folder is not None:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder)
         try:
-            compiled._cache = _Kept(function)
+            compiled._cache = MachineCode(function)
         finally:
             numba.config.CACHE_DIR = before
     kernel: F = compiled
     return kernel
 
 
-def _mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+    """A name of a record by what is in it."""
     return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
 
 # Machine code on disk calls functions by names that say their types. Numba names a record by its
 # number in the process that compiles, so a process that loads code of two such processes may call
 # one's function with the other's record. What is in the record is a name that holds everywhere.
-types.Record.mangling_args = property(_mangled)
+types.Record.mangling_args = property(mangled)
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:

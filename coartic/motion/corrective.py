@@ -64,7 +64,9 @@ class Correction(NamedTuple):
 
 
 @inner
-def _solve(larger: float, mixed: float, smaller: float, a: float, b: float) -> tuple[float, float]:
+def solve_semidefinite(
+    larger: float, mixed: float, smaller: float, a: float, b: float
+) -> tuple[float, float]:
     """Solve [[larger, mixed], [mixed, smaller]] v = (a, b), positive semidefinite."""
     ratio = mixed / larger
     pivot = smaller - ratio * mixed + _DAMPING * (larger + smaller)
@@ -73,7 +75,7 @@ def _solve(larger: float, mixed: float, smaller: float, a: float, b: float) -> t
 
 
 @inner
-def _pull(q: Any, start: Any, joint: int, disturbing: float, gain: float) -> bool:
+def pull_joint(q: Any, start: Any, joint: int, disturbing: float, gain: float) -> bool:
     """Pull a joint towards its start, less the part that disturbs the hand; if it moved."""
     before = q[joint]
     q[joint] += gain * (start[joint] - before - disturbing)
@@ -81,7 +83,7 @@ def _pull(q: Any, start: Any, joint: int, disturbing: float, gain: float) -> boo
 
 
 @inner
-def _stay(q: Any, start: Any, xs: Any, ys: Any, how: Any) -> bool:
+def pull_to_start(q: Any, start: Any, xs: Any, ys: Any, how: Any) -> bool:
     """q += β N(q) (start - q) for N = I - J⁺J, given the chain of ``q``; whether it moved.
 
     N r = r - Jᵀ(J Jᵀ)⁻¹ J r for r = start - q. It is never longer than r, so that a
@@ -102,31 +104,32 @@ def _stay(q: Any, start: Any, xs: Any, ys: Any, how: Any) -> bool:
         hand_x += dx * away
         hand_y += dy * away
     if xx >= yy:
-        x, y = _solve(xx, xy, yy, hand_x, hand_y)
+        x, y = solve_semidefinite(xx, xy, yy, hand_x, hand_y)
     else:
-        y, x = _solve(yy, xy, xx, hand_y, hand_x)
+        y, x = solve_semidefinite(yy, xy, xx, hand_y, hand_x)
 
     moved = False
     if how.free_x:
-        moved = _pull(q, start, 0, x, how.nullspace_gain)
+        moved = pull_joint(q, start, 0, x, how.nullspace_gain)
     if how.free_y:
-        moved = _pull(q, start, 1, y, how.nullspace_gain) or moved
+        moved = pull_joint(q, start, 1, y, how.nullspace_gain) or moved
     for k in range(tip):
         dx, dy = joint_lever(xs, ys, k, tip)
-        moved = _pull(q, start, BASE_DOF + k, dx * x + dy * y, how.nullspace_gain) or moved
+        moved = pull_joint(q, start, BASE_DOF + k, dx * x + dy * y, how.nullspace_gain) or moved
     return moved
 
 
 @inner
-def _stay_near(at: Any, count: int, how: Any) -> None:
+def stay_near(at: Any, count: int, how: Any) -> None:
+    """Pull every lane that goes on towards its start (:func:`pull_to_start`)."""
     for i in range(count):
         if at.fate[i] == GOING:
-            moved = _stay(at.q[:, i], at.start[:, i], at.x[:, i], at.y[:, i], how)
+            moved = pull_to_start(at.q[:, i], at.start[:, i], at.x[:, i], at.y[:, i], how)
             at.pulled[i] = 1.0 if moved else 0.0
 
 
 @lanewise
-def _errors(at: Any, count: int, goal: Any, square: float) -> None:
+def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
     for i in range(whole(count)):
@@ -138,7 +141,7 @@ def _errors(at: Any, count: int, goal: Any, square: float) -> None:
 
 
 @inlined
-def _descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, bool]:
+def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, bool]:
     """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
     ended = 0
     far = 0
@@ -180,12 +183,12 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
     iteration = 0
     while count > 0:
         place(at, count, is_near)
-        _errors(at, count, goal, square)
+        find_fates(at, count, goal, square)
         ended = count
         if iteration < model.max_iterations:
             if how.nullspace_gain > 0.0:
-                _stay_near(at, count, how)
-            ended, is_near = _descend(at, count, goal, how, model)
+                stay_near(at, count, how)
+            ended, is_near = descend(at, count, goal, how, model)
         if ended > 0:
             for lane in range(count - 1, -1, -1):
                 if at.fate[lane] == GOING and iteration < model.max_iterations:
@@ -204,7 +207,7 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
 
 
 @entry
-def _correct_one(arm: Any, goal: Any, how: Any, model: Any, lanes: Any, runs: Any) -> None:
+def correct_kernel(arm: Any, goal: Any, how: Any, model: Any, lanes: Any, runs: Any) -> None:
     """Correct the target of the only run."""
     board(lanes.at, 0, 0, runs[0].target, arm)
     correct_lanes(lanes, 1, goal, how, model, runs)
@@ -266,7 +269,7 @@ def correct(
     runs = runs_for(1, robot)
     run, own = runs[0], slice(robot.dof)
     run["target"][own] = configuration(robot, q)
-    _correct_one(
+    correct_kernel(
         robot.arm(hand),
         checked_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base, float(nullspace_gain)),

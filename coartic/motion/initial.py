@@ -17,17 +17,18 @@ from coartic.errors import LOADED, NotApplicableError, need
 from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import Execution, Movement, execute, execute_many
 from coartic.robot import HANDS, Hand
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import WITHOUT_REACH, Task, hands_of, letters_of
 
 MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 
 def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> Execution:
     """One trial by the corrective process alone, with the given hands (``"RRRR"``)."""
-    return execute(task, _by_correction(hands), model=model)
+    return execute(task, corrective_movements(hands), model=model)
 
 
-def _by_correction(hands: str) -> list[Movement]:
+def corrective_movements(hands: str) -> list[Movement]:
+    """A corrective movement for each goal, with the given hands."""
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
@@ -67,18 +68,20 @@ def ranked_sequences(
     that was given first.
     """
 
-    def rank(entry: tuple[str, Execution]) -> tuple[float, int]:
-        reward = entry[1].reward
-        return math.inf if reward is None else -reward, changes_of_hand(entry[0])
-
     each = list(sequences)
     trials: list[tuple[str, Execution]] = []
-    made = execute_many(task, map(_by_correction, each), model=model)
+    made = execute_many(task, map(corrective_movements, each), model=model)
     for hands, trial in zip(each, made, strict=True):
         if isinstance(trial, Exception):
             raise trial
         trials.append((hands, trial))
-    return sorted(trials, key=rank)
+    return sorted(
+        trials,
+        key=lambda entry: (
+            math.inf if entry[1].reward is None else -entry[1].reward,
+            changes_of_hand(entry[0]),
+        ),
+    )
 
 
 def initial_hands(
@@ -113,26 +116,14 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return InitialSearch(task.initial_hands)
     allowed = task.hands if hands is None else hands
-    return _by_policy(_Content(task), tuple(hand for hand in HANDS if hand in allowed), model)
-
-
-class _Content:
-    """A task as a key of a cache: equal where the content is equal."""
-
-    def __init__(self, task: Task) -> None:
-        self.task = task
-        self.text = task.model_dump_json()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Content) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
+    ordered = tuple(hand for hand in HANDS if hand in allowed)
+    return search_by_policy(task.model_dump_json(), ordered, model)
 
 
 @lru_cache(maxsize=64)
-def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -> InitialSearch:
-    task = content.task
+def search_by_policy(task_json: str, hands: tuple[Hand, ...], model: MotionModel) -> InitialSearch:
+    """The search of a task, given as JSON, with these hands: the same is made once."""
+    task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     if task.initial_hands == "best-single-hand":
         candidates = [letters_of([hand] * len(task.goals)) for hand in hands]
     else:
@@ -144,13 +135,13 @@ def _by_policy(content: _Content, hands: tuple[Hand, ...], model: MotionModel) -
             f"task {task.name!r}: the corrective process completes it with none of the "
             f"{len(candidates)} hand sequences of initial_hands = {task.initial_hands!r}"
         )
-    made = [trial for _, trial in ranked]
+    trials = [trial for _, trial in ranked]
     return InitialSearch(
         best,
-        trials=len(made),
-        movement_ticks=sum(trial.ticks for trial in made),
-        forward_kinematics=sum(trial.evaluations for trial in made),
-        corrective_iterations=sum(trial.iterations for trial in made),
-        corrections=sum(trial.corrections for trial in made),
-        failed_trials=sum(not trial.completed for trial in made),
+        trials=len(trials),
+        movement_ticks=sum(trial.ticks for trial in trials),
+        forward_kinematics=sum(trial.evaluations for trial in trials),
+        corrective_iterations=sum(trial.iterations for trial in trials),
+        corrections=sum(trial.corrections for trial in trials),
+        failed_trials=sum(not trial.completed for trial in trials),
     )

@@ -32,7 +32,7 @@ class Lanes(NamedTuple):
     """Lanes and who is in them."""
 
     at: Any
-    """The rows, by name; see :func:`_layout`."""
+    """The rows, by name; see :func:`layout`."""
     corrected: Any
     """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
     copied: some are integers."""
@@ -48,11 +48,12 @@ def width_of(robot: Robot) -> int:
 
 def runs_for(count: int, robot: Robot) -> NDArray[np.void]:
     """Room for so many runs that are moved and corrected, a record each."""
-    return np.zeros(count, _run(width_of(robot)))
+    return np.zeros(count, run_type(width_of(robot)))
 
 
 @cache
-def _run(width: int) -> np.dtype[np.void]:
+def run_type(width: int) -> np.dtype[np.void]:
+    """Type of the record of a run whose configurations have so many figures."""
     fields = {
         "q": (np.float64, width),  # where the robot is
         "target": (np.float64, width),  # where it is to go, or what a correction has found
@@ -68,14 +69,14 @@ def _run(width: int) -> np.dtype[np.void]:
 
 def lanes_for(robot: Robot) -> Lanes:
     """Lanes for either arm of a robot; the shorter one ends in links of length 0."""
-    record, corrected, moved = _layout(robot.most_links)
+    record, corrected, moved = layout(robot.most_links)
     at = np.zeros(1, record)
     rows = at.view(np.float64).reshape(-1, LANES)
     return Lanes(at[0], rows[corrected], rows[moved])
 
 
 @cache
-def _layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
+def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     """The rows of arms of so many links; which of them a correction needs, and a movement."""
     joints = (BASE_DOF + links,)
     corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
@@ -101,16 +102,17 @@ def _layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     record = np.dtype(
         [(name, kinds.get(name, np.float64), (*shape, LANES)) for name, shape in shapes.items()]
     )
-    first, last = _height(corrected), _height(corrected | shared)
-    return record, slice(last), slice(first, last + _height(moved))
+    first, last = height(corrected), height(corrected | shared)
+    return record, slice(last), slice(first, last + height(moved))
 
 
-def _height(shapes: Mapping[str, tuple[int, ...]]) -> int:
+def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
+    """Number of rows of quantities of these shapes."""
     return sum(math.prod(shape) for shape in shapes.values())
 
 
 @inlined
-def _seat(at: Any, lane: int, run: int, arm: Any) -> None:
+def seat(at: Any, lane: int, run: int, arm: Any) -> None:
     """Say whose arm is in a lane, and what it is like."""
     at.run[lane], at.first[lane], at.links[lane] = run, arm.first, len(arm.links)
     at.shoulder[0, lane] = arm.shoulder_x
@@ -120,7 +122,7 @@ def _seat(at: Any, lane: int, run: int, arm: Any) -> None:
 
 
 @inlined
-def _copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
+def copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
     """Copy the base and an arm's joints of a configuration into a lane."""
     row[0, lane] = q[0]
     row[1, lane] = q[1]
@@ -131,17 +133,17 @@ def _copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
 @inlined
 def board(at: Any, lane: int, run: int, q: Any, arm: Any) -> None:
     """Put an arm into a lane, where the robot is in configuration ``q``."""
-    _seat(at, lane, run, arm)
-    _copy_arm(at.q, lane, q, arm)
+    seat(at, lane, run, arm)
+    copy_arm(at.q, lane, q, arm)
     at.pulled[lane] = 0.0
 
 
 @inlined
 def depart(at: Any, lane: int, run: int, q: Any, target: Any, arm: Any) -> None:
     """Put an arm into a lane that the robot is to move from ``q`` to ``target``."""
-    _seat(at, lane, run, arm)
-    _copy_arm(at.start, lane, q, arm)
-    _copy_arm(at.target, lane, target, arm)
+    seat(at, lane, run, arm)
+    copy_arm(at.start, lane, q, arm)
+    copy_arm(at.target, lane, target, arm)
     square = 0.0
     for j in range(len(q)):
         delta = target[j] - q[j]
@@ -204,7 +206,7 @@ def winding(q: Any, lane: int) -> float:
     return total
 
 
-def _chains_by(cos: Any, sin: Any) -> Any:
+def chains_by(cos: Any, sin: Any) -> Any:
     """Forward kinematics of every lane, by these functions."""
 
     @lanewise
@@ -216,8 +218,8 @@ def _chains_by(cos: Any, sin: Any) -> Any:
     return chains
 
 
-_near_chains = _chains_by(near_cosine, near_sine)
-_far_chains = _chains_by(cosine, sine)
+_near_chains = chains_by(near_cosine, near_sine)
+_far_chains = chains_by(cosine, sine)
 
 
 @inner

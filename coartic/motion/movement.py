@@ -119,7 +119,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 
 @lanewise
-def _set_off(at: Any, count: int, model: Any) -> bool:
+def set_off(at: Any, count: int, model: Any) -> bool:
     """Rates, bounds and number of steps of every lane; whether all surely stay near."""
     far = 0
     for i in range(whole(count)):
@@ -151,7 +151,7 @@ def _set_off(at: Any, count: int, model: Any) -> bool:
 
 
 @lanewise
-def _go(at: Any, count: int, model: Any) -> None:
+def place_between(at: Any, count: int, model: Any) -> None:
     """The point at which each lane is now."""
     for i in range(whole(count)):
         fraction = at.step[i] * model.step / at.distance[i]
@@ -162,7 +162,7 @@ def _go(at: Any, count: int, model: Any) -> None:
 
 
 @lanewise
-def _look(
+def look(
     at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any, hit: float, arrived: float
 ) -> int:
     """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended.
@@ -220,7 +220,7 @@ def move_lanes(
     at = lanes.at
     evaluations = 0
     hit, arrived = largest_square(goal.radius), largest_square(model.arrival_tolerance)
-    is_near = _set_off(at, count, model)
+    is_near = set_off(at, count, model)
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
         place(at, count, is_near)
@@ -228,10 +228,10 @@ def move_lanes(
         fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
-        _go(at, count, model)
+        place_between(at, count, model)
         place(at, count, is_near)
         evaluations += 1
-        ended = _look(at, count, goal, stop_on_arrival, model, hit, arrived)
+        ended = look(at, count, goal, stop_on_arrival, model, hit, arrived)
         if ended == 0:
             continue
         for lane in range(count - 1, -1, -1):
@@ -255,7 +255,7 @@ def move_lanes(
 
 
 @entry
-def _move_one(
+def move_kernel(
     arm: Any, goal: Any, stop_on_arrival: bool, model: Any, lanes: Any, runs: Any
 ) -> None:
     """Move the only run."""
@@ -285,7 +285,7 @@ def move(
     runs = runs_for(1, robot)
     run, own = runs[0], slice(robot.dof)
     run["q"][own], run["target"][own] = configuration(robot, q), configuration(robot, target)
-    _move_one(
+    move_kernel(
         robot.arm(hand),
         checked_goal(goal, radius),
         stop_on_arrival,

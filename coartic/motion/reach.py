@@ -1,4 +1,4 @@
-"""Reaching for a goal: the one thing that trials and executions are made of.
+"""Reaching for a goal: the one thing that trials and executions are reached of.
 
 An arm first moves towards its target, if it has one. Where that misses the goal, the corrective
 process **A** looks for a configuration that hits it, and the arm moves there (paper, sections
@@ -14,15 +14,15 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel
 from coartic.motion.compiled import entry, fill_row, inlined, inner
 from coartic.motion.corrective import Corrector, correct_lanes
 from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
-from coartic.motion.movement import LARGEST, Goal, checked_goal, move_lanes
+from coartic.motion.movement import Goal, move_lanes
 from coartic.motion.problem import arm_of
-from coartic.robot import HANDS, Array, Hand, Robot
+from coartic.robot import Array, Robot
 
 
 class Reached(NamedTuple):
@@ -35,16 +35,16 @@ class Reached(NamedTuple):
     ticks: NDArray[np.int64]
     """Control ticks of its movements, shape ``(N,)``."""
     found: Array
-    """Target of its corrective movement, shape ``(N, dof)``; NaN where none was made."""
+    """Target of its corrective movement, shape ``(N, dof)``; NaN where none was reached."""
     corrections: NDArray[np.int64]
-    """Corrective movements made, 0 or 1: 0 also where **A** did not converge."""
+    """Corrective movements reached, 0 or 1: 0 also where **A** did not converge."""
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations made."""
+    """Forward-kinematics evaluations reached."""
 
 
-class _Asked(NamedTuple):
+class Arms(NamedTuple):
     """What the kernel reads: N arms in K groups, each to G goals in turn."""
 
     starts: Any  # (N, dof)
@@ -55,7 +55,7 @@ class _Asked(NamedTuple):
     goals: Any  # (K, G, 2)
 
 
-class _How(NamedTuple):
+class Rules(NamedTuple):
     """Robot, constants and options."""
 
     left: Any
@@ -67,7 +67,7 @@ class _How(NamedTuple):
     looks: bool
 
 
-class _Work(NamedTuple):
+class Work(NamedTuple):
     """What a lot of arms works on, each now at the same goal."""
 
     runs: Any  # records: see runs_for
@@ -77,7 +77,7 @@ class _Work(NamedTuple):
 
 
 @inner
-def _empty(target: Any) -> bool:
+def is_empty(target: Any) -> bool:
     """Whether no joint has a target."""
     for figure in target:  # noqa: SIM110 (which the compiler does not know)
         if not math.isnan(figure):
@@ -86,14 +86,14 @@ def _empty(target: Any) -> bool:
 
 
 @inlined
-def _aim(first: int, count: int, g: int, asked: Any, work: Any) -> None:
+def set_targets(first: int, count: int, g: int, arms: Any, work: Any) -> None:
     """Set the targets; an arm without one stays where it is."""
     for i in range(count):
-        run, target = work.runs[i], asked.targets[first + i, g]
+        run, target = work.runs[i], arms.targets[first + i, g]
         run.hit = False
         run.evaluations = 0
         fill_row(run.target, run.q)
-        work.aims[i] = work.going[i] and not _empty(target)
+        work.aims[i] = work.going[i] and not is_empty(target)
         if work.aims[i]:
             for j in range(len(target)):
                 if not math.isnan(target[j]):
@@ -102,8 +102,8 @@ def _aim(first: int, count: int, g: int, asked: Any, work: Any) -> None:
 
 
 @inner
-def _move_acting(
-    first: int, count: int, g: int, goal: Any, stops: bool, asked: Any, how: Any, work: Any
+def move_acting(
+    first: int, count: int, g: int, goal: Any, stops: bool, arms: Any, rules: Any, work: Any
 ) -> None:
     """Move the acting arms to their targets."""
     lane = 0
@@ -111,33 +111,33 @@ def _move_acting(
         run = work.runs[i]
         if run.acting:
             depart(
-                work.lanes.at, lane, i, run.q, run.target, arm_of(how, asked.hands[first + i, g])
+                work.lanes.at, lane, i, run.q, run.target, arm_of(rules, arms.hands[first + i, g])
             )
             lane += 1
     if lane > 0:
-        move_lanes(work.lanes, lane, goal, stops, how.model, work.runs)
+        move_lanes(work.lanes, lane, goal, stops, rules.model, work.runs)
 
 
 @inlined
-def _attempt(
-    first: int, count: int, g: int, goal: Any, asked: Any, how: Any, made: Any, work: Any
+def attempt(
+    first: int, count: int, g: int, goal: Any, arms: Any, rules: Any, reached: Any, work: Any
 ) -> None:
     """Move to the targets; see whether arms without one are in the goal already."""
     for stops in (True, False):
         for i in range(count):
             aims = work.aims[i]
             # A movement to where an arm is tells whether it hits; it needs no other end.
-            needed = work.going[i] and (aims or how.looks)
-            work.runs[i].acting = needed and (aims and asked.stops[first + i, g]) == stops
-        _move_acting(first, count, g, goal, stops, asked, how, work)
+            needed = work.going[i] and (aims or rules.looks)
+            work.runs[i].acting = needed and (aims and arms.stops[first + i, g]) == stops
+        move_acting(first, count, g, goal, stops, arms, rules, work)
         for i in range(count):
             if work.runs[i].acting and work.aims[i]:
-                made.ticks[first + i, g] = work.runs[i].ticks
+                reached.ticks[first + i, g] = work.runs[i].ticks
 
 
 @inlined
-def _finish(
-    first: int, count: int, g: int, goal: Any, asked: Any, how: Any, made: Any, work: Any
+def correct_missed(
+    first: int, count: int, g: int, goal: Any, arms: Any, rules: Any, reached: Any, work: Any
 ) -> None:
     """Have **A** finish what was missed."""
     lane = 0
@@ -146,52 +146,52 @@ def _finish(
         run.acting = work.going[i] and not run.hit
         if run.acting:
             fill_row(run.target, run.q)
-            board(work.lanes.at, lane, i, run.q, arm_of(how, asked.hands[first + i, g]))
+            board(work.lanes.at, lane, i, run.q, arm_of(rules, arms.hands[first + i, g]))
             lane += 1
-    correct_lanes(work.lanes, lane, goal, how.corrector, how.model, work.runs)
+    correct_lanes(work.lanes, lane, goal, rules.corrector, rules.model, work.runs)
     for i in range(count):
         run = work.runs[i]
         if run.acting:
-            made.iterations[first + i, g] = run.iterations
+            reached.iterations[first + i, g] = run.iterations
             run.acting = run.converged
             if run.converged:
-                made.corrections[first + i, g] = 1
-                fill_row(made.found[first + i, g], run.target)
-    _move_acting(first, count, g, goal, how.model.corrective_arrival, asked, how, work)
+                reached.corrections[first + i, g] = 1
+                fill_row(reached.found[first + i, g], run.target)
+    move_acting(first, count, g, goal, rules.model.corrective_arrival, arms, rules, work)
     for i in range(count):
         if work.runs[i].acting:
-            made.ticks[first + i, g] += work.runs[i].ticks
+            reached.ticks[first + i, g] += work.runs[i].ticks
 
 
 @inlined
-def _reach_lot(
-    first: int, count: int, group: int, asked: Any, how: Any, made: Any, work: Any
+def reach_lot(
+    first: int, count: int, group: int, arms: Any, rules: Any, reached: Any, work: Any
 ) -> None:
     """Arms of one group, as many as there is room for."""
     for i in range(count):
-        fill_row(work.runs[i].q, asked.starts[first + i])
+        fill_row(work.runs[i].q, arms.starts[first + i])
         work.going[i] = True
-    for g in range(asked.goals.shape[1]):
-        goal = Goal(asked.goals[group, g, 0], asked.goals[group, g, 1], how.radius)
-        _aim(first, count, g, asked, work)
-        _attempt(first, count, g, goal, asked, how, made, work)
-        if how.corrects:
-            _finish(first, count, g, goal, asked, how, made, work)
+    for g in range(arms.goals.shape[1]):
+        goal = Goal(arms.goals[group, g, 0], arms.goals[group, g, 1], rules.radius)
+        set_targets(first, count, g, arms, work)
+        attempt(first, count, g, goal, arms, rules, reached, work)
+        if rules.corrects:
+            correct_missed(first, count, g, goal, arms, rules, reached, work)
         for i in range(count):
             if work.going[i]:
-                fill_row(made.q[first + i, g], work.runs[i].q)
-                made.hit[first + i, g] = work.going[i] = work.runs[i].hit
-                made.evaluations[first + i, g] = work.runs[i].evaluations
+                fill_row(reached.q[first + i, g], work.runs[i].q)
+                reached.hit[first + i, g] = work.going[i] = work.runs[i].hit
+                reached.evaluations[first + i, g] = work.runs[i].evaluations
 
 
 @entry
-def _reach_all(asked: Any, how: Any, made: Any, work: Any) -> None:
+def reach_kernel(arms: Any, rules: Any, reached: Any, work: Any) -> None:
     """Every arm to its goals, each group of arms in lots."""
     room = len(work.runs)
-    for group in range(len(asked.goals)):
-        end = asked.bounds[group + 1]
-        for first in range(asked.bounds[group], end, room):
-            _reach_lot(first, min(room, end - first), group, asked, how, made, work)
+    for group in range(len(arms.goals)):
+        end = arms.bounds[group + 1]
+        for first in range(arms.bounds[group], end, room):
+            reach_lot(first, min(room, end - first), group, arms, rules, reached, work)
 
 
 def reach_in_turn(
@@ -211,29 +211,29 @@ def reach_in_turn(
 ) -> Reached:
     """Let N arms in K groups reach for G goals each, in turn, until they miss one.
 
-    Nothing is checked: :func:`reach` and the callers do that. ``starts`` has shape ``(N, dof)``;
+    Nothing is checked. ``starts`` has shape ``(N, dof)``;
     ``hands`` ``(N, G)``, indices into HANDS; ``goals`` ``(K, G, 2)``, those of a group, whose arms
     are those from ``bounds[k]`` up to ``bounds[k + 1]``; ``targets`` ``(N, G, dof)`` and ``stops``
-    ``(N, G)``, as in :func:`reach`. In ``targets`` joints without one are filled in, for goals that
-    were attempted.
+    ``(N, G)``, as in :func:`reach_unchecked`. In ``targets`` joints without one are filled in, for
+    goals that were attempted.
     """
     places = np.full((2, *hands.shape, robot.dof), np.nan)
     counts = np.zeros((4, *hands.shape), dtype=np.int64)
     hit = np.zeros(hands.shape, dtype=np.bool_)
-    made = Reached(places[0], hit, counts[0], places[1], *counts[1:])
+    reached = Reached(places[0], hit, counts[0], places[1], *counts[1:])
     largest = max((end - first for first, end in pairwise(bounds)), default=1)
     lot = max(min(largest, LANES), 1)
     free = ("x" not in locked_base, "y" not in locked_base)
     flags = np.zeros((2, lot), dtype=np.bool_)
-    _reach_all(
-        _Asked(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
-        _How(
+    reach_kernel(
+        Arms(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
+        Rules(
             robot.arm("left"), robot.arm("right"), radius, Corrector(*free), model, corrects, looks
         ),
-        made,
-        _Work(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
+        reached,
+        Work(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
     )
-    return made
+    return reached
 
 
 def reach_unchecked(
@@ -250,7 +250,18 @@ def reach_unchecked(
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
-    """:func:`reach` for arrays that are known to fit; ``hands`` are indices into HANDS."""
+    """Let N arms reach for a goal each, side by side, from where they are.
+
+    Nothing is checked. ``q`` has shape ``(N, dof)``, length unit (base) and rad (joints); ``hands``
+    ``(N,)``, indices into HANDS; ``goals`` ``(N, 2)`` and ``radius`` is that of them all, length
+    unit. ``targets`` has shape ``(N, dof)``: where a joint's target is NaN, the joint keeps its
+    value, and an arm whose row is NaN has none. ``stops``, of each or of all: whether the movement
+    to the target ends, too, where the hand has arrived (a learned or planned one), or on a hit
+    alone (a corrective one that is reached again). ``corrects``: whether **A** finishes what is
+    missed. ``looks``: whether an arm without a target may be in its goal already; else **A** begins
+    at once. ``locked_base`` holds ``"x"`` and/or ``"y"``; **A** leaves these as they are. Source:
+    paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
+    """
     count = len(q)
     order = np.lexsort(goals.T)  # arms of one goal are neighbours, in the order given
     places = goals[order]
@@ -258,7 +269,7 @@ def reach_unchecked(
     begins[1:] = (places[1:] != places[:-1]).any(axis=1)
     bounds = np.flatnonzero(begins)
     given = np.full((count, robot.dof), np.nan) if targets is None else targets
-    made = reach_in_turn(
+    reached = reach_in_turn(
         robot,
         q[order],
         hands[order, None],
@@ -274,69 +285,4 @@ def reach_unchecked(
     )
     back = np.empty_like(order)
     back[order] = np.arange(count)
-    return Reached._make(field[back, 0] for field in made)
-
-
-def reach(
-    robot: Robot,
-    q: ArrayLike,
-    hands: Sequence[Hand],
-    goals: ArrayLike,
-    radius: float,
-    targets: ArrayLike | None = None,
-    *,
-    stops: bool | Sequence[bool] | NDArray[np.bool_] = True,
-    corrects: bool = True,
-    looks: bool = True,
-    locked_base: Collection[str] = (),
-    model: MotionModel = PAPER,
-) -> Reached:
-    """Let N arms reach for a goal each, side by side, from where they are.
-
-    ``q`` has shape ``(N, dof)``, length unit (base) and rad (joints); ``hands`` names the hand
-    of each, ``goals`` has shape ``(N, 2)`` and ``radius`` is that of them all, length unit.
-    ``targets`` has shape ``(N, dof)``: where a joint's target is NaN, the joint keeps its value,
-    and an arm whose row is NaN has none. ``stops``, of each or of all: whether the movement to
-    the target ends, too, where the hand has arrived (a learned or planned one), or on a hit alone
-    (a corrective one that is made again). ``corrects``: whether **A** finishes what is missed.
-    ``looks``: whether an arm without a target may be in its goal already; else **A** begins at
-    once. ``locked_base`` holds ``"x"`` and/or ``"y"``; **A** leaves these as they are.
-
-    Raises ValueError for shapes that do not fit, for hands that are neither ``"left"`` nor
-    ``"right"``, for figures beyond ``LARGEST`` (or not finite: in targets NaN alone is allowed),
-    for other locks, and for a model that no movement can be made with. Source: paper, sections
-    *Generating Movement for Each Goal* and *The Corrective Process*.
-    """
-    checked_goal((0.0, 0.0), radius)
-    checked_model(model, radius=radius if corrects else None)
-    if not set(locked_base) <= {"x", "y"}:
-        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
-    count, dof = len(hands), robot.dof
-    if wrong := set(hands) - set(HANDS):
-        raise ValueError(f"a hand is 'left' or 'right', not one of {sorted(map(str, wrong))}")
-    flags = np.asarray(stops, dtype=np.bool_)
-    if flags.shape not in ((), (count,)):
-        raise ValueError(f"stops has shape {flags.shape}; needed is one value or ({count},)")
-    return reach_unchecked(
-        robot,
-        _figures("q", q, (count, dof)),
-        np.array([HANDS.index(hand) for hand in hands], dtype=np.int64),
-        _figures("goals", goals, (count, 2)),
-        float(radius),
-        None if targets is None else _figures("targets", targets, (count, dof), gaps=True),
-        stops=flags,
-        corrects=corrects,
-        looks=looks,
-        locked_base=locked_base,
-        model=model,
-    )
-
-
-def _figures(name: str, given: ArrayLike, shape: tuple[int, int], *, gaps: bool = False) -> Array:
-    """An array of this shape; ValueError where it is none, or a figure is no good."""
-    array = np.asarray(given, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"{name} has shape {array.shape}; needed is {shape}")
-    if not ((np.abs(array) <= LARGEST) | (np.isnan(array) & gaps)).all():
-        raise ValueError(f"{name} holds a figure that is not finite or beyond {LARGEST:g}")
-    return array
+    return Reached._make(field[back, 0] for field in reached)

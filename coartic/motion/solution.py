@@ -80,8 +80,7 @@ class Execution:
     @property
     def hands(self) -> str:
         """Hand used for each goal, such as ``"LRLR"``."""
-        by_goal = {movement.goal: movement.hand for movement in self.movements}
-        return letters_of([by_goal[goal] for goal in sorted(by_goal)])
+        return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
         """Ticks spent on each goal that was attempted."""
@@ -93,7 +92,12 @@ class Execution:
 
 Refused = SolutionError | ValueError | TypeError | OverflowError
 """What is wrong with a solution that cannot be executed."""
-_REFUSED = (SolutionError, ValueError, TypeError, OverflowError)
+
+
+def hands_in(movements: Iterable[Movement]) -> str:
+    """Hand used for each goal, such as ``"LRLR"``."""
+    by_goal = {movement.goal: movement.hand for movement in movements}
+    return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
 
 def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PAPER) -> Execution:
@@ -123,18 +127,18 @@ def execute_many(
     """
     need(task, Task, LOADED)
     checked_model(model, radius=task.radius)
-    made: list[_Run | Refused] = []
+    runs: list[SolutionRun | Refused] = []
     for solution in solutions:
         try:
-            made.append(_Run(task, list(solution)))
-        except _REFUSED as error:
-            made.append(error)
-    runs = [run for run in made if isinstance(run, _Run)]
+            runs.append(SolutionRun(task, list(solution)))
+        except (SolutionError, ValueError, TypeError, OverflowError) as error:
+            runs.append(error)
+    going = [run for run in runs if isinstance(run, SolutionRun)]
     for number in range(1, len(task.goals) + 1):
-        runs = [run for run in runs if not run.reason]
-        if runs:
-            _try_goal(task, number, runs, model)
-    return [run.outcome() if isinstance(run, _Run) else run for run in made]
+        going = [run for run in going if not run.reason]
+        if going:
+            try_goal(task, number, going, model)
+    return [run.outcome() if isinstance(run, SolutionRun) else run for run in runs]
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
@@ -156,14 +160,14 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     return travel
 
 
-class _Run:
+class SolutionRun:
     """An execution while it goes on."""
 
     def __init__(self, task: Task, solution: list[Movement]) -> None:
         # The corrective process has the last word.
         self.due = [
             [*movements, Movement(number, movements[0].hand, "corrective")]
-            for number, movements in _by_goal(task, solution)
+            for number, movements in movements_by_goal(task, solution)
         ]
         self.q = configuration(task.robot, task.q0)
         self.hit = False
@@ -212,13 +216,13 @@ class _Run:
         )
 
 
-_Due = list[tuple[_Run, Movement]]
-_How = Literal["look", "move", "correct"]
+Due = list[tuple[SolutionRun, Movement]]
+How = Literal["look", "move", "correct"]
 
 
-def _try_goal(task: Task, number: int, runs: list[_Run], model: MotionModel) -> None:
+def try_goal(task: Task, number: int, runs: list[SolutionRun], model: MotionModel) -> None:
     """Make the movements of one goal, in each run as many as are needed."""
-    seen = _reach(task, number, [(run, run.due[number - 1][0]) for run in runs], "look", model)
+    seen = reach_goal(task, number, [(run, run.due[number - 1][0]) for run in runs], "look", model)
     for n, run in enumerate(runs):
         run.hit = bool(seen.hit[n])
         # A movement, which this has always been counted as, also asks where its target is.
@@ -227,15 +231,19 @@ def _try_goal(task: Task, number: int, runs: list[_Run], model: MotionModel) -> 
         due = [(run, own) for run in runs if (own := run.next(number, place)) is not None]
         for run, movement in due:
             if movement.kind == "path":
-                _follow(task, run, movement, model)
+                follow_path(task, run, movement, model)
         straight = [(run, own) for run, own in due if own.kind != "path"]
-        _make(task, number, [(r, m) for r, m in straight if m.target is not None], "move", model)
-        _make(task, number, [(r, m) for r, m in straight if m.target is None], "correct", model)
+        move_straight(
+            task, number, [(r, m) for r, m in straight if m.target is not None], "move", model
+        )
+        move_straight(
+            task, number, [(r, m) for r, m in straight if m.target is None], "correct", model
+        )
     for run in runs:
         run.end_goal(number)
 
 
-def _follow(task: Task, run: _Run, movement: Movement, model: MotionModel) -> None:
+def follow_path(task: Task, run: SolutionRun, movement: Movement, model: MotionModel) -> None:
     """Make a movement along its path."""
     assert movement.waypoints is not None
     goal = task.goals[movement.goal - 1]
@@ -246,11 +254,11 @@ def _follow(task: Task, run: _Run, movement: Movement, model: MotionModel) -> No
     run.take(movement, result.q, result.ticks, result.hit)
 
 
-def _make(task: Task, number: int, due: _Due, how: _How, model: MotionModel) -> None:
+def move_straight(task: Task, number: int, due: Due, how: How, model: MotionModel) -> None:
     """Make straight movements, a run each: to given targets, or to those that **A** finds."""
     if not due:
         return
-    result = _reach(task, number, due, how, model)
+    result = reach_goal(task, number, due, how, model)
     for n, (run, movement) in enumerate(due):
         iterations = int(result.iterations[n])
         run.iterations += iterations
@@ -266,7 +274,7 @@ def _make(task: Task, number: int, due: _Due, how: _How, model: MotionModel) -> 
         run.take(movement, result.q[n], int(result.ticks[n]), bool(result.hit[n]))
 
 
-def _reach(task: Task, number: int, due: _Due, how: _How, model: MotionModel) -> Reached:
+def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) -> Reached:
     """Let each run look whether it has hit the goal, move to its target, or be corrected."""
     targets = np.full((len(due), 1, task.robot.dof), np.nan)
     if how == "move":
@@ -289,7 +297,7 @@ def _reach(task: Task, number: int, due: _Due, how: _How, model: MotionModel) ->
     return Reached._make(field[:, 0] for field in made)
 
 
-def _by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
+def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
     """The movements grouped by goal, checked against the task."""
     locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
     groups: list[tuple[int, list[Movement]]] = []

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ class Plan:
     methods: dict[str, DeclaredMethod]
     cells: tuple[PlannedCell, ...]
 
-    @property
+    @cached_property
     def model(self) -> MotionModel:
         """The constants of movement under these readings."""
         return model_under(load_readings(self.readings))
@@ -89,25 +90,32 @@ class Plan:
         """Number of runs."""
         return sum(cell.runs for cell in self.cells)
 
-    def asked(self, cell: PlannedCell) -> str:
-        """Hash of everything that the results of a cell depend on, but for seeds and code.
+    @cached_property
+    def asked(self) -> tuple[str, ...]:
+        """Of each cell a hash of everything that its results depend on, but for seeds and code.
 
         The time limit is not part of it: it decides whether there is a result, not which.
         """
-        return hash_of(
-            {
-                "task": self.tasks[cell.task],
-                "method": cell.method,
-                "parameters": cell.complete,
-                "model": self.model._asdict(),
-                "trial_budget": self.trial_budget,
-            }
+        return tuple(
+            hash_of(
+                {
+                    "task": self.tasks[cell.task],
+                    "method": cell.method,
+                    "parameters": cell.complete,
+                    "model": self.model._asdict(),
+                    "trial_budget": self.trial_budget,
+                }
+            )
+            for cell in self.cells
         )
 
-    def run_ids(self, cell: PlannedCell) -> list[str]:
-        """Ids of a cell's runs, in their order."""
-        asked, code = self.asked(cell), self.methods[cell.method].code
-        return [run_id(asked, self.seed, number, code) for number in range(cell.runs)]
+    def run_ids(self, position: int) -> list[str]:
+        """Ids of the runs of the cell at this position, in their order."""
+        cell = self.cells[position]
+        code = self.methods[cell.method].code
+        return [
+            run_id(self.asked[position], self.seed, number, code) for number in range(cell.runs)
+        ]
 
 
 def run_id(asked: str, suite_seed: int, number: int, code: str) -> str:

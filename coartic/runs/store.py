@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
 from coartic.method import Meter
@@ -86,6 +87,17 @@ TIMINGS = (
     "packages",
 )
 """Columns of ``runs`` that may differ between two runs of one specification."""
+_DTYPES: dict[str, Any] = {
+    **{
+        name: {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64"}[kind.split()[0]]
+        for name, kind in RESULTS.items()
+    },
+    **dict.fromkeys(("suite", "task", "method", "variant", "label", "hand", "kind"), "string"),
+    **dict.fromkeys(("told", "parameters", "commit", "code", "packages"), "string"),
+    **dict.fromkeys(("order", "goal", "ticks", "waypoint"), "Int64"),
+    "warm": "boolean",
+}
+"""How columns of views are read: with types that have room for what is missing."""
 _OWN = [name for name in RESULTS if name not in ("setting", "suite_seed", "environment", "details")]
 _SCHEMA = f"""
 CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
@@ -203,7 +215,7 @@ class Store:
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._db.close()
         if isinstance(error, sqlite3.DatabaseError | zlib.error):
-            with _explained(self.folder):
+            with explained(self.folder):
                 raise error
 
     # What was asked for.
@@ -220,22 +232,21 @@ class Store:
                     "seed": plan.seed,
                     "runs": plan.runs,
                     "trials": plan.trials,
-                    "readings": _json(plan.readings),
+                    "readings": to_json(plan.readings),
                     "time_limit_s": plan.time_limit_s,
                     "trial_budget": plan.trial_budget,
-                    "command": _json(command),
+                    "command": to_json(command),
                     "date": date,
                     "environment": self._environment(environment),
                 },
             )
             for name, definition in plan.tasks.items():
-                self._insert("tasks", {"name": name, "definition": _json(definition)})
+                self._insert("tasks", {"name": name, "definition": to_json(definition)})
             for name, method in plan.methods.items():
-                facts = asdict(method) | {
-                    key: _json(getattr(method, key)) for key in ("told", "secondary", "defaults")
-                }
+                facts = asdict(method)
+                facts |= {key: to_json(facts[key]) for key in ("told", "secondary", "defaults")}
                 self._insert("methods", {"name": name, **facts})
-            model = _json(plan.model._asdict())
+            model = to_json(plan.model._asdict())
             joints = {
                 name: parse_task(task, name).robot.joint_names for name, task in plan.tasks.items()
             }
@@ -243,12 +254,12 @@ class Store:
             for position, cell in enumerate(plan.cells):
                 method = plan.methods[cell.method]
                 setting = {
-                    "asked": plan.asked(cell),
+                    "asked": plan.asked[position],
                     "code": method.code,
                     "task": cell.task,
-                    "definition": _json(plan.tasks[cell.task]),
+                    "definition": to_json(plan.tasks[cell.task]),
                     "method": cell.method,
-                    "parameters": _json(cell.complete, sort_keys=True),
+                    "parameters": to_json(cell.complete, sort_keys=True),
                     "model": model,
                     "trial_budget": plan.trial_budget,
                     "told": ", ".join(method.told),
@@ -260,7 +271,7 @@ class Store:
                         "position": position,
                         "setting": self._cells[-1][0],
                         "variant": cell.variant,
-                        "parameters": _json(cell.parameters),
+                        "parameters": to_json(cell.parameters),
                         "runs": cell.runs,
                     },
                 )
@@ -274,10 +285,15 @@ class Store:
         methods = {}
         for method in self._db.execute("SELECT * FROM methods ORDER BY rowid"):
             facts = dict(method)
-            name = facts.pop("name")
-            facts |= {key: tuple(json.loads(facts[key])) for key in ("told", "secondary")}
-            facts |= {"stochastic": bool(facts["stochastic"])}
-            methods[name] = DeclaredMethod(**facts | {"defaults": json.loads(facts["defaults"])})
+            name, told, secondary = (facts.pop(key) for key in ("name", "told", "secondary"))
+            methods[name] = DeclaredMethod(
+                **facts
+                | {"stochastic": bool(facts["stochastic"])}
+                | {"defaults": json.loads(facts["defaults"])},
+                told=tuple(json.loads(told)),
+                secondary=tuple(json.loads(secondary)),
+            )
+        tasks = self._db.execute("SELECT name, definition FROM tasks ORDER BY rowid")
         cells = self._db.execute(
             "SELECT task, method, variant, cells.parameters, settings.parameters AS complete, runs "
             "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
@@ -286,21 +302,12 @@ class Store:
             suite=row["name"],
             **{key: row[key] for key in ("seed", "runs", "trials", "time_limit_s", "trial_budget")},
             readings=tuple(json.loads(row["readings"])),
-            tasks={
-                name: json.loads(text)
-                for name, text in self._db.execute(
-                    "SELECT name, definition FROM tasks ORDER BY rowid"
-                )
-            },
+            tasks={name: json.loads(definition) for name, definition in tasks},
             methods=methods,
             cells=tuple(
                 PlannedCell(
-                    task=cell["task"],
-                    method=cell["method"],
-                    variant=cell["variant"],
-                    parameters=json.loads(cell["parameters"]),
-                    complete=json.loads(cell["complete"]),
-                    runs=cell["runs"],
+                    **dict(cell)
+                    | {key: json.loads(cell[key]) for key in ("parameters", "complete")}
                 )
                 for cell in cells
             ),
@@ -312,21 +319,17 @@ class Store:
             "SELECT content, command, date FROM suite JOIN environments ON id = environment"
         )
         assert row is not None
-        own = {"command": json.loads(row["command"]), "date": row["date"]}
-        return {**json.loads(row["content"]), **own}
+        how = {"command": json.loads(row["command"]), "date": row["date"]}
+        return {**json.loads(row["content"]), **how}
 
     # Which runs there are.
 
     def present(self) -> Iterator[tuple[int, int, str, float | None]]:
         """Position of the cell, number, status and time limit of the runs asked for that there
         are."""
-        yield from map(
-            tuple,
-            self._db.execute(
-                f"SELECT position, results.run, status, time_limit_s {_ASKED_FOR} "
-                "ORDER BY position, results.run"
-            ),
-        )
+        columns = "position, results.run, status, time_limit_s"
+        order = "ORDER BY position, results.run"
+        yield from map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR} {order}"))
 
     def statuses(self) -> dict[str, int]:
         """How many of the runs asked for ended in which way."""
@@ -365,15 +368,17 @@ class Store:
                 environment = self._environment(run.environment)
                 row = run.row | {"setting": setting, "environment": environment}
                 result = self._insert("results", row)
-                for part, made in run.movements.items():
-                    for order, own in enumerate(made):
-                        assert own.target is not None
-                        place = (result, part, order, own.goal, own.hand, own.kind, own.ticks)
-                        movements.append((*place, *own.target.tolist()))
-                        points = [] if own.waypoints is None else own.waypoints.tolist()
+                for part, solution in run.movements.items():
+                    for order, m in enumerate(solution):
+                        assert m.target is not None
+                        facts = (result, part, order, m.goal, m.hand, m.kind, m.ticks)
+                        movements.append((*facts, *m.target.tolist()))
+                        points = [] if m.waypoints is None else m.waypoints.tolist()
                         waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
                 if run.rewards:
-                    self._insert("learning", {"result_id": result, "rewards": _packed(run.rewards)})
+                    stored = [FAILED if reward is None else reward for reward in run.rewards]
+                    blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
+                    self._insert("learning", {"result_id": result, "rewards": blob})
             self._insert_many("movements", (*_MOVEMENT, *joints), movements)
             self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
 
@@ -385,21 +390,22 @@ class Store:
         row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
         assert row is not None
         setting = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
-        made = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
+        environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         assert setting is not None
-        assert made is not None
+        assert environment is not None
         task = parse_task(json.loads(setting["definition"]), str(self.folder))
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-        own = {name: row[name] for name in RESULTS if name not in ("setting", "environment")}
+        parts = {part: self._movements(row["id"], part, task) for part in PARTS}
+        rewards = [] if blob is None else unpacked(blob["rewards"]).tolist()
         run = Run(
-            own,
-            Environment(json.loads(made["content"]), made["commit_id"], made["packages"]),
-            {
-                part: movements
-                for part in PARTS
-                if (movements := self._movements(row["id"], part, task))
-            },
-            [] if blob is None else _unpacked(blob["rewards"]),
+            {name: row[name] for name in RESULTS if name not in ("setting", "environment")},
+            Environment(
+                json.loads(environment["content"]),
+                environment["commit_id"],
+                environment["packages"],
+            ),
+            {part: movements for part, movements in parts.items() if movements},
+            [None if reward == FAILED else reward for reward in rewards],
         )
         return StoredRun(
             run,
@@ -425,13 +431,12 @@ class Store:
         rows = self._db.execute(f"SELECT * FROM {view}")
         names = [column[0] for column in rows.description]
         columns = list(zip(*rows, strict=True)) or [() for _ in names]
-        frame = pd.DataFrame(
-            {
-                name: pd.array(list(column), dtype=_dtype(name))
-                for name, column in zip(names, columns, strict=True)
-            },
-        )
-        return frame.drop(columns=[name for name in ("result_id", "part") if name in frame])
+        arrays = {
+            name: pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
+            for name, column in zip(names, columns, strict=True)
+            if name not in ("result_id", "part")
+        }
+        return pd.DataFrame(arrays)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
@@ -441,7 +446,7 @@ class Store:
             "ORDER BY cells.position, results.run"
         )
         for run_id, blob in rows:
-            stored = np.frombuffer(zlib.decompress(blob), dtype="<i4").astype(np.float64)
+            stored = unpacked(blob)
             yield run_id, np.where(stored == FAILED, np.nan, stored)
 
     # Inside.
@@ -478,21 +483,19 @@ class Store:
     def _setting(self, setting: dict[str, Any]) -> int:
         key = setting["asked"], setting["code"]
         if key not in self._settings:
-            found = self._one("SELECT id FROM settings WHERE asked = ? AND code = ?", *key)
-            self._settings[key] = self._insert("settings", setting) if found is None else found[0]
+            row = self._one("SELECT id FROM settings WHERE asked = ? AND code = ?", *key)
+            self._settings[key] = self._insert("settings", setting) if row is None else row["id"]
         return self._settings[key]
 
     def _environment(self, environment: Environment) -> int:
-        text = _json(environment.content, sort_keys=True)
+        text = to_json(environment.content, sort_keys=True)
         if text not in self._environments:
-            found = self._one("SELECT id FROM environments WHERE content = ?", text)
-            row = {
-                "content": text,
-                "commit_id": environment.commit,
-                "packages": environment.packages,
-            }
+            row = self._one("SELECT id FROM environments WHERE content = ?", text)
+            facts = {"commit_id": environment.commit, "packages": environment.packages}
             self._environments[text] = (
-                self._insert("environments", row) if found is None else found[0]
+                self._insert("environments", {"content": text} | facts)
+                if row is None
+                else row["id"]
             )
         return self._environments[text]
 
@@ -548,11 +551,10 @@ def open_store(folder: Path) -> Store:
     if not folder.exists():
         raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not path.is_file():
-        _check_older(folder)
         raise CoarticError(f"{folder} is not a results folder: it has no {FILE}")
-    with _explained(folder), _opened(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
+    with explained(folder), opened(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
-        if not _is_ours(connection, folder):
+        if not has_our_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
     return Store(folder, connection)
 
@@ -569,14 +571,14 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with _explained(folder), _opened(str(folder / FILE), 0.0) as connection:
-        _is_ours(connection, folder)  # or it is left as it is
+    with explained(folder), opened(str(folder / FILE), 0.0) as connection:
+        has_our_tables(connection, folder)  # or it is left as it is
         # No write-ahead log: it is unsafe on network disks.
         connection.execute("PRAGMA journal_mode = DELETE")
         connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         connection.execute("BEGIN EXCLUSIVE")
         connection.execute("COMMIT")
-        if not _is_ours(connection, folder):
+        if not has_our_tables(connection, folder):
             connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
     with Store(folder, connection) as store:
         yield store
@@ -586,23 +588,15 @@ def check_place(folder: Path) -> None:
     """Raises CoarticError for a place where no results folder can be."""
     if folder.exists() and not folder.is_dir():
         raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
-    if folder.is_dir() and not (folder / FILE).exists():
-        _check_older(folder)
-        if any(not entry.name.startswith(".") for entry in folder.iterdir()):
-            raise CoarticError(
-                f"{folder} is not empty and holds no results of coartic. Choose another folder."
-            )
-
-
-def _check_older(folder: Path) -> None:
-    if (folder / "records").is_dir() or (folder / "manifest.json").exists():
+    visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
+    if not (folder / FILE).exists() and any(visible):
         raise CoarticError(
-            f"{folder} holds results of an older version of coartic, which this version does not "
-            "read. Run the suite again with another --out."
+            f"{folder} is not empty and holds no results of coartic. Choose another folder."
         )
 
 
-def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
+def connect(where: str, timeout_s: float) -> sqlite3.Connection:
+    """A connection to a path or a ``file:`` address, which waits so long for a lock."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
@@ -611,9 +605,9 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 
 @contextmanager
-def _opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
     """A connection that stays open, unless something is wrong with it."""
-    connection = _connect(where, timeout_s)
+    connection = connect(where, timeout_s)
     try:
         yield connection
     except BaseException:
@@ -621,7 +615,7 @@ def _opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
         raise
 
 
-def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
+def has_our_tables(connection: sqlite3.Connection, folder: Path) -> bool:
     """Whether the file has our tables; False for an empty one."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -641,7 +635,7 @@ def _is_ours(connection: sqlite3.Connection, folder: Path) -> bool:
 
 
 @contextmanager
-def _explained(folder: Path) -> Iterator[None]:
+def explained(folder: Path) -> Iterator[None]:
     """What SQLite says of a file, in words."""
     try:
         yield
@@ -659,36 +653,11 @@ def _explained(folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _json(content: Any, *, sort_keys: bool = False) -> str:
+def to_json(content: Any, *, sort_keys: bool = False) -> str:
+    """Plain data as JSON with its own letters."""
     return json.dumps(content, ensure_ascii=False, sort_keys=sort_keys)
 
 
-def _packed(rewards: list[int | None]) -> bytes:
-    values = [FAILED if reward is None else reward for reward in rewards]
-    return zlib.compress(np.array(values, dtype="<i4").tobytes(), level=1)
-
-
-def _unpacked(blob: bytes) -> list[int | None]:
-    values = np.frombuffer(zlib.decompress(blob), dtype="<i4").tolist()
-    return [None if value == FAILED else value for value in values]
-
-
-_TEXTS = {name for name, kind in RESULTS.items() if kind.startswith("TEXT")} | {
-    *("suite", "task", "method", "variant", "label", "part"),
-    *("told", "parameters", "commit", "code", "packages", "hand", "kind"),
-}
-_WHOLE = {name for name, kind in RESULTS.items() if kind.startswith("INTEGER")} | {
-    *("result_id", "order", "goal", "ticks", "waypoint"),
-}
-_NUMBERS = {name for name, kind in RESULTS.items() if kind == "REAL"}
-
-
-def _dtype(column: str) -> Any:
-    """How a column of a view is read: with nullable types, and joints as plain numbers."""
-    if column in _TEXTS:
-        return "string"
-    if column == "warm":
-        return "boolean"
-    if column in _WHOLE:
-        return "Int64"
-    return "Float64" if column in _NUMBERS else "float64"
+def unpacked(blob: bytes) -> NDArray[np.int32]:
+    """Rewards of all trials as they are stored: those that failed are :data:`FAILED`."""
+    return np.frombuffer(zlib.decompress(blob), dtype="<i4")

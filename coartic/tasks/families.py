@@ -21,7 +21,7 @@ import itertools
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -36,10 +36,10 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, problems, read_toml
+from coartic.inputs import MOST_CELLS, problems, read_toml, sentence
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, key_of
@@ -72,43 +72,38 @@ _LEAST_GOALS, _MOST_GOALS = 2, 8
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
-def _in_parts(value: Any) -> int:
-    """A number in thousandths."""
+def in_thousandths(value: Any) -> int:
+    """A number of up to three decimals as a whole number of thousandths."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _PARTS:
-        text = "should be a number up to 1000"
+        problem = "should be a number up to 1000"
     elif round(value * _PARTS) / _PARTS != value:
-        text = "has more than three decimals"
+        problem = "should have at most three decimals"
     else:
         return round(value * _PARTS)
-    raise PydanticCustomError("parts", "{text}", {"text": text})
+    raise PydanticCustomError("parts", "{text}", {"text": problem})
 
 
-def _ordered(span: tuple[int, int]) -> tuple[int, int]:
-    if span[0] > span[1]:
-        raise PydanticCustomError("order", "goes from more to less", {})
-    return span
+def refuse(wrong: Callable[[Any], bool], problem: str) -> AfterValidator:
+    """A validator that refuses what is wrong, with the problem in words."""
 
-
-def _checked(wrong: Callable[[int], bool], text: str) -> AfterValidator:
-    def check(parts: int) -> int:
-        if wrong(parts):
-            raise PydanticCustomError("parts", "{text}", {"text": text})
-        return parts
+    def check(value: Any) -> Any:
+        if wrong(value):
+            raise PydanticCustomError("parts", "{text}", {"text": problem})
+        return value
 
     return AfterValidator(check)
 
 
-Parts = Annotated[int, BeforeValidator(_in_parts)]
+Parts = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
-Span = Annotated[tuple[Parts, Parts], AfterValidator(_ordered)]
+_Ordered = refuse(lambda span: span[0] > span[1], "should go from less to more")
+Span = Annotated[tuple[Parts, Parts], _Ordered]
 """From, to; every thousandth between as likely."""
-_Positive = Annotated[Parts, _checked(lambda parts: parts <= 0, "should be greater than 0")]
+_Positive = Annotated[Parts, refuse(lambda parts: parts <= 0, "should be greater than 0")]
 _Share = Annotated[
-    Parts, _checked(lambda parts: not 0 < parts <= _PARTS, "should be above 0, at most 1")
+    Parts, refuse(lambda parts: not 0 < parts <= _PARTS, "should be above 0, at most 1")
 ]
-_Bend = Annotated[
-    Parts, _checked(lambda parts: abs(parts) > 1570, "should be within -1.57 to 1.57")
-]
+_Bend = Annotated[Parts, refuse(lambda parts: abs(parts) > 1570, "should be within -1.57 to 1.57")]
 _Goals = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=_MOST_GOALS)]
 _Links = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
 _Bases = tuple[Base, ...]
@@ -125,16 +120,16 @@ class Region(_Data):
     """From, to, length unit; at the start the base is at the origin."""
     y: Span
     """From, to, length unit."""
-    scale: Annotated[tuple[_Share, _Share], AfterValidator(_ordered)] = (_PARTS, _PARTS)
+    scale: Annotated[tuple[_Share, _Share], _Ordered] = (_PARTS, _PARTS)
     """Share of both sides that an instance's own box has, from, to."""
 
 
 class Alignment(_Data):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
-    steps: Annotated[tuple[_Positive, _Positive], AfterValidator(_ordered)]
+    steps: Annotated[tuple[_Positive, _Positive], _Ordered]
     """From goal to goal along the line, length unit, from, to."""
-    off: Annotated[tuple[_Positive, _Positive], AfterValidator(_ordered)]
+    off: Annotated[tuple[_Positive, _Positive], _Ordered]
     """Distance of the one goal from the line, to either side, length unit, from, to."""
 
 
@@ -143,7 +138,7 @@ class Posture(_Data):
 
     first: Span
     """Angle of the first joint from +x, rad, from, to."""
-    others: Annotated[tuple[_Bend, _Bend], AfterValidator(_ordered)]
+    others: Annotated[tuple[_Bend, _Bend], _Ordered]
     """Angle of each other joint from the link before it, rad, from, to, within ±π/2: an arm whose
     bends are so small is straight, and thereby singular, where they are all 0."""
 
@@ -174,9 +169,9 @@ class Family(_Data):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: Annotated[tuple[_Goals, _Goals], AfterValidator(_ordered)]
+    goals: Annotated[tuple[_Goals, _Goals], _Ordered]
     """How many there are, from, to; each number as likely."""
-    links: Annotated[tuple[_Links, _Links], AfterValidator(_ordered)]
+    links: Annotated[tuple[_Links, _Links], _Ordered]
     """How many each of both arms has, from, to; they have one length (to a thousandth)."""
     reach: _Positive = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
@@ -204,14 +199,12 @@ class Family(_Data):
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
     @model_validator(mode="after")
-    def _has_fit_goals(self) -> Family:
-        text = None
+    def has_fit_goals(self) -> Family:
+        """Refuses goals that overlap or are too small."""
         if self.radius <= PAPER.correction_tolerance * _PARTS:
-            text = "radius is not larger than the accuracy of the corrective process"
-        elif self.apart < 2 * self.radius:
-            text = "apart lets goals overlap"
-        if text is not None:
-            raise PydanticCustomError("goals", "{text}", {"text": text})
+            raise sentence("radius is not larger than the accuracy of the corrective process")
+        if self.apart < 2 * self.radius:
+            raise sentence("apart lets goals overlap")
         return self
 
     def key(self, stream: str) -> tuple[int, int]:
@@ -229,14 +222,11 @@ class Candidate:
     goals: tuple[tuple[int, int], ...]
     angles: dict[Hand, tuple[int, ...]]
 
-    def lengths(self) -> tuple[int, ...]:
-        """Of an arm's links: one for all, where that can be, else the first ones longer."""
-        whole, rest = divmod(self.family.reach, self.links)
-        return tuple(whole + (k < rest) for k in range(self.links))
-
     def content(self) -> dict[str, Any]:
         """Of the task file, but for what only an accepted instance has."""
-        links = [length / _PARTS for length in self.lengths()]
+        # Links of one length, where that can be, else the first ones a thousandth longer.
+        length, longer = divmod(self.family.reach, self.links)
+        links = [(length + (k < longer)) / _PARTS for k in range(self.links)]
         return {
             "name": "candidate",
             "hands": list(self.family.hands),
@@ -257,34 +247,37 @@ class Candidate:
         return parse_task(content, f"family {self.family.name}", reach=False)
 
 
-def _outside(candidate: Candidate) -> bool:
+def goal_outside(candidate: Candidate) -> bool:
+    """Whether a goal of the line, or off it, is outside the region."""
     (left, right), (low, high) = candidate.family.region.x, candidate.family.region.y
     return not all(left <= x <= right and low <= y <= high for x, y in candidate.goals)
 
 
-def _overlap(candidate: Candidate) -> bool:
+def goals_overlap(candidate: Candidate) -> bool:
+    """Whether two goals are nearer to each other than the family lets them be."""
     return any(
         (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 < candidate.family.apart**2
         for a, b in itertools.combinations(candidate.goals, 2)
     )
 
 
-def _out_of_reach(candidate: Candidate) -> bool:
-    family, robot = candidate.family, Robot()
-    shoulders = {"left": robot.left_shoulder, "right": robot.right_shoulder}
+def goal_out_of_reach(candidate: Candidate) -> bool:
+    """Whether a hand cannot come near enough to a goal, with the base as it is locked."""
+    family, farthest = candidate.family, candidate.family.reach * candidate.family.within
     for base in (candidate.base, *family.restrictions):
+        fixed = ["xy".index(axis) for axis in LOCKED[base]]
         for hand in family.hands:
-            shoulder = map(_in_parts, shoulders[hand])
-            fixed = zip("xy", shoulder, strict=True)
-            places = [(axis, at) for axis, at in fixed if axis in LOCKED[base]]
+            arm = Robot().arm(hand)
+            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
             for goal in candidate.goals:
-                square = sum((goal["xy".index(axis)] - at) ** 2 for axis, at in places)
-                if square * _PARTS**2 > (family.reach * family.within) ** 2:
+                square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in fixed)
+                if square * _PARTS**2 > farthest**2:
                     return True
     return False
 
 
-def _starts_in_goal(candidate: Candidate) -> bool:
+def starts_in_goal(candidate: Candidate) -> bool:
+    """Whether a hand is in a goal at the start, or close by."""
     from coartic.motion.movement import move
 
     task, family = candidate.task(), candidate.family
@@ -296,7 +289,8 @@ def _starts_in_goal(candidate: Candidate) -> bool:
     )
 
 
-def _starts_straight(candidate: Candidate) -> bool:
+def starts_straight(candidate: Candidate) -> bool:
+    """Whether an arm is straight at the start, or nearly."""
     return any(
         max(map(abs, candidate.angles[hand][1:])) < candidate.family.bent
         for hand in candidate.family.hands
@@ -304,21 +298,13 @@ def _starts_straight(candidate: Candidate) -> bool:
 
 
 RULES: dict[str, Callable[[Candidate], bool]] = {
-    "outside": _outside,
-    "overlap": _overlap,
-    "reach": _out_of_reach,
-    "straight": _starts_straight,
-    "start-hit": _starts_in_goal,
+    "outside": goal_outside,
+    "overlap": goals_overlap,
+    "reach": goal_out_of_reach,
+    "straight": starts_straight,
+    "start-hit": starts_in_goal,
 }
 """What no instance may be, in the order in which it is asked; then comes :data:`CORRECTIVE`."""
-RULES_IN_WORDS = {
-    "outside": "a goal of the line, or off it, is outside the region",
-    "overlap": "two goals are nearer to each other than the family lets them be",
-    "reach": "a hand cannot come near enough to a goal, with the base as it is locked",
-    "straight": "an arm is straight at the start, or nearly",
-    "start-hit": "a hand is in a goal at the start, or close by",
-    CORRECTIVE: "the corrective process alone does not complete the task with the initial hands",
-}
 
 
 def judged(candidate: Candidate) -> tuple[str | None, str]:
@@ -326,11 +312,11 @@ def judged(candidate: Candidate) -> tuple[str | None, str]:
     for rule, breaks in RULES.items():
         if breaks(candidate):
             return rule, ""
-    hands = _initial_hands(candidate)
+    hands = corrective_hands(candidate)
     return (CORRECTIVE, "") if hands is None else (None, hands)
 
 
-def _initial_hands(candidate: Candidate) -> str | None:
+def corrective_hands(candidate: Candidate) -> str | None:
     """With which the corrective process does the task under every restriction, or None."""
     from coartic.motion.initial import corrective_trial, initial_hands
 
@@ -352,9 +338,9 @@ def candidate_of(address: Address, attempt: int) -> Candidate:
     base, postures = structure.one_of(family.base), structure.one_of(family.start)
     vertical = structure.one_of((False, True))
     draws = Draws(key, address.number, attempt, _GEOMETRY)
-    goals = _scattered(draws, family.region, count)
+    goals = scattered_goals(draws, family.region, count)
     if family.line is not None:
-        goals = _aligned(draws, family.region, family.line, count, vertical)
+        goals = aligned_goals(draws, family.region, family.line, count, vertical)
     angles: dict[Hand, tuple[int, ...]] = {}
     for hand in HANDS:
         posture = postures.left if hand == "left" else postures.right
@@ -363,7 +349,8 @@ def candidate_of(address: Address, attempt: int) -> Candidate:
     return Candidate(family, links, base, tuple(goals), angles)
 
 
-def _scattered(draws: Draws, region: Region, count: int) -> list[tuple[int, int]]:
+def scattered_goals(draws: Draws, region: Region, count: int) -> list[tuple[int, int]]:
+    """Goals in a box of their own within the region, thousandths."""
     share = draws.integer(*region.scale)
     sides = []
     for low, high in (region.x, region.y):
@@ -373,9 +360,10 @@ def _scattered(draws: Draws, region: Region, count: int) -> list[tuple[int, int]
     return [(draws.integer(*sides[0]), draws.integer(*sides[1])) for _ in range(count)]
 
 
-def _aligned(
+def aligned_goals(
     draws: Draws, region: Region, line: Alignment, count: int, vertical: bool
 ) -> list[tuple[int, int]]:
+    """Goals on a line, but for one that is neither first nor last, thousandths."""
     along, across = (region.y, region.x) if vertical else (region.x, region.y)
     at, level = draws.integer(*along), draws.integer(*across)
     forward = draws.one_of((-1, 1))
@@ -390,35 +378,30 @@ def _aligned(
     return list(pairs)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """An instance, and what was drawn before it."""
-
-    task: Task
-    rejected: tuple[str, ...]
-    """The rules that earlier attempts broke, in order."""
-
-
 @lru_cache(maxsize=4096)
-def drawn(address: Address) -> Drawn:
-    """The instance at an address. Raises TaskError where there is none."""
+def drawn(address: Address) -> tuple[Task, tuple[str, ...]]:
+    """The instance at an address, and the rules that earlier attempts broke, in order.
+
+    Raises TaskError where there is none.
+    """
     family = load_family(address.family)
     rejected: list[str] = []
     while len(rejected) < MOST_ATTEMPTS:
         candidate = candidate_of(address, len(rejected))
         rule, hands = judged(candidate)
         if rule is None:
-            return Drawn(_named(address, family, candidate, hands), tuple(rejected))
+            return named_task(address, candidate, hands), tuple(rejected)
         rejected.append(rule)
     most, times = Counter(rejected).most_common(1)[0]
     raise TaskError(
         f"{address}: {MOST_ATTEMPTS:_} draws of family {family.name!r} broke a rule, {times:_} of "
-        f"them {most!r}: {RULES_IN_WORDS[most]}"
+        f"them {most!r}"
     )
 
 
-def _named(address: Address, family: Family, candidate: Candidate, hands: str) -> Task:
-    name = str(address)
+def named_task(address: Address, candidate: Candidate, hands: str) -> Task:
+    """The task of an accepted candidate, with its name, initial hands and provenance."""
+    name, family = str(address), candidate.family
     short = name.rpartition("/")[2]
     source = f"drawn: family {family.name}, instance {short}"
     chosen = ["goals", "start", "initial_hands"]
@@ -444,7 +427,7 @@ def instance(name: str) -> Task:
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return drawn(address).task
+    return drawn(address)[0]
 
 
 def check_instance(task: Task, source: str) -> None:
@@ -484,85 +467,53 @@ def named_by(text: str) -> list[str]:
     return names_in(text) if is_range else [text]
 
 
-@dataclass(frozen=True)
-class Rejections:
-    """How often draws were rejected, and why."""
-
-    instances: int
-    draws: int
-    by_rule: dict[str, int]
-    """Draws whose first broken rule it was, by rule."""
-
-    @property
-    def rate(self) -> float:
-        """Share of the draws that were rejected."""
-        return 1 - self.instances / self.draws
-
-
-def rejections(names: Iterable[str]) -> Rejections:
-    """Of the draws of some instances. Raises TaskError for names that are none."""
-    addresses = [address_of(instance(name).name) for name in names]
-    found = [drawn(address) for address in addresses if address is not None]
-    counts = Counter(rule for each in found for rule in each.rejected)
-    rules = (*RULES, CORRECTIVE)
-    draws = len(found) + counts.total()
-    return Rejections(len(found), draws, {rule: counts[rule] for rule in rules})
-
-
-@cache
 def families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
-    return {name: _shipped(name) for name in _files()}
+    return {name: read_family(path) for name, path in family_files().items()}
 
 
-def _files() -> dict[str, Path]:
-    """By name with version."""
-    return {_name(path): path for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))}
+def family_files() -> dict[str, Path]:
+    """Files of the shipped families by name with version."""
+    return {family_name(path): path for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))}
 
 
-def _name(path: Path) -> str:
+def family_name(path: Path) -> str:
+    """Of a file, ``two-armed.v1.toml``, the name of its family, ``two-armed/v1``."""
     return "/".join(path.stem.rsplit(".", 1))
-
-
-@cache
-def _shipped(name: str) -> Family:
-    return read_family(_files()[name])
 
 
 def load_family(name: str) -> Family:
     """A family by name, with its version or, without, the newest. Raises TaskError."""
-    known = _files()
-    newest = {family.partition("/")[0]: family for family in sorted(known, key=_version)}
+    files = family_files()
+    newest = {known.partition("/")[0]: known for known in sorted(files, key=version_in)}
     full = newest.get(name, name)
-    if full not in known:
-        hint = did_you_mean(full, known) or ";"
-        raise TaskError(f"unknown family {name!r}{hint} the families are {', '.join(known)}")
-    return _shipped(full)
+    if full not in files:
+        hint = did_you_mean(full, files) or ";"
+        raise TaskError(f"unknown family {name!r}{hint} the families are {', '.join(files)}")
+    return read_family(files[full])
 
 
-def _version(name: str) -> int:
+def version_in(name: str) -> int:
+    """The version in a family's name, 2 of ``two-armed/v2``; 0 where it is none."""
     number = name.partition("/v")[2]
     return int(number) if number.isdecimal() else 0
 
 
+@cache
 def read_family(path: Path) -> Family:
     """A family from its file. Raises TaskError with one line per problem."""
     content = read_toml(path, error=TaskError)
-    name = _name(path)
+    name = family_name(path)
     if "name" in content:
         raise TaskError(f"{path}: name: is an unknown key; a family is named by its file")
     try:
         family = Family(**content, name=name)
     except ValidationError as error:
         keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
-        raise TaskError(problems(str(path), error, keys, _explain)) from None
+        raise TaskError(problems(str(path), error, keys)) from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
     return family
-
-
-def _explain(detail: ErrorDetails) -> str | None:
-    return detail["msg"] if detail["type"] == "goals" else None
 
 
 def task_text(task: Task) -> str:
@@ -571,23 +522,23 @@ def task_text(task: Task) -> str:
     tables = {key: content.pop(key) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
         del tables["robot"]
-    lines = [f"{key} = {_toml(value)}" for key, value in content.items()]
+    lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]
     for key, table in tables.items():
         if table:
             lines += [
                 "",
                 f"[{key}]",
-                *(f"{name} = {_toml(value)}" for name, value in table.items()),
+                *(f"{name} = {toml_value(value)}" for name, value in table.items()),
             ]
     return "\n".join(lines) + "\n"
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value as TOML writes it; strings as JSON does, of printable characters."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -23,13 +24,12 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
 
 from coartic.errors import TaskError
-from coartic.inputs import brief_value, key_of, problems, read_toml
+from coartic.inputs import brief_value, problems, read_toml, sentence
 from coartic.model import PAPER, MotionModel, checked_model
-from coartic.robot import HANDS, LARGEST, MOST_LINKS, Array, Finite, Hand, Length, Robot
-from coartic.text import Line, did_you_mean
+from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
+from coartic.text import Line, counted, did_you_mean
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
@@ -181,62 +181,47 @@ class Task(_Frozen):
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="after")
-    def _is_consistent(self, info: ValidationInfo) -> Task:
-        for check in (
-            self._check_hands,
-            self._check_start,
-            self._check_initial_hands,
-            self._check_reach,
-            self._check_provenance,
-        ):
-            if info.context == WITHOUT_REACH and check == self._check_reach:
-                continue
-            problem = check()
-            if problem is not None:
-                key, message = problem
-                raise PydanticCustomError("task", "{text}", {"key": key, "text": message})
+    def is_consistent(self, info: ValidationInfo) -> Task:
+        """Refuses what cannot be, with the key and what would be right."""
+        if (problem := next(self.problems(), None)) is not None:
+            raise sentence(problem)
+        # No model's corrective process ends farther from a goal than its rim (checked_task).
+        if info.context != WITHOUT_REACH and (far := self.out_of_reach(self.radius)) is not None:
+            raise sentence(far)
         return self
 
-    def _check_hands(self) -> tuple[str, str] | None:
+    def problems(self) -> Iterator[str]:
+        """What its keys say against each other, a sentence each."""
         for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
             if len(set(values)) < len(values):
-                return key, f"names the same entry twice: {', '.join(values)}"
-        return None
-
-    def _check_start(self) -> tuple[str, str] | None:
-        for hand, angles, links in (
-            ("left", self.start.left, self.robot.left_links),
-            ("right", self.start.right, self.robot.right_links),
-        ):
-            if len(angles) != len(links):
-                return (
-                    f"start.{hand}",
-                    f"has {len(angles)} joint angles; the {hand} arm has {len(links)} joints",
+                yield f"{key} names the same entry twice: {', '.join(values)}"
+        for hand, angles in (("left", self.start.left), ("right", self.start.right)):
+            joints = len(self.robot.left_links if hand == "left" else self.robot.right_links)
+            if len(angles) != joints:
+                yield (
+                    f"start.{hand} has {len(angles)} joint angles; the {hand} arm has "
+                    f"{joints} joints"
                 )
-        return None
-
-    def _check_initial_hands(self) -> tuple[str, str] | None:
+        for key in self.provenance:
+            if key not in type(self).model_fields:
+                yield f"provenance.{key} is not a key of a task{did_you_mean(key, all_keys())}"
+        text = self.initial_hands
         if self.initial_is_policy:
-            return None
-        key, text = "initial_hands", self.initial_hands
+            return
         if not text or set(text) - set(LETTERS):
-            return key, (
-                f"is {brief_value(text)}; it must be a sequence of L and R such as 'RRRR', "
-                f"or one of {', '.join(INITIAL_POLICIES)}"
+            yield (
+                f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such as "
+                f"'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
             )
-        if len(text) != len(self.goals):
-            return key, f"{brief_value(text)} names {len(text)} hands for {len(self.goals)} goals"
-        absent = sorted({LETTERS[letter] for letter in text} - set(self.hands))
-        if absent:
-            return key, f"{text!r} uses the {absent[0]} hand, which is not among hands"
-        return None
+        elif len(text) != len(self.goals):
+            yield f"initial_hands {brief_value(text)} names {len(text)} hands for " + counted(
+                len(self.goals), "goal"
+            )
+        elif absent := sorted({LETTERS[letter] for letter in text} - set(self.hands)):
+            yield f"initial_hands {text!r} uses the {absent[0]} hand, which is not among hands"
 
-    def _check_reach(self) -> tuple[str, str] | None:
-        # No model's corrective process ends farther from a goal than its rim (checked_task).
-        return self.out_of_reach(self.radius)
-
-    def out_of_reach(self, tolerance: float) -> tuple[str, str] | None:
-        """Key and words of the first goal that no hand, or not the initial one, can hit.
+    def out_of_reach(self, tolerance: float) -> str | None:
+        """The first goal, in words, that no hand, or not the initial one, can hit.
 
         ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
         length unit. None where all goals are within reach.
@@ -244,12 +229,14 @@ class Task(_Frozen):
         named = None if self.initial_is_policy else hands_of(self.initial_hands)
         for index, goal in enumerate(self.goals):
             excess = {hand: self.beyond_reach(hand, goal, tolerance) for hand in self.hands}
-            locked = " and ".join(self.locked_base)
-            where = f"({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked in {locked}"
+            where = (
+                f"goals[{index}] ({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked "
+                f"in {' and '.join(self.locked_base)}"
+            )
             if all(value > 0 for value in excess.values()):
-                return f"goals[{index}]", f"{where}: {min(excess.values()):.3g} too far"
+                return f"{where}: {min(excess.values()):.3g} too far"
             if named is not None and excess[named[index]] > 0:
-                return f"goals[{index}]", (
+                return (
                     f"{where} for the {named[index]} hand that initial_hands "
                     f"{self.initial_hands!r} gives it: {excess[named[index]]:.3g} too far"
                 )
@@ -267,12 +254,6 @@ class Task(_Frozen):
         inside = near - distance if len(self.locked_base) == 2 else 0.0
         return max(distance - far, inside) - tolerance
 
-    def _check_provenance(self) -> tuple[str, str] | None:
-        for key in self.provenance:
-            if key not in type(self).model_fields:
-                return f"provenance.{key}", f"is not a key of a task{did_you_mean(key, _keys())}"
-        return None
-
 
 def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
     """The task itself; TaskError where a model's corrective process cannot do it.
@@ -285,7 +266,7 @@ def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
         raise TaskError(f"task {task.name!r}: {error}") from None
     problem = task.out_of_reach(model.correction_tolerance)
     if problem is not None:
-        raise TaskError(f"task {task.name!r}: {' '.join(problem)}")
+        raise TaskError(f"task {task.name!r}: {problem}")
     return task
 
 
@@ -309,28 +290,10 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(problems(source, error, _keys(), _explain)) from None
+        raise TaskError(problems(source, error, all_keys())) from None
 
 
-def _keys() -> list[str]:
+def all_keys() -> list[str]:
     """All keys of a task file, whatever table they belong to."""
-    robot = ("left_links", "right_links", "left_shoulder", "right_shoulder", "base_size")
+    robot = [field.name for field in fields(Robot)]
     return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
-
-
-def _explain(detail: ErrorDetails) -> str | None:
-    """In the words of a task, where it has some of its own."""
-    context, key = detail.get("ctx", {}), key_of(detail["loc"])
-    match detail["type"]:
-        case "task":
-            return f"{context['key']} {context['text']}"
-        case "extra_forbidden" | "unexpected_keyword_argument" if len(detail["loc"]) > 1:
-            table, last = str(detail["loc"][0]), str(detail["loc"][-1])
-            if last in Task.model_fields:
-                return f"{key} is an unknown key; {last!r} belongs above the line [{table}]"
-        case "greater_than_equal" | "less_than_equal":
-            shown = brief_value(detail["input"])
-            return f"{key} is {shown}; its size must be at most {LARGEST:g}"
-        case "too_short" if key == "goals":
-            return "goals is empty; a task needs at least one goal"
-    return None
