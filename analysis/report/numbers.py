@@ -75,9 +75,8 @@ def numbers(study: Study) -> Iterator[Number]:
             for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
                 if label:
                     row: Any = tables.price(study).loc[label]
-                    comment = (
-                        f"{column.replace('_', ' ')} of the targets: table price, row '{label}'"
-                    )
+                    what = tables.COLUMNS[column].header
+                    comment = f"{what} of the targets: table price, row '{label}'"
                     yield from with_interval(f"{level}{letters(of)}", row, column, 0, 1, comment)
         for at in price["levels"]:
             comment = f"ratio of trials, learner over {price['rival']}: table price"
