@@ -190,7 +190,7 @@ def test_optimisers_of_the_page_are_methods(name, tmp_path, in_this_process):
     laws = check_method(entry, tasks=[load_task("ascending")])
     assert [law for law in laws if not law.passed] == []
     session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
-    solution = entry.made({}).solve(session).solution
+    solution = entry.with_parameters({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
     assert execute(load_task("ascending"), solution).reward == max(session.rewards)
 

@@ -184,9 +184,7 @@ def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
 def test_parameters_are_validated():
     entry = registry([METHOD])["nearest-hand"]
     assert entry.complete({"reluctance": 0.5}) == {"reluctance": 0.5}
-    with pytest.raises(
-        CoarticError, match="'nearest-hand': reluctance is -1.0; it must be at least 0"
-    ):
+    with pytest.raises(CoarticError, match="'nearest-hand': reluctance is -1.0; it should be"):
         entry.complete({"reluctance": -1.0})
     with pytest.raises(CoarticError, match="Its parameters: reluctance"):
         entry.complete({"reluctant": 1.0})
