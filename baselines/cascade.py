@@ -106,12 +106,13 @@ class Cascade:
         where a solver fails.
         """
         self._reach.demand(rows, least)
-        short = max(0.0, float(self._solve(1, self._reach)[0])) + SLACK
+        short = max(0.0, float(self.solve_level(1, self._reach)[0])) + SLACK
         self._prefer.demand(rows, least - short)
         self._prefer.gradient[:] = -2.0 * preferred
-        return self._solve(2, self._prefer)
+        return self.solve_level(2, self._prefer)
 
-    def _solve(self, level: Literal[1, 2], program: Program) -> Array:
+    def solve_level(self, level: Literal[1, 2], program: Program) -> Array:
+        """The variables of a level. Raises CascadeError where the solver fails."""
         try:
             found = _SOLVERS[self.solver](program, SETTINGS[self.solver])
         except ValueError as error:  # of what is no number
@@ -123,7 +124,8 @@ class Cascade:
         return np.array(found.variables, dtype=np.float64)
 
 
-def _daqp(program: Program, settings: dict[str, Any]) -> Solved:
+def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
+    """A program solved by DAQP."""
     import daqp
 
     hessian, gradient, rows, upper = program
@@ -140,7 +142,8 @@ def _daqp(program: Program, settings: dict[str, Any]) -> Solved:
     return Solved(flag == 1, f"with exit flag {flag}", x, info["iterations"])
 
 
-def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
+def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
+    """A program solved by Clarabel."""
     import clarabel
 
     hessian, gradient, rows, upper = program
@@ -160,8 +163,8 @@ def _clarabel(program: Program, settings: dict[str, Any]) -> Solved:
 
 
 _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
-    "clarabel": _clarabel,
-    "daqp": _daqp,
+    "clarabel": solve_by_clarabel,
+    "daqp": solve_by_daqp,
 }
 
 

@@ -101,7 +101,7 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """Solutions with these hands, these goals hit without a movement, angles in a box."""
 
     hands: Hands
@@ -119,13 +119,15 @@ class _Part:
 
 
 @dataclass(order=True)
-class _Node:
+class Node:
+    """A part with its bound, in the order of bounds."""
+
     ticks: float
     """Bound, before it is rounded up."""
     number: int
     length: float = field(compare=False)
     """Bound on the path."""
-    part: _Part = field(compare=False)
+    part: Part = field(compare=False)
     point: Array = field(compare=False)
     """Where the relaxation has its minimum."""
     lagrangian: Lagrangian = field(compare=False)
@@ -139,7 +141,7 @@ def certify(
     ``still`` holds the arm that is not chosen. The search ends when all is proven or after
     ``most_nodes`` cone programmes.
     """
-    search = _Search(task, ticks, still, model.step)
+    search = ProofSearch(task, ticks, still, model.step)
     search.begin()
     root_length = search.heap[0].length if search.heap else search.longest(0)
     least = 0
@@ -159,11 +161,11 @@ def certify(
     )
 
 
-class _Search:
+class ProofSearch:
     """The open parts, and what was spent."""
 
     def __init__(self, task: Task, ticks: int, still: bool, step: float) -> None:
-        self.heap: list[_Node] = []
+        self.heap: list[Node] = []
         self.solved = self.iterations = 0
         self._task, self._ticks, self._step = task, ticks, step
         self._numbers = itertools.count()
@@ -189,30 +191,30 @@ class _Search:
             sequences = list(itertools.product(self._robot_hands, repeat=goals))
         for hands in sequences:
             box = self.relaxation(hands, ()).first_box(self.longest(0))
-            self._add(_Part(hands, (), mergeable(self._task, hands), box), 0.0)
+            self.add(Part(hands, (), mergeable(self._task, hands), box), 0.0)
 
-    def branch(self, node: _Node) -> None:
+    def branch(self, node: Node) -> None:
         """Split a part into parts that together hold every solution in it."""
         part = node.part
         moves = len(part.hands) - len(part.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._ticks
-        goal = self._goal_to_decide(node, bounded)
+        goal = self.goal_to_decide(node, bounded)
         if goal is not None:
-            self._decide(node, goal)
+            self.decide(node, goal)
         elif bounded:
             for i, first in enumerate(part.open):
                 merged = (*part.merged, first)
-                self._add(_Part(part.hands, merged, part.open[i + 1 :], part.box), node.length)
+                self.add(Part(part.hands, merged, part.open[i + 1 :], part.box), node.length)
         else:
             root = self.relaxation(part.hands, part.merged)
             for box in root.split(part.box, node.point):
                 # What is known of the whole may rule a half out, without a programme.
-                if self._short(node.lagrangian, box, part.moves) >= 0.0:
-                    half = _Part(part.hands, part.merged, part.open, box)
-                    self._add(half, node.length)
+                if self.shortfall(node.lagrangian, box, part.moves) >= 0.0:
+                    half = Part(part.hands, part.merged, part.open, box)
+                    self.add(half, node.length)
 
-    def _goal_to_decide(self, node: _Node, bounded: bool) -> int | None:
+    def goal_to_decide(self, node: Node, bounded: bool) -> int | None:
         """The goal whose undecided hand is farthest off, if that is what comes first."""
         unknown = [g for g, hand in enumerate(node.part.hands) if hand is None]
         if not unknown:
@@ -232,7 +234,7 @@ class _Search:
             return goal
         return None
 
-    def _decide(self, node: _Node, goal: int) -> None:
+    def decide(self, node: Node, goal: int) -> None:
         """One part for each hand, the new angles anywhere on a path of interest."""
         part = node.part
         for hand in self._robot_hands:
@@ -244,9 +246,9 @@ class _Search:
             box[own] = root.first_box(self.longest(part.moves))[own]
             able = set(mergeable(self._task, hands))
             still_open = tuple(g for g in part.open if g in able)
-            self._add(_Part(hands, part.merged, still_open, box), node.length)
+            self.add(Part(hands, part.merged, still_open, box), node.length)
 
-    def _add(self, part: _Part, parent: float) -> None:
+    def add(self, part: Part, parent: float) -> None:
         """Bound a part, and keep what is left of it."""
         if part.moves >= self._ticks:
             return
@@ -255,20 +257,18 @@ class _Search:
         self.solved += 1
         self.iterations += count
         lagrangian = root.lagrangian(found, self.longest(0))
-        slack = self._short(lagrangian, part.box, part.moves)
+        slack = self.shortfall(lagrangian, part.box, part.moves)
         length = max(parent, self.longest(part.moves) - slack)
         if slack < 0.0 or length > self.longest(part.moves):
             return
         box = lagrangian.within(part.box, slack)
         if np.any(box[:, 0] > box[:, 1]):
             return
-        part = _Part(part.hands, part.merged, part.open, box)
+        part = Part(part.hands, part.merged, part.open, box)
         ticks = length / self._step + part.moves
-        heapq.heappush(
-            self.heap, _Node(ticks, next(self._numbers), length, part, point, lagrangian)
-        )
+        heapq.heappush(self.heap, Node(ticks, next(self._numbers), length, part, point, lagrangian))
 
-    def _short(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:
+    def shortfall(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:
         """By how much a bound is short of the longest path of interest."""
         bound = lagrangian.constant + float(lagrangian.least(box).sum()) - _TOLERANCE
         return self.longest(moves) - bound

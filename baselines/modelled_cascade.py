@@ -54,13 +54,14 @@ class ModelledCascade(Cascade):
         """As :meth:`coartic.baselines.cascade.Cascade.solve`."""
         self._rows.value = rows
         self._least.value = least
-        self._state(1)
+        self.solve_stated(1)
         self._least.value = least - (max(0.0, float(self._s.value)) + SLACK)
         self._preferred.value = preferred
-        self._state(2)
+        self.solve_stated(2)
         return np.array(self._x.value, dtype=np.float64)
 
-    def _state(self, level: int) -> None:
+    def solve_stated(self, level: int) -> None:
+        """Solve a level as cvxpy states it. Raises CascadeError."""
         problem = self.levels[level - 1]
         try:
             with warnings.catch_warnings():

@@ -121,7 +121,7 @@ class Controller:
         postures = self.postures(q, aims, {} if before is None else before.postures)
         nearest, since = np.inf, 0
         while True:
-            distance = float(np.hypot(*self._error(q, aims[0])))
+            distance = float(np.hypot(*self.error_of(q, aims[0])))
             if distance <= self.task.radius - _HIT_MARGIN:
                 break
             if distance < nearest - 0.1 * length:
@@ -138,9 +138,9 @@ class Controller:
                     f"after {len(waypoints)} control steps and comes no nearer"
                 )
             if waypoints:
-                self._sweep(q, aims, postures)
-            rates = self._rates(q, aims[0], postures[0], rates, length)
-            q = self._moved(q, length * rates)
+                self.sweep(q, aims, postures)
+            rates = self.next_rates(q, aims[0], postures[0], rates, length)
+            q = self.moved(q, length * rates)
             waypoints.append(q)
         path = np.array(waypoints or [start])
         found = follow(
@@ -167,21 +167,21 @@ class Controller:
             before = found[-1] if found else q
             posture, change = known.get(aim, before), np.inf
             for _ in range(_POSTURE_STEPS if aim not in known else 0):
-                posture, change = self._nearer(posture, before, aim)
+                posture, change = self.step_nearer(posture, before, aim)
                 if change <= _POSTURE_TOLERANCE:
                     break
             found.append(posture)
         for _ in range(_POSTURE_STEPS if len(aims) > 1 else 0):
-            if self._sweep(q, aims, found) <= _POSTURE_TOLERANCE:
+            if self.sweep(q, aims, found) <= _POSTURE_TOLERANCE:
                 break
         return found
 
     def nearest_hands(self, q: Array, goal: int) -> list[Hand]:
         """The hands, the nearest to a goal first, the left one of equally near ones."""
         hands = [hand for hand in HANDS if hand in self.session.hands]
-        return sorted(hands, key=lambda hand: float(np.hypot(*self._error(q, Aim(hand, goal)))))
+        return sorted(hands, key=lambda hand: float(np.hypot(*self.error_of(q, Aim(hand, goal)))))
 
-    def _sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
+    def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Move each posture, in place, towards where the ways to and from it are shortest.
 
         The sum of two distances is least where their ends, each weighted by the inverse of its
@@ -199,13 +199,13 @@ class Controller:
                     self.session.joints(aims[k + 1].hand) if aims[k + 1].arm_only else slice(None)
                 )
                 preferred[heeding] += on / (to + on) * (after - before)[heeding]
-            postures[k], change = self._nearer(postures[k], preferred, aim)
+            postures[k], change = self.step_nearer(postures[k], preferred, aim)
             largest = max(largest, change)
         return largest
 
-    def _nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
+    def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
         """One Gauss-Newton step to the posture nearest to a preferred one that hits a goal."""
-        rows, outside = self._disc(posture, aim)
+        rows, outside = self.faces(posture, aim)
         way = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.cascade.solve(rows, outside, way)
         short = outside.max()
@@ -216,33 +216,35 @@ class Controller:
             bent = (self.moving >= arm.start) & (self.moving < arm.stop)
             change[bent] += np.resize([1.0, -1.0], bent.sum())
         length = float(np.linalg.norm(change))
-        return self._moved(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
+        return self.moved(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
-    def _rates(self, q: Array, aim: Aim, posture: Array, last: Array, length: float) -> Array:
+    def next_rates(self, q: Array, aim: Aim, posture: Array, last: Array, length: float) -> Array:
         """Joint rates of one control step of a ``length``, of norm 1 at most."""
         way = (posture - q)[self.moving]
         steps = max(1.0, float(np.linalg.norm(way)) / length)
-        rows, outside = self._disc(q, aim)
+        rows, outside = self.faces(q, aim)
         shrunk = outside.max() * (1.0 - _CLOSING / steps)
         preferred = (1.0 - self.inertia) * way / (steps * length) + self.inertia * last
         rates = self.cascade.solve(length * rows, outside - shrunk, preferred)
         rates /= max(1.0, float(np.linalg.norm(rates)))
         return rates
 
-    def _disc(self, q: Array, aim: Aim) -> tuple[Array, Array]:
+    def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
         """How changes of the joints bring a hand within each face of a goal, ``(FACES, joints)``.
 
         And how far it is outside of each, ``(FACES,)``, length unit.
         """
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
-        return _NORMALS @ jacobian, _NORMALS @ self._error(q, aim) - radius
+        return _NORMALS @ jacobian, _NORMALS @ self.error_of(q, aim) - radius
 
-    def _moved(self, q: Array, change: Array) -> Array:
+    def moved(self, q: Array, change: Array) -> Array:
+        """A configuration with the joints that are not locked changed."""
         moved = q.copy()
         moved[self.moving] += change
         return moved
 
-    def _error(self, q: Array, aim: Aim) -> Array:
+    def error_of(self, q: Array, aim: Aim) -> Array:
+        """From a hand to its goal's centre, shape ``(2,)``, length unit."""
         error: Array = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         return error

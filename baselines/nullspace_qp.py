@@ -177,19 +177,19 @@ class NullspaceQP(Method):
         iterations = cascade.iterations
         try:
             with session.solving():
-                return self._solve(controller)
+                return self.search(controller)
         except CascadeError as error:
             raise MethodError("solver-failed", str(error)) from None
         finally:
             session.spend(solver_iterations=cascade.iterations - iterations)
 
-    def _solve(self, controller: Controller) -> Result:
+    def search(self, controller: Controller) -> Result:
         """Extend the sequence with the fewest ticks so far until one is complete.
 
         No other can be better then, since ticks only add up. Of equal ones the one with
         the fewest changes of hand is kept, then the first.
         """
-        candidates = self._candidates(controller)
+        candidates = self.candidates(controller)
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)
@@ -211,23 +211,25 @@ class NullspaceQP(Method):
                 return Result(tuple(leg.movement for leg in way), details)
             plan = tuple(self.aims(hands, g) for g in range(goal + 1))
             if plan not in legs:
-                legs[plan] = self._leg(controller, way, plan[-1])
+                legs[plan] = self.leg_or_failure(controller, way, plan[-1])
             leg = legs[plan]
             if isinstance(leg, StuckError):
                 stuck.append(leg)
             else:
                 heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*way, leg)))
-        raise _failure(str(stuck[0]), stuck)
+        raise failure(str(stuck[0]), stuck)
 
-    def _leg(
+    def leg_or_failure(
         self, controller: Controller, way: tuple[Leg, ...], aims: tuple[Aim, ...]
     ) -> Leg | StuckError:
+        """The next leg of a way, or why there is none."""
         try:
             return controller.leg(way[-1] if way else None, aims)
         except StuckError as error:
             return error
 
-    def _candidates(self, controller: Controller) -> list[tuple[Hand, ...]]:
+    def candidates(self, controller: Controller) -> list[tuple[Hand, ...]]:
+        """The hand sequences that are simulated."""
         session, choice = controller.session, self.parameters.hands
         if choice == "every":
             ordered = [hand for hand in HANDS if hand in session.hands]
@@ -237,17 +239,19 @@ class NullspaceQP(Method):
         way: tuple[Leg, ...] = ()
         for goal in range(session.goals_count):
             nearest = controller.nearest_hands(way[-1].q if way else session.q0, goal)
-            legs = [self._leg(controller, way, (Aim(nearest[0], goal),))]
+            legs = [self.leg_or_failure(controller, way, (Aim(nearest[0], goal),))]
             if isinstance(legs[0], StuckError):  # only then is it another hand's turn
-                legs += [self._leg(controller, way, (Aim(hand, goal),)) for hand in nearest[1:]]
+                legs += [
+                    self.leg_or_failure(controller, way, (Aim(hand, goal),)) for hand in nearest[1:]
+                ]
             reached = [leg for leg in legs if isinstance(leg, Leg)]
             if not reached:
-                raise _failure("; ".join(map(str, legs)), legs)
+                raise failure("; ".join(map(str, legs)), legs)
             way = (*way, reached[0])
         return [tuple(leg.movement.hand for leg in way)]
 
 
-def _failure(reason: str, legs: Sequence[object]) -> MethodError:
+def failure(reason: str, legs: Sequence[object]) -> MethodError:
     """No way to a goal; one that was only not finished says nothing of the task."""
     if any(isinstance(leg, UnfinishedError) for leg in legs):
         return MethodError("solver-failed", reason)

@@ -93,18 +93,18 @@ class Optimum(Method):
         if (session.model.arrival_tick, session.model.whole_last_step) != (1, False):
             raise MethodError("infeasible", "proof and rounding need a tick for each arrival "
                               "and a last step that ends at the target")  # fmt: skip
-        task = _locked(session.hand_over(*self.told), parameters.base)
+        task = with_locks(session.hand_over(*self.told), parameters.base)
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
         with session.solving():
-            best, solves, failed = self._shortest(session, task, problem)
+            best, solves, failed = self.shortest_plans(session, task, problem)
             if not best:
                 raise MethodError(
                     "infeasible", f"none of {solves} solves found a path that hits every goal"
                 )
-            made, ticks = self._whole(session, task, problem, best)
+            made, ticks = self.fewest_ticks(session, task, problem, best)
         ranked = sorted(best.values(), key=lambda entry: entry[1].cost)
-        bound, proof = self._proof(session, task, ticks)
+        bound, proof = self.proof(session, task, ticks)
         details = {
             "path_length": ranked[0][1].cost,
             "path_lengths": {letters_of(i.hands): plan.cost for i, plan in ranked[:MOST_KEPT]},
@@ -115,11 +115,11 @@ class Optimum(Method):
         }
         return Result(made, details, bound=bound)
 
-    def _proof(self, session: Session, task: Task, ticks: int) -> tuple[int | None, dict[str, Any]]:
+    def proof(self, session: Session, task: Task, ticks: int) -> tuple[int | None, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
         return None, {}
 
-    def _shortest(
+    def shortest_plans(
         self, session: Session, task: Task, problem: TrajectoryProblem
     ) -> tuple[dict[tuple[Hand, ...], tuple[Instance, Plan]], int, int]:
         """The shortest plan of each hand sequence; solves made; those that failed."""
@@ -137,7 +137,7 @@ class Optimum(Method):
                 best[hands] = instance, plan
         return best, solves, failed
 
-    def _whole(
+    def fewest_ticks(
         self,
         session: Session,
         task: Task,
@@ -231,7 +231,8 @@ class BranchAndBound(DynamicProgramming):
     Parameters = BoundParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_nodes": 100}
 
-    def _proof(self, session: Session, task: Task, ticks: int) -> tuple[int, dict[str, Any]]:
+    def proof(self, session: Session, task: Task, ticks: int) -> tuple[int, dict[str, Any]]:
+        """Reward that is proven never to be exceeded, and how hard that was."""
         with session.solving():
             found = certify(
                 task,
@@ -275,13 +276,13 @@ class Multistart(Optimum):
         rng = np.random.default_rng(self.parameters.sampling_seed)
         for letters in hand_sequences(task):
             hands = hands_of(letters)
-            corrected = _corrected(session, task, hands)
+            start = corrected(session, task, hands)
             for number in range(self.parameters.starts):
                 spread = 0.0 if number == 0 else 0.05 * 30.0 ** rng.random()
-                yield hands, corrected + spread * rng.standard_normal(corrected.shape)
+                yield hands, start + spread * rng.standard_normal(start.shape)
 
 
-def _corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
+def corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):
@@ -298,7 +299,7 @@ def _corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
     return np.array(configurations)
 
 
-def _locked(task: Task, base: str) -> Task:
+def with_locks(task: Task, base: str) -> Task:
     """The task with further base coordinates locked."""
     if base == "task":
         return task

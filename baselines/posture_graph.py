@@ -83,7 +83,7 @@ def sample_postures(
 
 
 @dataclass(frozen=True)
-class _Begun:
+class Beginning:
     """The cheapest chains of nodes for the beginning of a hand sequence."""
 
     hands: tuple[Hand, ...]
@@ -134,17 +134,19 @@ class PostureGraph:
         sequences, goal by goal, as many are kept as are cheapest; none is lost while there
         are no more than that.
         """
-        begun = _Begun((), dict.fromkeys(HANDS, self._start[None, :]), np.zeros((1, 1)), ())
-        if only is not None or most is None or len(self.task.hands) ** self._goals <= most:
-            yield from self._every(begun, only)
+        begun = Beginning(
+            (), dict.fromkeys(HANDS, np.array(self.task.q0)[None, :]), np.zeros((1, 1)), ()
+        )
+        if only is not None or most is None or len(self.task.hands) ** len(self.task.goals) <= most:
+            yield from self.every_chain(begun, only)
             return
         kept = [begun]
-        for _ in range(self._goals):
-            longer = [more for beginning in kept for more in self._longer(beginning, None)]
+        for _ in range(len(self.task.goals)):
+            longer = [more for beginning in kept for more in self.longer(beginning, None)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
         for whole in kept:
-            yield self._chain(whole)
+            yield self.chain_of(whole)
 
     def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
         """Why there is no chain: the first goal without a posture; empty where there is one."""
@@ -157,23 +159,15 @@ class PostureGraph:
                 )
         return ""
 
-    @property
-    def _start(self) -> Array:
-        return np.array(self.task.q0)
-
-    @property
-    def _goals(self) -> int:
-        return len(self.task.goals)
-
-    def _every(self, begun: _Begun, only: tuple[Hand, ...] | None) -> Iterator[Chain]:
+    def every_chain(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Chain]:
         """All chains that begin so, one after another: they share what they begin with."""
-        if len(begun.hands) == self._goals:
-            yield self._chain(begun)
+        if len(begun.hands) == len(self.task.goals):
+            yield self.chain_of(begun)
             return
-        for longer in self._longer(begun, only):
-            yield from self._every(longer, only)
+        for longer in self.longer(begun, only):
+            yield from self.every_chain(longer, only)
 
-    def _longer(self, begun: _Begun, only: tuple[Hand, ...] | None) -> Iterator[_Begun]:
+    def longer(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
         goal = len(hands)
@@ -182,25 +176,26 @@ class PostureGraph:
             if layer is None or not len(layer):
                 continue
             last = hands[-1] if hands else hand
-            base = _squares(nodes[last], layer, slice(0, BASE_DOF))
-            arm = _squares(nodes[hand], layer, self.task.robot.joints(hand))
+            base = squared_distances(nodes[last], layer, slice(0, BASE_DOF))
+            arm = squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
                 step = np.sqrt(base + arm)
                 came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for j in range(cost.shape[1]):
-                    came[:, j], reached[:, j] = _least(cost[:, j, None] + step)
+                    came[:, j], reached[:, j] = least_of_columns(cost[:, j, None] + step)
             else:
                 # (i, j) -> (k, i): the hand comes from its own node j; the least over j.
                 came = np.empty((len(layer), cost.shape[0]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for i in range(cost.shape[0]):
                     total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
-                    came[:, i], reached[:, i] = _least(total)
-            yield _Begun((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
+                    came[:, i], reached[:, i] = least_of_columns(total)
+            yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
-    def _chain(self, whole: _Begun) -> Chain:
+    def chain_of(self, whole: Beginning) -> Chain:
+        """The cheapest chain of a whole sequence."""
         hands, cost, back = whole.hands, whole.cost, whole.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
@@ -209,7 +204,7 @@ class PostureGraph:
             came = back[goal][i, j]
             same = goal == 0 or hands[goal - 1] == hands[goal]
             i, j = (came, j) if same else (j, came)
-        configurations, q = [], self._start
+        configurations, q = [], np.array(self.task.q0)
         for hand, node in zip(hands, reversed(picked), strict=True):
             q = q.copy()
             q[:BASE_DOF] = node[:BASE_DOF]
@@ -263,13 +258,13 @@ def spread_out(task: Task, chain: Chain) -> Array:
     return configurations
 
 
-def _squares(before: Array, after: Array, joints: slice) -> Array:
+def squared_distances(before: Array, after: Array, joints: slice) -> Array:
     """Squared distances of every pair, over some joints, shape ``(before, after)``."""
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))
 
 
-def _least(costs: Array) -> tuple[NDArray[np.intp], Array]:
+def least_of_columns(costs: Array) -> tuple[NDArray[np.intp], Array]:
     """The row of the least of every column, and that least."""
     rows = costs.argmin(axis=0)
     return rows, costs[rows, np.arange(len(rows))]

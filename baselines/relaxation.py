@@ -81,16 +81,16 @@ class Relaxation:
 
         self._stiff = np.zeros((goals, dof), dtype=np.bool_)
         for g, hand in enumerate(hands):
-            self._stiff[g, _stiff_joints(task, hand, still)] = True
+            self._stiff[g, stiff_joints(task, hand, still)] = True
         self._stiff[list(merged)] = True
         self.goal_of = np.array([g for g, _ in links], dtype=np.intp)
         self._own = np.array([g * dof + arms[g].first + k for g, k in links], dtype=np.intp)
         self._tip = np.array([k + 1 == len(arms[g].links) for g, k in links], dtype=np.bool_)
-        discs = [_disc(task, arm) for arm in chosen]
+        discs = [disc_of(task, arm) for arm in chosen]
         shoulders = np.array([shoulder for shoulder, _ in discs])
         self._radii = np.array([radius for _, radius in discs])
         self._offset = q0[:BASE_DOF] + shoulders - task.goal_array
-        cones = _Cones(self._size)
+        cones = Cones(self._size)
         for g, joint in zip(*np.nonzero(self._stiff), strict=True):
             cones.add_change(q0, int(g), int(joint))
         self._stiff_rows = slice(0, len(cones.rows))
@@ -124,7 +124,7 @@ class Relaxation:
         if links:
             self._cones.append(clarabel.NonnegativeConeT(_NORMALS * len(links)))
         self._quadratic = sparse.csc_matrix((self._size, self._size))
-        self._lay_out(np.array(cones.rows))
+        self.lay_out(np.array(cones.rows))
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
         # Any multipliers give a bound, so it need not be exact, nor end.
@@ -143,7 +143,7 @@ class Relaxation:
 
     def solve(self, box: Array) -> tuple[Multipliers, Array, int]:
         """Multipliers for a box, the relaxation's minimiser, iterations of the solver."""
-        matrix, offsets = self._with_half_spaces(box)
+        matrix, offsets = self.with_half_spaces(box)
         solution = clarabel.DefaultSolver(
             self._quadratic,
             self._objective,
@@ -207,7 +207,7 @@ class Relaxation:
         """Those of a minimiser, shape ``(G, dof)``."""
         return point[: self._stiff.size].reshape(self._stiff.shape)
 
-    def _lay_out(self, fixed: Array) -> None:
+    def lay_out(self, fixed: Array) -> None:
         """Where the entries of the half-spaces stand, below the rows that are fixed."""
         links = len(self._directions)
         turned, angle_columns = np.nonzero(self._angles)  # of each link, its angle's joints
@@ -224,14 +224,14 @@ class Relaxation:
         self._ends = np.searchsorted(columns[self._order], np.arange(self._size + 1))
         self._matrix = sparse.csc_matrix((len(fixed) + _NORMALS * links, self._size))
 
-    def _with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
+    def with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
         """All rows, and the right sides of the half-spaces ``A x <= b``.
 
         They hold (c, s, φ) of every link in its interval.
         """
         middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
-        normals = _normals(half)
-        offsets = _support(normals, half)
+        normals = half_space_normals(half)
+        offsets = support_of(normals, half)
         along, across, turn = normals
         # From the interval's own frame, where its middle is the angle zero.
         cosine, sine = directions(middle).T
@@ -307,7 +307,7 @@ class Lagrangian:
         return found
 
 
-def _disc(task: Task, arm: Arm | None) -> tuple[Array, float]:
+def disc_of(task: Task, arm: Arm | None) -> tuple[Array, float]:
     """Where the shoulder is from the base, and the radius of the goal for that arm's hand.
 
     For an undecided hand (None): the middle of the shoulders, and how far it may be from the
@@ -323,7 +323,7 @@ def _disc(task: Task, arm: Arm | None) -> tuple[Array, float]:
     return middle, task.radius + max(reaches)
 
 
-class _Cones:
+class Cones:
     """Rows ``constant + entries · x`` of cones, as Clarabel has them, one cone after another."""
 
     def __init__(self, size: int) -> None:
@@ -356,7 +356,7 @@ class _Cones:
         self._in_closed = len(self.rows)
 
 
-def _stiff_joints(task: Task, hand: Hand | None, still: bool) -> list[int]:
+def stiff_joints(task: Task, hand: Hand | None, still: bool) -> list[int]:
     """Joints that cannot move on the way to a goal of this hand, or of an undecided one."""
     stiff = {{"x": 0, "y": 1}[axis] for axis in task.locked_base}
     for other in HANDS:
@@ -368,7 +368,7 @@ def _stiff_joints(task: Task, hand: Hand | None, still: bool) -> list[int]:
 _NORMALS = 9  # half-spaces of each link
 
 
-def _normals(half: Array) -> Array:
+def half_space_normals(half: Array) -> Array:
     """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, _NORMALS, links)``.
 
     The interval's ends; the chord; tangents to cosine and sine; the chord of the sine. Any
@@ -384,7 +384,7 @@ def _normals(half: Array) -> Array:
     return np.array(found).swapaxes(0, 1)
 
 
-def _support(normals: Array, half: Array) -> Array:
+def support_of(normals: Array, half: Array) -> Array:
     """Maximum of ``a cos δ + b sin δ + k δ`` over |δ| <= half, exactly; ``(n, links)``."""
     a, b, k = normals
     cosine, sine = directions(half).T

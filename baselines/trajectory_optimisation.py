@@ -105,13 +105,13 @@ class TrajectoryOptimisation(Method):
             goals = len(task.goals)
             problem = trajectory_problem(task.robot, task.hands, goals, self.cost)
         with session.solving():
-            plans, failed = self._plans(session, task, problem, only)
+            plans, failed = self.plans(session, task, problem, only)
             if not plans:
                 raise MethodError(
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
             instance, plan = min(plans, key=lambda entry: entry[1].cost)
-            made = self._movements(session, task, problem, instance, plan)
+            made = self.movements_of(session, task, problem, instance, plan)
         details = {
             "cost": plan.cost,
             "path_length": float(plan.lengths(task.q0).sum()),
@@ -120,7 +120,7 @@ class TrajectoryOptimisation(Method):
         }
         return Result(tuple(made), details)
 
-    def _plans(
+    def plans(
         self,
         session: Session,
         task: Task,
@@ -129,12 +129,12 @@ class TrajectoryOptimisation(Method):
     ) -> tuple[list[tuple[Instance, Plan]], dict[str, str]]:
         """The plan of each hand sequence, and the reason of each that has none."""
         plans, failed = [], {}
-        for hands, starts in self._starts(session, task, only).items():
+        for hands, starts in self.starts(session, task, only).items():
             instance = Instance.of(
                 task,
                 hands,
                 still=self.parameters.other_arm == "still",
-                radius=self._radius(session, task),
+                radius=self.target_radius(session, task),
             )
             found = []
             for start in starts:
@@ -152,7 +152,7 @@ class TrajectoryOptimisation(Method):
                 failed[letters_of(hands)] = plan.reason
         return plans, failed
 
-    def _starts(
+    def starts(
         self, session: Session, task: Task, only: tuple[Hand, ...] | None
     ) -> dict[tuple[Hand, ...], list[Array]]:
         """Starts for every hand sequence, or for ``only`` one.
@@ -184,11 +184,11 @@ class TrajectoryOptimisation(Method):
                 known.append(first + spread * rng.standard_normal(first.shape))
         return starts
 
-    def _radius(self, session: Session, task: Task) -> float:
+    def target_radius(self, session: Session, task: Task) -> float:
         """Within this of a goal's centre a target is sure to hit."""
         return task.radius - session.model.arrival_tolerance
 
-    def _movements(
+    def movements_of(
         self,
         session: Session,
         task: Task,
@@ -196,6 +196,7 @@ class TrajectoryOptimisation(Method):
         instance: Instance,
         plan: Plan,
     ) -> list[Movement]:
+        """The movements of a plan; the session spends what they take."""
         made, evaluations = movements(
             task, instance.hands, plan.configurations, instance.held, session.model
         )
@@ -209,12 +210,13 @@ class PathLength(TrajectoryOptimisation):
     cost = "path-length"
     Parameters = PathLengthParameters
 
-    def _radius(self, session: Session, task: Task) -> float:
+    def target_radius(self, session: Session, task: Task) -> float:
+        """Within this of a goal's centre a target is sure to hit."""
         if self.parameters.whole_ticks:
             return task.radius
-        return super()._radius(session, task)
+        return super().target_radius(session, task)
 
-    def _movements(
+    def movements_of(
         self,
         session: Session,
         task: Task,
@@ -222,18 +224,19 @@ class PathLength(TrajectoryOptimisation):
         instance: Instance,
         plan: Plan,
     ) -> list[Movement]:
+        """The movements of a plan; the session spends what they take."""
         if not self.parameters.whole_ticks:
-            return super()._movements(session, task, problem, instance, plan)
+            return super().movements_of(session, task, problem, instance, plan)
         rounding = Rounding(problem, instance, session.model.step)
         whole = rounding.nearest(plan)
         session.spend(**rounding.spent)
         if whole is None:  # aimed inside the discs it is a plan all the same
-            inside = replace(instance, radius=super()._radius(session, task))
+            inside = replace(instance, radius=super().target_radius(session, task))
             plan = problem.solve(inside, plan.configurations)
             session.spend(**plan.spent)
             if not plan.converged:
                 raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
-            return super()._movements(session, task, problem, inside, plan)
+            return super().movements_of(session, task, problem, inside, plan)
         made, evaluations = movements(
             task, whole.hands, whole.configurations, instance.held, session.model, whole.steps
         )
@@ -246,7 +249,7 @@ class Smooth(TrajectoryOptimisation):
 
     Parameters = SmoothParameters
 
-    def _movements(
+    def movements_of(
         self,
         session: Session,
         task: Task,
@@ -254,6 +257,7 @@ class Smooth(TrajectoryOptimisation):
         instance: Instance,
         plan: Plan,
     ) -> list[Movement]:
+        """The movements of a plan; the session spends what they take."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
 
 
@@ -292,9 +296,10 @@ _PLANNER = frozenset(
 )
 
 
-def _variant(
+def variant(
     base: type[TrajectoryOptimisation], cost: Cost, title: str, citation: str, secondary: str
 ) -> type[TrajectoryOptimisation]:
+    """A method of its own for one cost."""
     extra = Information.SECONDARY_OBJECTIVES if secondary else Information.REWARD_FORMULA
     return type(
         base.__name__ + "".join(part.title() for part in cost.split("-")),
@@ -313,7 +318,7 @@ def _variant(
 
 
 METHODS: tuple[type[TrajectoryOptimisation], ...] = (
-    _variant(
+    variant(
         PathLength,
         "path-length",
         "path length",
@@ -321,7 +326,7 @@ METHODS: tuple[type[TrajectoryOptimisation], ...] = (
         "Journal of Guidance, Control, and Dynamics.",
         "",
     ),
-    _variant(
+    variant(
         TrajectoryOptimisation,
         "squared-changes",
         "squared configuration changes",
@@ -330,7 +335,7 @@ METHODS: tuple[type[TrajectoryOptimisation], ...] = (
         "approach.",
         "sum of squared configuration changes",
     ),
-    _variant(
+    variant(
         Smooth,
         "acceleration",
         "minimum acceleration",
@@ -338,7 +343,7 @@ METHODS: tuple[type[TrajectoryOptimisation], ...] = (
         "confirmed mathematical model. Journal of Neuroscience (there: jerk).",
         "minimum joint acceleration",
     ),
-    _variant(
+    variant(
         Smooth,
         "jerk",
         "minimum jerk",

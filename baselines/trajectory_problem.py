@@ -13,11 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Literal
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BPoly
 
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
@@ -123,7 +125,7 @@ class TrajectoryProblem:
         limits, q = [], q0
         for g in range(goals):
             q = q + steps[:, g]
-            hand = _chosen_hand({hand: robot.symbolic_hand(q, hand) for hand in hands}, right[g])
+            hand = chosen_hand({hand: robot.symbolic_hand(q, hand) for hand in hands}, right[g])
             limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
@@ -131,7 +133,7 @@ class TrajectoryProblem:
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
-            costs = [_segment_cost(cost, steps[:, g], durations[g], ends[g]) for g in range(goals)]
+            costs = [segment_cost(cost, steps[:, g], durations[g], ends[g]) for g in range(goals)]
             objective = sum(costs, casadi.SX(0))
         lower = [-np.inf] * len(limits)
         upper = [0.0] * len(limits)
@@ -173,15 +175,17 @@ class TrajectoryProblem:
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         step_bound = np.where(instance.held, 0.0, np.inf).ravel()
-        rate_bound = self._rate_bound(instance)
-        at, low, high = self._length_bounds(steps, lengths)
-        times, shortest, longest = self._time_bounds(steps, free_times)
+        rate_bound = self.rate_bound(instance)
+        first_lengths, low, high = self.length_bounds(steps, lengths)
+        times, shortest, longest = self.time_bounds(steps, free_times)
         rim = instance.radius - _RIM
         chosen = np.zeros(self.goals)
         chosen[[] if deep is None else list(deep)] = 1.0
         deepest = 0.0 if deep is None else rim
         solution = self._solver(
-            x0=np.concatenate([steps.ravel(), at, times, [0.0], np.zeros(rate_bound.size)]),
+            x0=np.concatenate(
+                [steps.ravel(), first_lengths, times, [0.0], np.zeros(rate_bound.size)]
+            ),
             lbx=np.concatenate([-step_bound, low, shortest, [0.0], -rate_bound]),
             ubx=np.concatenate([step_bound, high, longest, [deepest], rate_bound]),
             lbg=self._lower,
@@ -197,16 +201,16 @@ class TrajectoryProblem:
                 ]
             ),
         )
-        return self._plan(instance, solution)
+        return self.plan_from(instance, solution)
 
-    def _rate_bound(self, instance: Instance) -> Array:
+    def rate_bound(self, instance: Instance) -> Array:
         """Most of every rate: 0 at rest (start and end) and for joints held on either side."""
         still = np.vstack([instance.held[:1] | True, instance.held])
         still[:-1] |= instance.held
         still[-1] = True
         return np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
 
-    def _length_bounds(self, steps: Array, lengths: Array | None) -> tuple[Array, Array, Array]:
+    def length_bounds(self, steps: Array, lengths: Array | None) -> tuple[Array, Array, Array]:
         """Lengths of the segments to start from, with their least and most."""
         if self.cost != "path-length":
             return np.zeros(self.goals), np.zeros(self.goals), np.zeros(self.goals)
@@ -217,7 +221,7 @@ class TrajectoryProblem:
             at[given] = low[given] = high[given] = lengths[given]
         return at, low, high
 
-    def _time_bounds(self, steps: Array, free: bool) -> tuple[Array, Array, Array]:
+    def time_bounds(self, steps: Array, free: bool) -> tuple[Array, Array, Array]:
         """Durations of the segments to start from, with their least and most."""
         goals = self.goals
         if not (free and self._order):
@@ -227,7 +231,7 @@ class TrajectoryProblem:
         times *= goals / times.sum()
         return times, np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
 
-    def _plan(self, instance: Instance, solution: dict[str, Any]) -> Plan:
+    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> Plan:
         """What IPOPT gave; its word is checked: every limit it was given holds."""
         goals, dof = self.goals, self.robot.dof
         x = np.asarray(solution["x"]).ravel()
@@ -253,14 +257,14 @@ class TrajectoryProblem:
         )
 
 
-def _chosen_hand(positions: dict[Hand, Any], right: Any) -> Any:
+def chosen_hand(positions: dict[Hand, Any], right: Any) -> Any:
     """Position of the hand that a parameter chooses, 1 for the right one."""
     if len(positions) == 1:
         return next(iter(positions.values()))
     return right * positions["right"] + (1 - right) * positions["left"]
 
 
-def _segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
+def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
     """Cost of the best segment between given end states, which is a polynomial.
 
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals
@@ -296,25 +300,7 @@ def spline(plan: Plan, q0: Array, samples: int) -> list[Array]:
     Hermite cubics (one rate) or quintics (two) between start and goals.
     """
     corners = np.vstack([q0, plan.configurations])
-    at = np.linspace(0.0, 1.0, samples + 1)[1:, None]
-    pieces = []
-    for g, time in enumerate(plan.durations):
-        p0, p1 = corners[g], corners[g + 1]
-        v0, v1 = plan.rates[0, g] * time, plan.rates[0, g + 1] * time
-        if len(plan.rates) == 1:
-            rest = p1 - p0 - v0
-            piece = p0 + v0 * at + (3 * rest - (v1 - v0)) * at**2 + ((v1 - v0) - 2 * rest) * at**3
-        else:
-            a0, a1 = plan.rates[1, g] * time**2, plan.rates[1, g + 1] * time**2
-            d = p1 - p0 - v0 - a0 / 2
-            v, a = v1 - v0 - a0, a1 - a0
-            piece = (
-                p0
-                + v0 * at
-                + a0 / 2 * at**2
-                + (10 * d - 4 * v + a / 2) * at**3
-                + (-15 * d + 7 * v - a) * at**4
-                + (6 * d - 3 * v + a / 2) * at**5
-            )
-        pieces.append(piece)
-    return pieces
+    times = np.concatenate([[0.0], np.cumsum(plan.durations)])
+    curve = BPoly.from_derivatives(times, np.stack([corners, *plan.rates], axis=1))
+    share = np.linspace(0.0, 1.0, samples + 1)[1:]
+    return [curve(begin + share * (end - begin)) for begin, end in pairwise(times)]

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +52,7 @@ class Rounding:
 
     def __init__(self, problem: TrajectoryProblem, instance: Instance, step: float) -> None:
         self._problem, self._instance, self._step = problem, instance, step
-        self.spent: dict[str, int] = {}
+        self.spent: Counter[str] = Counter()
 
     def nearest(self, plan: Plan, merged: tuple[int, ...] = ()) -> TickPlan | None:
         """Every segment but the last rounded to the nearest step, the last one up.
@@ -61,7 +61,7 @@ class Rounding:
         this is nearly always the least number of ticks. None where a solve fails.
         """
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
-        return self._divided(plan, [round(length) for length in exact], merged)
+        return self.divided(plan, [round(length) for length in exact], merged)
 
     def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Roundings up and down of all but the last segment, the nearest first.
@@ -75,7 +75,7 @@ class Rounding:
             key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
         )
         for steps in ranked[:MOST_ROUNDINGS]:
-            found = self._divided(plan, list(steps), merged)
+            found = self.divided(plan, list(steps), merged)
             if found is not None:
                 yield found
 
@@ -105,14 +105,14 @@ class Rounding:
                 continue
             for g in further:
                 more = (*merged, g)
-                found = self._solve(plan.configurations, np.full(goals, np.nan), more)
+                found = self.solve_around(plan.configurations, np.full(goals, np.nan), more)
                 if found.converged:
                     waiting.append((more, found))
 
-    def _divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
+    def divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
         """The plan with these steps to all goals but the last, and as few as can be to that."""
         lengths = np.array([*steps, np.nan]) * self._step
-        found = self._solve(plan.configurations, lengths, merged)
+        found = self.solve_around(plan.configurations, lengths, merged)
         if not found.converged:
             return None
         last = found.lengths(self._instance.q0)[-1] / self._step
@@ -120,14 +120,14 @@ class Rounding:
         # Hands as deep inside the discs as these lengths allow: safe against rounding, and
         # above all those that are to be there before another hand hits.
         deep = merged or range(len(lengths))
-        centred = self._solve(found.configurations, lengths, merged, deep=deep)
+        centred = self.solve_around(found.configurations, lengths, merged, deep=deep)
         if not centred.converged:
             return None
         lengths[list(merged)] = 0.0
         whole = tuple(round(length / self._step) for length in lengths)
         return TickPlan(self._instance.hands, whole, centred.configurations)
 
-    def _solve(
+    def solve_around(
         self,
         start: Array,
         lengths: Array,
@@ -135,6 +135,7 @@ class Rounding:
         *,
         deep: Sequence[int] | None = None,
     ) -> Plan:
+        """The shortest plan near another one, with these lengths and mergers."""
         instance = self._instance
         if merged:
             lengths, held = lengths.copy(), instance.held.copy()
@@ -142,7 +143,7 @@ class Rounding:
             held[list(merged)] = True
             instance = replace(instance, held=held)
         plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
-        add(self.spent, plan.spent)
+        self.spent.update(plan.spent)
         return plan
 
 
@@ -163,12 +164,6 @@ def mergeable(task: Task, hands: Sequence[Hand | None]) -> tuple[int, ...]:
         or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
     ]
     return tuple(able)
-
-
-def add(total: dict[str, int], spent: Mapping[str, int]) -> None:
-    """Add what one solve spent to a total."""
-    for name, count in spent.items():
-        total[name] = total.get(name, 0) + count
 
 
 def movements(

@@ -21,7 +21,7 @@ def write_atomically(path: Path, data: bytes) -> None:
     try:
         with open(number, "wb") as file:
             file.write(data)
-        os.chmod(name, 0o666 & ~_umask())
+        os.chmod(name, 0o666 & ~current_umask())
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
@@ -35,10 +35,10 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     Raises CoarticError, before anything is written, where another file is in the way.
     """
     check_folder(folder, files)
-    with _errors(folder):
-        before = _listed(folder)
+    with errors_in_words(folder):
+        before = listed_files(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        _list(folder, {*before, *files})  # whatever happens now, all of them are known
+        write_listing(folder, {*before, *files})  # whatever happens now, all of them are known
         for name, data in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(folder / name, data)
@@ -46,14 +46,14 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
             (folder / name).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # others are in it
                 (folder / name).parent.rmdir()
-        _list(folder, {*files})
+        write_listing(folder, {*files})
 
 
 def check_folder(folder: Path, names: Iterable[str] = ()) -> None:
     """Raises CoarticError where :func:`publish` would; for those who work long before."""
     if os.path.lexists(folder) and not folder.is_dir():
         raise CoarticError(f"cannot write {folder}: what is there is no folder")
-    ours = _listed(folder)
+    ours = listed_files(folder)
     in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
     if in_the_way:
         shown = ", ".join(map(plain, in_the_way[:3]))
@@ -71,7 +71,7 @@ def write_outputs(files: Mapping[Path, bytes], *, replace: bool) -> None:
     """
     check_outputs(files, replace=replace)
     for path, data in files.items():
-        with _errors(path):
+        with errors_in_words(path):
             write_atomically(path, data)
 
 
@@ -101,7 +101,7 @@ def folder_named(name: object, what: str = "the name of a folder") -> Path:
     return Path(name)
 
 
-def _listed(folder: Path) -> set[str]:
+def listed_files(folder: Path) -> set[str]:
     """What an earlier call wrote; names that lead elsewhere are none of it."""
     try:
         names = (folder / LISTING).read_text(encoding="utf-8").splitlines()
@@ -110,19 +110,21 @@ def _listed(folder: Path) -> set[str]:
     return {name for name in names if name and not Path(name).is_absolute() and ".." not in name}
 
 
-def _list(folder: Path, names: Iterable[str]) -> None:
+def write_listing(folder: Path, names: Iterable[str]) -> None:
+    """Say which files in a folder are ours."""
     text = "".join(f"{name}\n" for name in sorted(names))
     write_atomically(folder / LISTING, text.encode())
 
 
-def _umask() -> int:
+def current_umask() -> int:
+    """Permissions that new files of this process do not get."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
 
 
 @contextlib.contextmanager
-def _errors(path: Path) -> Iterator[None]:
+def errors_in_words(path: Path) -> Iterator[None]:
     """What the system says, as a sentence."""
     try:
         yield

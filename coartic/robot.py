@@ -172,22 +172,6 @@ class Robot:
             result[..., 0, arm.first + k], result[..., 1, arm.first + k] = lever(xs, ys, k, tip)
         return self._hand(xs, ys, array), result
 
-    def nullspace_projector(self, q: ArrayLike, hand: Hand, free: ArrayLike | None = None) -> Array:
-        """Orthogonal projector on the nullspace of the hand's Jacobian.
-
-        Joint displacements in its range leave the hand where it is, to first
-        order. Shape ``(..., dof, dof)``. ``free`` is a boolean mask of shape
-        ``(dof,)``: joints that may move (all by default); the rows and columns of
-        the others are zero. Source: I - J^+ J (Liegeois 1977).
-        """
-        mask = np.ones(self.dof, bool) if free is None else np.asarray(free, dtype=bool)
-        if mask.shape != (self.dof,):
-            raise ValueError(f"free has shape {mask.shape}; one entry per joint is ({self.dof},)")
-        jacobian = self.jacobian(q, hand) * mask
-        inverse = np.linalg.pinv(jacobian) * mask[:, None]
-        projector: Array = np.diag(mask.astype(np.float64)) - inverse @ jacobian
-        return projector
-
     def base_outline(self, q: ArrayLike) -> Array:
         """Corners of the base, counter-clockwise from lower left, shape ``(..., 4, 2)``."""
         array = self._configuration(q)

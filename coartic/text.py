@@ -36,7 +36,7 @@ def one_line(text: str) -> str:
     Lines are joined by `` | ``; what else does not print (control characters, escape sequences,
     marks that turn the direction of writing) is shown as its escape, such as ``\\x1b``.
     """
-    if _printable_line(text):
+    if is_printable_line(text):
         return text
     return " | ".join(printed(part.strip()) for part in text.splitlines() if part.strip())
 
@@ -45,7 +45,7 @@ def printed(text: str) -> str:
     """Text with an escape for every character that does not print, line breaks among them."""
 
     def shown(match: re.Match[str]) -> str:
-        return match[0] if _prints(match[0]) else match[0].encode("unicode_escape").decode()
+        return match[0] if prints(match[0]) else match[0].encode("unicode_escape").decode()
 
     return _DOUBTFUL.sub(shown, text)
 
@@ -62,17 +62,20 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
 
 
-def _printable_line(text: str) -> bool:
-    return text.isprintable() or all(map(_prints, text))
+def is_printable_line(text: str) -> bool:
+    """Whether a text prints on one line."""
+    return text.isprintable() or all(map(prints, text))
 
 
-def _prints(c: str) -> bool:
+def prints(c: str) -> bool:
+    """Whether a character prints."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
-def _printable(text: str) -> str:
+def refuse_unprintable(text: str) -> str:
+    """The text itself; a validation error where it is not one printable line."""
     for c in "" if text.isprintable() else text:
-        if not _prints(c):
+        if not prints(c):
             escape = c.encode("unicode_escape").decode()
             raise PydanticCustomError(
                 "not_plain",
@@ -82,7 +85,7 @@ def _printable(text: str) -> str:
     return text
 
 
-printable = AfterValidator(_printable)
+printable = AfterValidator(refuse_unprintable)
 """Refuses what is not one line of printable text."""
 Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
 """One line of printable text, such as a title or a citation."""

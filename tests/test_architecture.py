@@ -96,24 +96,6 @@ def test_no_imports_go_round_in_circles():
         raise AssertionError(" <- ".join(error.args[1])) from None
 
 
-STATISTICS = [path for path in sources() if path.parent == ROOT / "analysis" / "statistics"]
-
-
-@pytest.mark.parametrize("path", STATISTICS, ids=lambda path: path.name)
-def test_statistics_know_no_task_no_file_and_no_paper(path):
-    """Numbers come in: of the analysis they use themselves alone."""
-    own = {name for name in imported(path) if name.startswith("coartic.")}
-    assert own <= {name for name in own if name.startswith("coartic.analysis.statistics")} | {
-        "coartic.robot.Array"
-    }
-
-
-def test_the_command_line_uses_all_it_sits_on():
-    files = (ROOT / "coartic" / "cli").glob("*.py")
-    roots = {package_of(name) for path in files for name in imported(path)}
-    assert {"coartic", "benchmarks", "analysis"} <= roots
-
-
 FRESH = """
 import gc, sys, time
 gc.disable()  # all is imported
@@ -219,18 +201,3 @@ def without_posix(out):
 def test_nothing_needs_what_posix_alone_has(tmp_path):
     """As on Windows."""
     apart(without_posix, tmp_path / "out")
-
-
-def test_git_ignores_no_source():
-    """What git ignores is in no clone, and in no wheel."""
-    files = [
-        path
-        for package in (*PACKAGES, "tests", "docs")
-        for path in (ROOT / package).rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
-    ]
-    done = subprocess.run(
-        ["git", "check-ignore", "--no-index", *files],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.stdout == ""

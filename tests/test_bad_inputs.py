@@ -60,13 +60,13 @@ TASKS = [
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
     (GOOD.partition("[start]")[0], "start"),
     (task('"mine"', '"my task"'), "name"),
-    ('title = "a\\nb"' + GOOD, "title is 'a\\nb'; it should be one line"),
+    ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
 ]
 FAMILIES = [
-    (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be"),
+    (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be greater than or equal to 2"),
     (family("[2, 3]", "[3, 2]"), "goals is [3, 2]; it should go from less to more"),
-    (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be"),
+    (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be less than or equal to 8"),
     ("apart = 0.1" + FAMILY, "apart lets goals overlap"),
     ("radius = 0.01" + FAMILY, "radius is not larger than the accuracy"),
     ("reach = 4.0001" + FAMILY, "reach is 4.0001; it should have at most three decimals"),
@@ -79,15 +79,15 @@ SUITES = [
     (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
-    (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be"),
+    (
+        SUITE + "grid = {noise_sd = [-1.0]}",
+        "noise_sd is -1.0; it should be greater than or equal to 0",
+    ),
     (SUITE + "grid = {noise_sd = []}", "cells[0].grid"),
     (suite('["dual-process/EC1"]', "[]"), "cells[0].methods"),
     (SUITE + "run = 3", "cells[0].run is an unknown key; did you mean 'runs'?"),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
-    (
-        SUITE + "move = {goal = 2, by = [[0, 1e9]]}",
-        "cells[0].move.by[0][1] is 1000000000.0; it should be",
-    ),
+    (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it should be less than or equal to 10000"),
 ]
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import Multipliers, Relaxation, _normals, _support
+from coartic.baselines.relaxation import Multipliers, Relaxation, half_space_normals, support_of
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement
@@ -26,7 +26,7 @@ NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 @given(st.floats(1e-6, 12.0), st.lists(st.floats(-2, 2), min_size=3, max_size=3))
 def test_offsets_are_exact_maxima(half, normal):
     a, b, k = normal
-    offset = _support(np.array(normal)[:, None, None], np.array([half])).item()
+    offset = support_of(np.array(normal)[:, None, None], np.array([half])).item()
     delta = np.linspace(-half, half, 40_001)
     cosine, sine = directions(delta).T
     true = (a * cosine + b * sine + k * delta).max()
@@ -36,7 +36,7 @@ def test_offsets_are_exact_maxima(half, normal):
 
 @given(st.floats(1e-6, 12.0))
 def test_normals_bound_all_sides(half):
-    normals = _normals(np.array([half]))[..., 0]
+    normals = half_space_normals(np.array([half]))[..., 0]
     assert normals.shape[0] == 3
     for side in (1.0, -1.0):
         assert ((0.0, 0.0, side) == normals.T).all(axis=1).any()
@@ -97,7 +97,7 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
             assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
             for _ in range(5):
                 if len(box):
-                    rows, offsets = root._with_half_spaces(box)
+                    rows, offsets = root.with_half_spaces(box)
                     point = np.zeros(root._size)
                     point[: q.size] = q.ravel()
                     point[root._directions], point[root._directions + 1] = directions(angles).T

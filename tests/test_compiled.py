@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numba
@@ -88,19 +87,6 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
 
     assert of_some(4) == 14
     assert twice.signatures == [(types.int64,)]
-
-
-def test_machine_code_that_nobody_uses_is_removed(monkeypatch, tmp_path):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    current = compiled.cache_folder()
-    old, other = (current.with_name(f"kernel-{16 * name}") for name in "ab")
-    for folder, days in ((old, 40), (other, 20), (current, 40)):
-        (folder / "code").mkdir(parents=True)
-        os.utime(folder, 2 * (time.time() - days * 24 * 3600,))
-    assert compiled.cache_folder() == current  # used now
-    assert {*current.parent.iterdir()} == {current, other}
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc", "nb?"])

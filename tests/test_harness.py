@@ -13,7 +13,6 @@ from coartic import (
     corrective_trial,
     execute,
     hand_sequences,
-    learn,
     load_task,
 )
 from coartic.analysis.comparisons.paper import paper_rows
@@ -43,28 +42,10 @@ def results(tmp_path_factory):
     return run_and_write(tmp_path_factory.mktemp("results") / "deep" / "er")
 
 
-def test_suite_paper():
-    assert load_suite("paper").trials == 10_000
-    assert [(cell.task.name, cell.method) for cell in paper_cells()] == [
-        ("ascending", "dual-process/EC1"),
-        ("descending", "dual-process/EC1"),
-        ("two-armed-1", "dual-process/EC2"),
-        ("two-armed-1", "dual-process/EC3"),
-        ("two-armed-1", "dual-process/EC4"),
-        ("two-armed-2", "dual-process/EC3"),
-        ("two-armed-2", "dual-process/EC4"),
-    ]
-
-
 def test_every_method_runs_in_some_suite():
     suites = ("comparison", "ablations", "optimum")
     cells = [cell for suite in suites for cell in select_cells(load_suite(suite), KNOWN)]
     assert {cell.method for cell in cells} == set(KNOWN)
-
-
-def test_suite_comparison_has_at_most_sixteen_methods_a_task():
-    tasks = [cell.task.name for cell in select_cells(load_suite("comparison"), KNOWN)]
-    assert max(map(tasks.count, tasks)) <= 16
 
 
 def test_suite_ablations_frees_the_base():
@@ -81,20 +62,6 @@ def test_suite_ablations_frees_the_base():
     suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
     with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
         select_cells(suite, KNOWN)
-
-
-def test_runs(results):
-    runs = results.runs
-    assert len(runs) == 14
-    assert runs.run_id.is_unique
-    assert list(runs.run) == [0, 1] * 7
-    assert (runs.status == "ok").all()
-    assert (runs.trials == 150).all()
-    assert (runs.corrective_iterations == runs.jacobians).all()
-    assert (runs.reward >= runs.initial_reward).all()
-    assert (runs.solution_corrections <= 4).all()
-    assert runs.told.str.contains("reward by trial").all()
-    assert set(runs[runs.task == "ascending"].initial_reward) == {-319}
 
 
 def test_solutions_re_execute_to_the_stored_reward(results):
@@ -146,18 +113,6 @@ def test_seeds_are_paired_by_task_and_run(results):
             sequence = np.random.SeedSequence(root, spawn_key=(*words, run))
             drawn = int(sequence.generate_state(1, np.uint64)[0])
             assert run_seed(root, task, run) == drawn >> 1
-
-
-def test_a_run_is_reproduced_from_its_row(results):
-    row = results.runs.iloc[5]
-    run = learn(
-        results.tasks[row.task],
-        row.method.split("/")[1],
-        seed=int(row.seed),
-        trials=int(row.trials),
-    )
-    assert run.reward == row.reward
-    assert run.hands == row.hands
 
 
 def test_run_ids_name_what_the_run_depends_on():
@@ -302,19 +257,6 @@ def test_deterministic_methods_run_once():
     cells = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
     assert [cell.method for cell in cells] == ["corrective-alone/every"]
     assert planned(cells, runs=20).plan.size == 1
-
-
-def test_corrective_alone_as_a_method(tmp_path):
-    cells = paper_cells(methods=["corrective-alone/given", "corrective-alone/every"])
-    found = run_and_write(tmp_path, cells).runs
-    by_cell = found.set_index(["task", "method"]).reward
-    assert by_cell["two-armed-1", "corrective-alone/given"] == -675
-    assert by_cell["two-armed-1", "corrective-alone/every"] == -532
-    assert by_cell["ascending", "corrective-alone/every"] == -319
-    spent = found.set_index(["task", "method"])
-    assert spent.trials["two-armed-1", "corrective-alone/every"] == 16
-    assert spent.trials["two-armed-1", "corrective-alone/given"] == 1
-    assert spent.movement_ticks["two-armed-1", "corrective-alone/given"] == 675
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):

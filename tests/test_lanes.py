@@ -169,12 +169,6 @@ def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     assert [set(runs.together) for runs in found] == [{1, 2, LANES}, {1}]
 
 
-def test_long_runs_are_fewer_side_by_side():
-    made = LEARNER.entry.with_parameters
-    most = [made({"trials": n}).most_together() for n in (10, 10_000, 1_000_000, 10**7)]
-    assert most == [LANES, LANES, 4, 1]
-
-
 @pytest.mark.parametrize(
     ("cells", "runs", "workers", "sizes"),
     [

@@ -31,14 +31,6 @@ from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
 
 
-def same_run(a, b):
-    assert a.counters == b.counters
-    assert a.reward == b.reward
-    np.testing.assert_array_equal(a.rewards.data, b.rewards.data)
-    for field in ("completed", "values", "targets"):
-        np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
-
-
 def _tenths(values):
     part = np.arange(len(values)) * 10 // max(1, len(values))
     return [values[part == number] for number in range(10)]
@@ -226,13 +218,6 @@ def test_other_arm_is_still_without_amodother():
     assert np.ptp(moved[:, 2:], axis=0).all()
 
 
-def test_one_armed_condition_never_uses_or_moves_the_left_arm():
-    task = load_task("ascending")
-    run = learn(task, "EC1", seed=1, trials=300)
-    assert set(run.hands) == {"R"}
-    assert not run.execute().configurations[:, task.robot.joints("left")].any()
-
-
 @pytest.mark.parametrize("epsilon", [0.0, 0.2, 1.0])
 def test_hand_exploration_rate(epsilon):
     """DASel picks a random hand ε of the time, so the wrong one ε/2 of the time.
@@ -280,14 +265,6 @@ def test_constants_of_the_paper():
     assert TRIALS == 10_000
 
 
-def test_twenty_thousand_iterations_are_allowed():
-    """A goal at the edge of a locked reach: slow, but within the bound."""
-    task = tiny_task(locked_base=["x", "y"], goals=[[4.5, 0.1], [0.5, 4.1]])
-    short = learn(task, "EC1", seed=0, trials=1, model=MotionModel(max_iterations=50))
-    assert short.status == "infeasible"
-    assert learn(task, "EC1", seed=0, trials=1).counters.corrective_iterations > 50
-
-
 def test_what_a_policy_spends_is_counted():
     content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
     run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
@@ -318,34 +295,10 @@ def test_models_no_movement_can_be_made_with(model):
         execute(load_task("ascending"), [], model=model)
 
 
-def test_same_seed_same_run_any_number_of_workers():
-    task = load_task("two-armed-2")
-    alone = [learn(task, "EC4", seed=seed, trials=300) for seed in range(6)]
-    for jobs in (1, 2, 4):
-        together = learn_many(task, "EC4", seeds=range(6), trials=300, jobs=jobs)
-        for a, b in zip(alone, together, strict=True):
-            same_run(a, b)
-    assert not np.array_equal(alone[0].rewards, alone[1].rewards)
-
-
 def test_fewer_trials_are_a_prefix():
     task = load_task("ascending")
     long, short = (learn(task, "EC1", seed=5, trials=n) for n in (500, 200))
     np.testing.assert_array_equal(long.rewards[:200], short.rewards)
-
-
-def test_arrival_tolerance_evidence():
-    """Why θ^a is 0.01: 0.1 is farther from the published -303 and -314."""
-    wide = MotionModel(arrival_tolerance=0.1)
-    published = {"ascending": -303, "descending": -314}
-    wider = {
-        name: learn_many(load_task(name), "EC1", seeds=range(4), model=wide) for name in published
-    }
-    near, far = (
-        sum(abs(np.mean([run.reward for run in runs[name]]) - published[name]) for name in runs)
-        for runs in ({name: learnt(name, "EC1") for name in published}, wider)
-    )
-    assert near < far
 
 
 def failing_task():
@@ -381,14 +334,6 @@ def test_run_without_any_completed_trial():
     assert run.solution == ()
     with pytest.raises(CoarticError, match="nothing to execute"):
         run.execute()
-
-
-def test_goal_already_hit_costs_nothing():
-    task = tiny_task(goals=[[4.5, 0.1], [4.5, 1.0]])
-    run = learn(task, "EC3", seed=0, trials=1)
-    assert run.solution[0].ticks == 0
-    assert run.execute().reward == run.reward == execute(task, run.solution).reward
-    assert run.execute().hands == "RR"
 
 
 def test_errors():
@@ -440,21 +385,6 @@ def test_one_hand_is_always_the_closest():
     """It draws no number to break a tie with itself."""
     condition = ExplorationCondition("one", ("right",), True, False, "closest", epsilon=0.5)
     assert_equals_reference(load_task("ascending"), condition, trials=6)
-
-
-def test_variants_differ_from_the_papers_conditions_in_one_field():
-    assert list(CONDITIONS) == ["EC1", "EC2", "EC3", "EC4"]
-    off = ExplorationCondition("off", HANDS, True, True, "random")
-    for condition in CONDITIONS.values():
-        for field in ("nullspace_gain", "bias", "corrects", "credit", "discount"):
-            assert getattr(condition, field) == getattr(off, field)
-    for name, variant in VARIANTS.items():
-        plain = CONDITIONS[name[:3]]
-        fields = [f for f in vars(plain) if getattr(plain, f) != getattr(variant, f)]
-        assert len(fields) == 2
-        assert fields[0] == "id"
-        method = f"dual-process/{name}"
-        assert learn(load_task("two-armed-2"), method, seed=0, trials=1).method == method
 
 
 @pytest.mark.parametrize("discount", [0.0, 0.5, 1.0])

@@ -98,23 +98,6 @@ def random_movement(rng, robot, hand):
     return q, target, tuple(goal)
 
 
-@pytest.mark.parametrize("robot", [ROBOT, UNEVEN], ids=["paper", "uneven"])
-@pytest.mark.parametrize("stop_on_arrival", [True, False])
-def test_equals_the_step_by_step_loop(robot, stop_on_arrival):
-    """Random movements of all kinds."""
-    rng = np.random.default_rng(6)
-    hits = 0
-    for index in range(120):
-        hand = HANDS[index % 2]
-        q, target, goal = random_movement(rng, robot, hand)
-        arguments = (robot, q, target, hand, goal, 0.1)
-        fast = move(*arguments, stop_on_arrival=stop_on_arrival)
-        slow = reference.move(*arguments, stop_on_arrival=stop_on_arrival)
-        assert_same(fast, slow)
-        hits += fast.hit
-    assert 24 < hits < 108  # both outcomes are well represented
-
-
 @pytest.mark.parametrize(("robot", "count"), [(ROBOT, 5_000), (UNEVEN, 2_000)])
 @pytest.mark.parametrize("hand", HANDS)
 def test_equals_every_step_many_thousand_times(robot, count, hand):
@@ -203,20 +186,6 @@ def test_ticks_of_a_plain_translation():
     ahead = move(ROBOT, q, target, "right", (4.995, 0.1), 0.1)
     assert (ahead.ticks, ahead.hit) == (41, True)
     assert ahead.q[0] == pytest.approx(0.40)
-
-
-def test_movement_already_there():
-    q = np.zeros(10)
-    assert move(ROBOT, q, q, "right", (9.0, 9.0), 0.1)[1:3] == (1, False)
-    assert move(ROBOT, q, q, "right", (4.5, 0.1), 0.1)[1:3] == (1, True)
-
-
-def test_last_step_is_exact_and_shorter():
-    q, target = np.zeros(10), np.zeros(10)
-    target[3] = 0.0255  # 3 steps, the last one of 0.0055
-    result = move(ROBOT, q, target, "right", (50.0, 0.0), 0.1, stop_on_arrival=False)
-    assert result.ticks == math.ceil(0.0255 / PAPER.step) + 1
-    np.testing.assert_array_equal(result.q, target)
 
 
 def test_skips_most_steps():

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.suites import Cell, load_suite, select_cells
+from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
 from tests.support.suites import ROOT, planned, run_and_write
 
@@ -181,15 +181,6 @@ def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
     assert "cannot say whether it applies to task 'ascending': ZeroDivisionError" in error
 
 
-def test_parameters_are_validated():
-    entry = registry([METHOD])["nearest-hand"]
-    assert entry.complete({"reluctance": 0.5}) == {"reluctance": 0.5}
-    with pytest.raises(CoarticError, match="'nearest-hand': reluctance is -1.0; it should be"):
-        entry.complete({"reluctance": -1.0})
-    with pytest.raises(CoarticError, match="Its parameters: reluctance"):
-        entry.complete({"reluctant": 1.0})
-
-
 def test_the_pages_show_the_example_as_it_is():
     """Method and task of the how-to pages are those that the tests run."""
     pages = [ROOT / "docs" / "howto" / name for name in ("method.md", "task.md")]
@@ -208,13 +199,3 @@ def test_the_agent_of_the_page_learns(tmp_path):
     runs = run_and_write(tmp_path / "out", [cell], runs=2, trials=400).runs
     assert (runs.status == "ok").all()
     assert (runs.reward > -319).all()
-
-
-def test_the_suite_of_the_page_can_be_used(tmp_path):
-    page = (ROOT / "docs" / "howto" / "task.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```toml\n(# noise.toml.*?)```", page, re.DOTALL)
-    path = tmp_path / "noise.toml"
-    path.write_text(block, encoding="utf-8")
-    cells = select_cells(load_suite(str(path)), registry())
-    assert [cell.variant for cell in cells[:3]] == ["noise_sd=0.02", "", "noise_sd=0.1"]
-    assert len(cells) == 6

@@ -185,7 +185,7 @@ def test_a_script_needs_no_guard(tmp_path):
 def test_workers_that_cannot_begin_get_a_sentence():
     entry, task = KNOWN["dual-process/EC1"], load_task("ascending").model_dump(mode="json")
     job = job_of(entry, task | {"goals": []}, entry.complete({}), (0,))
-    with pytest.raises(CoarticError, match="worker processes cannot begin.*goals is"):
+    with pytest.raises(CoarticError, match="worker processes cannot begin.*goals is "):
         list(Local(1).perform([job] * 10))
 
 

@@ -12,7 +12,6 @@ from scipy.optimize import minimize
 from coartic import execute, load_task
 from coartic.baselines.posture_based import OneGoal, TwoGoals
 from coartic.method import MethodError, Session
-from coartic.tasks.task import letters_of
 from tests.support.strategies import tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -263,28 +262,6 @@ def test_a_goal_out_of_reach_is_infeasible():
     with pytest.raises(MethodError, match="goal 2: .* puts the left hand within 0.09 of it"):
         solve(left, OneGoal, hands="given", **QUICK)
     assert solve(left, OneGoal, **QUICK)[0].solution[1].hand == "right"
-
-
-def test_hands_that_cannot_be_had_are_refused_beforehand():
-    policy = bent(initial_hands="best-of-all")
-    assert OneGoal().why_not(policy) is None
-    named = OneGoal(OneGoal.Parameters(hands="given"))
-    assert "names no hand sequence but 'best-of-all'" in named.why_not(policy)
-    every = TwoGoals(TwoGoals.Parameters(hands="every"))
-    assert every.why_not(policy) is None
-
-
-def test_of_too_many_hand_sequences_some_are_planned():
-    """Those of a beam: here the best one of all is among two."""
-    task = load_task("two-armed-1")
-    every, two, one = (
-        solve(task, OneGoal, hands="every", most_sequences=most, **QUICK)[0] for most in (16, 2, 1)
-    )
-    hands = [letters_of([m.hand for m in result.solution]) for result in (every, two, one)]
-    assert hands[0] == "LRLR"
-    costs = [sum(result.details["expected_ticks"]) for result in (every, two, one)]
-    assert costs[0] <= 1.05 * min(costs[1:])
-    assert all(execute(task, result.solution).reward is not None for result in (two, one))
 
 
 @pytest.mark.parametrize(

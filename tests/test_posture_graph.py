@@ -50,13 +50,6 @@ def test_chains_are_the_cheapest(name):
             assert np.hypot(*(miss - task.goals[goal])) <= task.radius
 
 
-def test_one_sequence_alone_is_the_same():
-    graph = PostureGraph.sampled(TASKS["two-armed-2"], 20, np.random.default_rng(4))
-    for chain in graph.chains():
-        (alone,) = graph.chains(chain.hands)
-        assert np.array_equal(alone.configurations, chain.configurations)
-
-
 @pytest.mark.parametrize("name", TASKS)
 @pytest.mark.parametrize("hand", ["left", "right"])
 def test_samples_hit_the_goal_and_move_only_what_can(name, hand):

@@ -118,16 +118,6 @@ def test_three_worlds_agree(robot, hand):
         np.testing.assert_allclose(columns, jacobian, atol=1e-12, rtol=0)
 
 
-def test_casadi_matrix_symbols_and_no_warnings():
-    """MX works as SX does; the suite turns CasADi's warnings into errors."""
-    symbol = casadi.MX.sym("q", 10)
-    function = casadi.Function("f", [symbol], [PAPER_ROBOT.symbolic_hand(symbol, "left")])
-    q = np.linspace(-1, 1, 10)
-    np.testing.assert_allclose(
-        np.array(function(q)).ravel(), PAPER_ROBOT.forward_kinematics(q, "left"), atol=1e-14
-    )
-
-
 @given(q=configurations(PAPER_ROBOT), shift=arrays(np.float64, 2, elements=st.floats(-5, 5)))
 def test_moving_the_base_moves_both_hands_alike(q, shift):
     moved = q.copy()
@@ -148,51 +138,6 @@ def test_turning_the_first_joint_turns_the_arm(hand, q, angle):
     after = PAPER_ROBOT.joint_positions(turned, hand)
     rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     np.testing.assert_allclose(after - after[0], (before - before[0]) @ rotation.T, atol=1e-12)
-
-
-@given(q=configurations(PAPER_ROBOT))
-def test_hand_does_not_depend_on_the_other_arm(q):
-    other = q.copy()
-    other[PAPER_ROBOT.joints("left")] += 1.0
-    np.testing.assert_array_equal(
-        PAPER_ROBOT.forward_kinematics(q, "right"), PAPER_ROBOT.forward_kinematics(other, "right")
-    )
-
-
-@pytest.mark.parametrize("hand", HANDS)
-@given(q=configurations(PAPER_ROBOT, -3, 3))
-def test_nullspace_projector_laws(hand, q):
-    projector = PAPER_ROBOT.nullspace_projector(q, hand)
-    jacobian = PAPER_ROBOT.jacobian(q, hand)
-    np.testing.assert_allclose(jacobian @ projector, 0, atol=1e-10)
-    np.testing.assert_allclose(projector @ projector, projector, atol=1e-10)
-    np.testing.assert_allclose(projector, projector.T, atol=1e-10)
-    assert np.trace(projector) == pytest.approx(8)  # 10 degrees of freedom, 2 constraints
-
-
-def test_nullspace_with_locked_base():
-    q = np.random.default_rng(4).uniform(-1, 1, 10)
-    free = np.ones(10, bool)
-    free[:2] = False
-    projector = PAPER_ROBOT.nullspace_projector(q, "right", free)
-    assert not projector[:2].any()
-    assert not projector[:, :2].any()
-    np.testing.assert_allclose(PAPER_ROBOT.jacobian(q, "right") @ projector, 0, atol=1e-12)
-    assert np.trace(projector) == pytest.approx(6)
-
-
-def test_nullspace_at_a_singular_posture():
-    """A straight arm on a locked base controls one direction only."""
-    free = np.ones(10, bool)
-    free[:2] = False
-    projector = PAPER_ROBOT.nullspace_projector(np.zeros(10), "right", free)
-    assert np.trace(projector) == pytest.approx(7)
-
-
-def test_reach():
-    assert PAPER_ROBOT.reach("left") == (0.0, 4.0)
-    assert UNEVEN.reach("left") == (0.7, 0.7)
-    assert Robot(right_links=(3.0, 1.0)).reach("right") == (2.0, 4.0)
 
 
 def test_base_outline():

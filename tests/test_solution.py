@@ -143,14 +143,6 @@ def test_side_by_side_as_movement_after_movement(name, seed, model):
         assert execution.completed == (not reason)
 
 
-def test_many_of_none():
-    assert execute_many(load_task("ascending"), []) == []
-    with pytest.raises(TypeError, match="is no Task"):
-        execute_many("ascending", [])
-    with pytest.raises(ValueError, match=r"model\.step is 0"):
-        execute_many(load_task("ascending"), [], model=PAPER._replace(step=0.0))
-
-
 @pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
 def test_best_trials_re_execute_exactly(name, condition):
     for run in learn_many(load_task(name), condition, seeds=range(4), trials=1500):
@@ -194,14 +186,6 @@ def test_no_way_is_followed_without_end():
     assert "1800000 steps; at most 1000000 are allowed" in str(second)
 
 
-def test_first_printed_initial_solution_step_by_step():
-    execution = corrective_trial(load_task("ascending"), "RRR")
-    assert execution.reward == -319
-    assert execution.corrections == 3
-    assert [movement.kind for movement in execution.movements] == ["corrective"] * 3
-    assert sum(execution.ticks_by_goal()) == 319
-
-
 def planned(*targets, hand="right"):
     return [
         Movement(number, hand, "planned", np.array(target, dtype=float))
@@ -222,19 +206,6 @@ def test_a_plan_that_hits():
     assert execution.reward == -192
     assert execution.corrections == 0
     assert execution.completed
-
-
-def test_a_plan_that_misses_is_corrected_and_pays():
-    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
-    execution = execute(task, planned(posture(0.8), posture(2.0)))
-    assert execution.completed
-    assert execution.corrections == 1
-    assert [movement.kind for movement in execution.movements] == [
-        "planned",
-        "corrective",
-        "planned",
-    ]
-    assert execution.reward < -192
 
 
 def test_aiming_at_the_rim_stops_short_of_it():
@@ -266,34 +237,12 @@ def test_paths():
         execute(task, [Movement(1, "right", "path", waypoints=waypoints * np.nan), onward])
 
 
-def test_via_points_end_with_the_hit():
-    """The first movement is always made; once the goal is hit, the rest is not."""
-    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
-    via = [*planned(posture(1.0)), Movement(1, "right", "planned", np.array(posture(3.0)))]
-    assert execute(task, via).ticks_by_goal() == (91,)
-
-
-def test_figures_that_no_movement_can_have():
-    """Once, 1e17 overflowed the tick count into a positive reward."""
-    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
-    with pytest.raises(CoarticError, match="a (figure|number) beyond 100000"):
-        execute(task, planned(posture(1e17)))
-
-
 def test_a_planned_movement_is_always_made():
     task = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
     assert execute(task, planned(posture(0.0))).reward == -1
     corrective = execute(task, [Movement(1, "right", "corrective")])
     assert corrective.reward == 0
     assert corrective.hands == "R"
-
-
-def test_uncorrectable_plan_has_a_reason():
-    task = tiny_task(locked_base=["x", "y"], goals=[[2.5, 0.1]], hands=["right"], initial_hands="R")
-    execution = execute(task, [Movement(1, "right", "corrective")])
-    assert not execution.completed
-    assert execution.reward is None
-    assert execution.reason.startswith("goal 1: the corrective process did not converge")
 
 
 @pytest.mark.parametrize(

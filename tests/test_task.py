@@ -1,7 +1,6 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
 import math
-import tomllib
 
 import numpy as np
 import pytest
@@ -9,14 +8,13 @@ from pydantic import ValidationError
 
 from coartic import (
     NotApplicableError,
-    Task,
     TaskError,
     builtin_tasks,
     corrective_trial,
     initial_hands,
     load_task,
 )
-from coartic.tasks.task import TASK_FOLDER, parse_task
+from coartic.tasks.task import parse_task
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
 
@@ -78,14 +76,6 @@ def test_task_is_immutable():
         task.goal_array[0] = 1.0
 
 
-def test_own_file(tmp_path):
-    task = load_task(write(tmp_path, GOOD))
-    assert task.name == task.label == "mine"
-    assert task.hands == ("left", "right")
-    assert task.radius == 0.1
-    assert task == load_task(str(tmp_path / "mine.toml"))
-
-
 def test_several_mistakes_each_get_a_line(tmp_path):
     path = write(tmp_path, GOOD.replace('"RR"', "1").replace("[5.0, 2.0]", "[nan, inf]"))
     with pytest.raises(TaskError) as caught:
@@ -127,16 +117,6 @@ def test_inner_reach():
     )  # fmt: skip
 
 
-def test_built_in_python_too():
-    with pytest.raises(ValidationError, match="names 1 hands for 2 goals"):
-        Task(
-            name="x",
-            goals=((1.0, 1.0), (2.0, 2.0)),
-            initial_hands="R",
-            start={"left": (0.0,) * 4, "right": (0.0,) * 4},
-        )
-
-
 def test_initial_hand_policies():
     """The printed policies give the printed hands: both tasks start with RRRR."""
     for name, policy in (("two-armed-1", "best-single-hand"), ("two-armed-2", "best-of-all")):
@@ -162,11 +142,3 @@ def test_a_file_with_a_byte_order_mark(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
     assert load_task(path).name == "mine"
-
-
-def test_every_shipped_file_is_found():
-    names = {
-        tomllib.loads(path.read_text(encoding="utf-8"))["name"]
-        for path in TASK_FOLDER.glob("*.toml")
-    }
-    assert names == set(builtin_tasks())

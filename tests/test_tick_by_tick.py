@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from coartic import (
     Movement,
-    corrective_trial,
     execute,
     learn,
     load_task,
@@ -47,13 +46,6 @@ def test_learned_solutions(name, condition):
         path = agrees(run.task, run.solution)
         assert path.ticks == -run.reward
         assert tuple(np.diff([-1, *path.hits])) == path.execution.ticks_by_goal()
-
-
-@pytest.mark.parametrize("name", ["ascending", "two-armed-1", "two-armed-2"])
-def test_corrective_solutions(name):
-    task = load_task(name)
-    hands = {"ascending": "RRR"}.get(name, "LRLR")
-    agrees(task, corrective_trial(task, hands).movements)
 
 
 @st.composite

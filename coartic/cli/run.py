@@ -70,10 +70,14 @@ def run(
             out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
         )
     say(report.sentence(time.monotonic() - started))
-    from coartic.analysis.report.text import answers  # slow, after what ran is said
-    from coartic.analysis.study import load
+    pairs = []
+    if (
+        report.progress.present < report.progress.total
+    ):  # else they are as they were; to work them out takes a while
+        from coartic.analysis.report.text import answers
+        from coartic.analysis.study import load
 
-    pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
+        pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
     if report.crashed:
         sys.exit(1)

@@ -60,7 +60,7 @@ def corrective_trials(
     q, ticks = configuration(task.robot, task.q0)[None], np.zeros(1)
     whose = np.zeros(len(hand), dtype=np.int64)
     for g in range(goals_each):
-        first, longer = _alike(hand[:, g], goal[:, g, 0], goal[:, g, 1], whose)
+        first, longer = first_alike(hand[:, g], goal[:, g, 0], goal[:, g, 1], whose)
         q, ticks = q[whose[first]], ticks[whose[first]]
         going = ~np.isnan(ticks)
         chosen = first[going]
@@ -83,7 +83,7 @@ def corrective_trials(
     )
 
 
-def _alike(*keys: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def first_alike(*keys: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The first of those whose keys are all equal, and, of each, which of these it is like."""
     order = np.lexsort(keys)
     new = np.ones(len(order), dtype=np.bool_)

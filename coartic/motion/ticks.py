@@ -75,7 +75,7 @@ def trajectory(task: Task, movements: Iterable[Movement], model: MotionModel = P
             points = path_points(task.robot, q, movement.waypoints, model)
             points = points[unpaid : unpaid + movement.ticks]
         else:
-            points = _line(q, movement.target, unpaid + movement.ticks, model)[unpaid:]
+            points = line_points(q, movement.target, unpaid + movement.ticks, model)[unpaid:]
         if len(points):
             q = points[-1]
             rows.append(points)
@@ -84,7 +84,7 @@ def trajectory(task: Task, movements: Iterable[Movement], model: MotionModel = P
     return Trajectory(task, execution, np.concatenate(rows), hits)
 
 
-def _line(q: Array, target: Array, count: int, model: MotionModel) -> Array:
+def line_points(q: Array, target: Array, count: int, model: MotionModel) -> Array:
     """The first points of a movement, summed and rounded as its kernel does."""
     difference = target - q
     square = 0.0

@@ -16,7 +16,6 @@ integers; the others ask the compiled kernels, which use IEEE arithmetic alone
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
 import re
@@ -540,8 +539,3 @@ def toml_value(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(toml_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-
-
-def task_hash(task: Task) -> str:
-    """SHA-256 of the task's file (:func:`task_text`)."""
-    return hashlib.sha256(task_text(task).encode()).hexdigest()

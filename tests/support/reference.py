@@ -91,7 +91,9 @@ def correct(
             return Correction(q, False, iteration)
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
         if nullspace_gain:
-            step += nullspace_gain * robot.nullspace_projector(q, hand, free) @ (start - q)
+            jacobian = robot.jacobian(q, hand) * free
+            away = free * (start - q)
+            step += nullspace_gain * (away - np.linalg.pinv(jacobian) @ jacobian @ away)
         before, q = q, q + step
         if (q == before).all():  # a stationary point away from the goal: it stays for ever
             return Correction(q, False, iteration + 1)
