@@ -32,8 +32,8 @@ TOLD = {
 """A letter for each kind of information, in the order in which the tables show them."""
 BY_TRIAL, BY_FORMULA, UNTOLD = GROUPS = (
     "using the reward of each trial",
-    "using the reward as a formula, and the kinematics",
-    "using the goals and the kinematics, not the reward",
+    "using the reward as a formula",
+    "not using the reward",
 )
 """What methods are told of the reward and make use of."""
 STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
