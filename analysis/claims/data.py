@@ -78,7 +78,7 @@ class Data:
         """
         what, who, hands = side
         if what == "number":
-            return np.array(0.0)
+            return np.array(float(side.who))
         if who == "best":
             return np.array(self.best_sequences(task)[1])
         if who == "initial":

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import read_beside
+from coartic.errors import CoarticError
+from coartic.inputs import problems
 
 _FILE = read_beside(__file__, "claims")
 HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
@@ -40,7 +42,8 @@ _SHOWN = re.sub(r"\?P<\w+>", "?:", _SIDE)
 Shown = Annotated[str, Field(pattern=rf"^{_SHOWN}$")]
 """What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
 _MARGIN = "|".join(MARGINS)
-_PAIR = rf"{_SHOWN} > ({_SHOWN}|0)( by ({_MARGIN}))?"
+_NUMBER = r"-?\d+(\.\d+)?"
+_PAIR = rf"{_SHOWN} > ({_SHOWN}|{_NUMBER})( by ({_MARGIN}))?"
 Pair = Annotated[str, Field(pattern=rf"^({_PAIR}|{_HANDS} > ({_HANDS}|others))$")]
 """Two things that are compared, the first of which is said to be higher, by more than a margin if
 there is one. Or hand sequences of the corrective process alone."""
@@ -138,8 +141,16 @@ class Claim(BaseModel):
         return self
 
 
+def claim_of(name: str, section: str, row: Mapping[str, Any]) -> Claim:
+    """A row of ``claims.toml``; raises CoarticError that names the claim and the key."""
+    try:
+        return Claim(id=name, section=section, **row)
+    except ValidationError as error:
+        raise CoarticError(problems(f"claims.toml, claim {name!r}", error)) from None
+
+
 CLAIMS: Mapping[str, Claim] = {
-    name: Claim(id=name, section=section, **row)
+    name: claim_of(name, section, row)
     for section, rows in _FILE.items()
     for name, row in rows.items()
 }

@@ -295,7 +295,7 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
     """Both sides of a comparison with their difference, and what the paper prints of them."""
     seen = in_words(first.what, a)
     if second.what == "number":
-        return seen
+        return seen if b == 0 else f"{seen} against {second.who}"
     if not b.ndim:
         seen += f" against {number(float(b))} ({second})"
     elif first.what != second.what:

@@ -11,6 +11,7 @@ import pandas as pd
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study, cached
+from coartic.errors import CoarticError
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -62,7 +63,10 @@ def table(
         def frame(study: Study) -> pd.DataFrame:
             return frame_of(rows(study), f"{columns}, run_ids")
 
-        TABLES[rows.__name__.replace("_", "-")] = frame
+        name = rows.__name__.replace("_", "-")
+        if name in TABLES:
+            raise CoarticError(f"there are two tables {name!r}; the second is in {rows.__module__}")
+        TABLES[name] = frame
         return frame
 
     return as_table
