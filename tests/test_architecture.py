@@ -188,10 +188,11 @@ def without_posix(out):
     everything()
 
     from coartic.analysis.study import load
-    from coartic.benchmarks.run import plan_suite
+    from coartic.benchmarks.run import Selection, plan_suite
     from tests.support.suites import InProcess
 
-    suite = plan_suite("quick", runs=2, trials=5)
+    select = Selection(methods=["EC1", "random-search/climbing", "nullspace-qp/next-goal"])
+    suite = plan_suite("quick", runs=2, trials=5, select=select)
     assert suite.perform(out, executor=InProcess()).progress.failed == 0
     runs = load(out).runs
     assert len(runs) == suite.plan.size

@@ -2,8 +2,9 @@
 
 import os
 import shutil
-import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
@@ -89,8 +90,7 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
     assert twice.signatures == [(types.int64,)]
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc", "nb?"])
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
+@pytest.mark.parametrize(("ending", "share"), [("nbi", 0.5), ("nbc", 0.99), ("nb?", 0.0)])
 def test_machine_code_that_was_cut_short_is_compiled_anew(tmp_path, ending, share):
     """By a full disk, say: the index, the code, or both."""
     ignored = shutil.ignore_patterns("__pycache__", "benchmarks")
@@ -119,28 +119,61 @@ def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path
     assert not list(tmp_path.rglob("*.nb?"))
 
 
-MOVE = """
-import sys
-import numpy as np
-from coartic import Robot, move
-for links in map(int, sys.argv[1:]):
+def found_slowly(folder):
+    """As ``found``, by a process that takes a second to compile."""
+    forget("coartic")
+    sys.path.insert(0, str(folder))
+    from coartic.motion.compiled import MachineCode
+
+    keep = MachineCode.save_overload
+    MachineCode.save_overload = lambda *code: (time.sleep(1.0), keep(*code))
+    from kernel import across
+
+    across(np.array([1.0, 6.5]), np.zeros(2))
+    return sum(across.stats.cache_hits.values())
+
+
+def test_of_two_processes_one_compiles(tmp_path):
+    ignored = shutil.ignore_patterns("__pycache__", "benchmarks")
+    shutil.copytree(ROOT / "coartic", tmp_path / "coartic", ignore=ignored)
+    (tmp_path / "kernel.py").write_text(KERNEL, encoding="utf-8")
+    with ThreadPoolExecutor(2) as pool:
+        hits = list(pool.map(apart, [found_slowly] * 2, [tmp_path] * 2))
+    assert sorted(hits) == [0, 1]
+
+
+LANES = """
+from coartic import Robot
+from coartic.motion.compiled import entry
+from coartic.motion.lanes import lanes_for, near, place
+
+@entry
+def placed(at):
+    place(at, 1, near(at, 1))
+
+def reach_of(links):
     robot = Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)
-    target = np.full(robot.dof, 0.3)
-    print(move(robot, np.zeros(robot.dof), target, "left", (90.0, 9.0), 0.1).ticks, flush=True)
+    at = lanes_for(robot).at
+    at["length"][:] = 1.0
+    placed(at)
+    return float(at["x"][-1, 0])
 """
 
 
+def reaches(folder, numbers):
+    """Of straight arms of so many unit links, by kernels that are kept in a folder."""
+    forget("coartic")
+    numba.config.CACHE_DIR = str(folder)
+    sys.path.insert(0, str(folder))
+    from lanes import placed, reach_of
+
+    return [reach_of(links) for links in numbers], sum(placed.stats.cache_hits.values())
+
+
 def test_machine_code_of_several_processes_goes_together(tmp_path):
-    """Each compiles for a number of links; one that loads all of it moves all robots."""
-
-    def ticks(*links):
-        command = [sys.executable, "-c", MOVE, *map(str, links)]
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, check=True, timeout=100
-        )
-        return done.stdout.split()
-
-    alone = [ticks(links)[0] for links in (5, 2, 3)]
-    assert ticks(5, 2, 3) == alone
-    assert ticks(3, 2, 5) == alone[::-1]
+    """Each compiles for a number of links; one that loads all of it places all robots."""
+    (tmp_path / "lanes.py").write_text(LANES, encoding="utf-8")
+    for links in (5, 2, 3):
+        assert apart(reaches, tmp_path, [links]) == ([links], 0)
+    for numbers in ([5, 2, 3], [3, 2, 5]):
+        assert apart(reaches, tmp_path, numbers) == (numbers, 3)

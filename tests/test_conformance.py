@@ -64,16 +64,24 @@ def known():
     return registry([BROKEN])
 
 
+APART = (
+    *("dual-process/EC4", "corrective-alone/given", "random-search/climbing", "cma-es/every"),
+    *("nullspace-qp/next-goal", "posture-based/one-goal", "optimum/multistart"),
+    *("trajectory-optimisation/jerk", "test/local", "test/remembers"),
+)
+"""One method of each kind, and those that a process of their own gives away."""
+
+
 class HereAndThere:
-    """The first runs of a method in a process of their own, which takes longest to begin, where
-    they are compared with the one that is performed in this."""
+    """The first runs of some methods in a process of their own, which takes longest to begin,
+    where they are compared with the one that is performed in this."""
 
     def __init__(self, jobs):
         pass
 
     def perform(self, jobs):
-        apart = jobs[0].is_ours or jobs[0].method in ("test/local", "test/remembers")
-        return (Local(1) if apart and len(jobs) > 1 else InProcess()).perform(jobs)
+        apart = jobs[0].method in APART and len(jobs) > 1
+        return (Local(1) if apart else InProcess()).perform(jobs)
 
 
 @pytest.fixture(autouse=True)

@@ -46,7 +46,7 @@ def installed(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(site)
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("installed", "in_this_process")
 def test_a_package_brings_a_method(coartic, tmp_path):
     code, checked, _ = coartic("check", "nearest-hand")
     assert code == 0, checked

@@ -1,10 +1,11 @@
 """What is kept of runs: read back to the last bit, whatever interrupts or damages it."""
 
+import multiprocessing
 import random
 import sqlite3
-import subprocess
 import sys
 import time
+import warnings
 from contextlib import closing
 from dataclasses import replace
 
@@ -151,28 +152,34 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
     same_results(load(tmp_path), undisturbed)
 
 
-KILLED = """
-import sys
-from coartic.benchmarks.run import run_suite
-run_suite("paper", sys.argv[1], runs=30, trials=60, watch=lambda p, _: print(p.done, flush=True))
-"""
+def perform_until_killed(folder, progress):
+    """Perform runs and say how many are kept."""
+    plan = planned(runs=30, trials=60)
+    plan.perform(folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="a fork begins at once")
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
-    command = [sys.executable, "-c", KILLED, str(folder)]
-    for _ in range(3):
-        enough = chance.randrange(40)
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            next(line for line in process.stdout if int(line) >= enough)
-            time.sleep(chance.uniform(0, 0.05))
-            process.kill()
+    fork = multiprocessing.get_context("fork")
+    for _ in range(5):
+        receive, send = fork.Pipe(duplex=False)
+        process = fork.Process(target=perform_until_killed, args=(folder, send))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of threads, which a fork does not have
+            process.start()
+        enough = chance.randrange(30)
+        while receive.recv() < enough:
+            pass
+        time.sleep(chance.uniform(0, 0.05))
+        process.kill()
+        process.join()
         with closing(sqlite3.connect(folder / FILE)) as plain_sql:
             assert plain_sql.execute("PRAGMA integrity_check").fetchone() == ("ok",)
             there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
     assert there == sorted(there)
     assert 0 < there[-1] < 210
-    options = {"runs": 30, "trials": 60, "time_limit_s": 600.0}
+    options = {"runs": 30, "trials": 60}
     same_results(run_and_write(folder, **options), run_and_write(tmp_path / "whole", **options))
 
 
