@@ -251,7 +251,7 @@ def hopeless_task(like: Task) -> Task:
     )
 
 
-def check_task_file(path: Path, known: Registry) -> list[Law]:
+def check_task_file(path: Path, registered: Registry) -> list[Law]:
     """Every law of a task file, in order; of one that is not valid the first alone."""
     try:
         task = load_task(path)
@@ -297,7 +297,7 @@ def check_task_file(path: Path, known: Registry) -> list[Law]:
         return "goals and start have a source and a status"
 
     def methods() -> str:
-        names = [name for name, entry in known.items() if entry.why_not(task) is None]
+        names = [name for name, entry in registered.items() if entry.why_not(task) is None]
         if not names:
             raise BrokenLawError("no method applies to it")
         return ", ".join(names)

@@ -107,12 +107,12 @@ class Entry:
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, defaults included, as plain data; CoarticError names the ones that are
         wrong."""
-        known = self.method.Parameters.model_fields
+        fields = self.method.Parameters.model_fields
         try:
             typed = self.with_parameters(parameters).parameters
             complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
         except ValidationError as error:
-            wrong, names = problems_inline(error, known), ", ".join(known) or "none"
+            wrong, names = problems_inline(error, fields), ", ".join(fields) or "none"
             raise CoarticError(f"method {self.name!r}: {wrong}. Its parameters: {names}.") from None
         return complete
 
@@ -204,9 +204,9 @@ def current_code(where: str, name: str) -> str:
         return code_of(file_of(importlib.import_module(where)))
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
+def unknown(kind: str, name: str, names: Iterable[str]) -> CoarticError:
     """An error for a name that is not among the known ones, with the nearest of them."""
-    names = list(known)
+    names = list(names)
     hint = did_you_mean(name, names) or "."
     more = f" and {len(names) - _MOST_NAMED} others" if len(names) > _MOST_NAMED else ""
     return CoarticError(
@@ -217,7 +217,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CoarticError:
 _MOST_NAMED = 40  # in an error
 
 
-def add_entries(known: dict[str, Entry], entries: Iterable[Entry]) -> None:
+def add_entries(registered: dict[str, Entry], entries: Iterable[Entry]) -> None:
     """Add methods by id. Raises MethodFileError for an id that is reserved or taken."""
     for entry in entries:
         if entry.name.startswith(RESERVED):
@@ -225,12 +225,12 @@ def add_entries(known: dict[str, Entry], entries: Iterable[Entry]) -> None:
                 f"{entry.origin}: method id {entry.name!r} is reserved: ids that begin with "
                 f"{' or '.join(map(repr, RESERVED))} are this project's"
             )
-        if entry.name in known:
+        if entry.name in registered:
             raise MethodFileError(
                 f"{entry.origin}: method id {entry.name!r} is already taken "
-                f"({known[entry.name].origin})"
+                f"({registered[entry.name].origin})"
             )
-        known[entry.name] = entry
+        registered[entry.name] = entry
 
 
 def entries_of_file(path: Path) -> Iterator[Entry]:

@@ -66,11 +66,11 @@ def performed(entry: Entry, jobs: Sequence[Job], tasks: Sequence[Task]) -> Itera
         yield kept([name], answers[number], task, entry, MotionModel(**job.model))[0]
 
 
-def performed_again(stored: StoredRun, known: Registry) -> Run:
+def performed_again(stored: StoredRun, registered: Registry) -> Run:
     """A stored run, performed anew by the code that is here now."""
-    if stored.method not in known:
-        raise unknown("method", stored.method, known)
-    entry = known[stored.method]
+    if stored.method not in registered:
+        raise unknown("method", stored.method, registered)
+    entry = registered[stored.method]
     job = job_of(
         entry,
         stored.task.model_dump(mode="json"),
@@ -83,7 +83,7 @@ def performed_again(stored: StoredRun, known: Registry) -> Run:
     return next(performed(entry, [job], [stored.task]))
 
 
-def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str, list[str]]]:
+def some_again(folder: Path, count: int, registered: Registry) -> Iterator[tuple[str, list[str]]]:
     """Perform ``count`` runs of a folder anew, spread over its cells, those of known methods; the
     id of each, and in what it differs from what is stored."""
     with open_store(folder) as store:
@@ -91,18 +91,19 @@ def some_again(folder: Path, count: int, known: Registry) -> Iterator[tuple[str,
         ids = [
             run_id
             for position, cell in enumerate(plan.cells)
-            if cell.method in known and known[cell.method].code == plan.methods[cell.method].code
+            if cell.method in registered
+            and registered[cell.method].code == plan.methods[cell.method].code
             for run_id in plan.run_ids(position)
         ]
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
     for stored in chosen:
-        yield stored.run.run_id, differences(stored.run, performed_again(stored, known))
+        yield stored.run.run_id, differences(stored.run, performed_again(stored, registered))
 
 
 def differences(a: Run, b: Run) -> list[str]:
     """In what the results of two runs differ; times and surroundings apart."""
-    found = [
+    changes = [
         f"{name}: {shown(a.row[name])} against {shown(b.row[name])}"
         for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
         if a.row[name] != b.row[name]
@@ -113,10 +114,10 @@ def differences(a: Run, b: Run) -> list[str]:
             scores = [
                 f"{run.row[f'{prefix}reward']} with {run.row[f'{prefix}hands']}" for run in (a, b)
             ]
-            found.append(f"{part}: {scores[0]} against {scores[1]}")
+            changes.append(f"{part}: {scores[0]} against {scores[1]}")
     if a.rewards != b.rewards:
-        found.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
-    return found
+        changes.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
+    return changes
 
 
 def plain_movements(movements: Sequence[Movement]) -> list[Any]:

@@ -98,7 +98,9 @@ def trials_a_second() -> dict[str, float]:
         "objective, one by one": _rate(
             100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
         ),
-        "Session.trial, one by one": _rate(100, lambda: [session.trial(own) for own in single]),
+        "Session.trial, one by one": _rate(
+            100, lambda: [session.trial(solution) for solution in single]
+        ),
     }
     if importlib.util.find_spec("gymnasium"):
         rates |= _rates_of_environments(hands, best, noise)

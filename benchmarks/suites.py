@@ -130,17 +130,17 @@ class Block(SuitePart):
                 raise sentence(f"{brief_value(name)} has the same value twice in the grid")
         return self
 
-    def methods_among(self, known: Iterable[str]) -> Iterable[str]:
+    def methods_among(self, registered: Iterable[str]) -> Iterable[str]:
         """Ids of the methods that the block asks for."""
-        return known if ALL in self.methods else self.methods
+        return registered if ALL in self.methods else self.methods
 
-    def tasks_among(self, own: Iterable[str]) -> list[str]:
+    def tasks_among(self, user_tasks: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
         ``TASK-*`` are the members of a task (:mod:`coartic.tasks.members`),
         ``FAMILY/v1/i000..i039`` instances of a family (:mod:`coartic.tasks.families`).
         """
-        every = [*builtin_tasks(), *own]
+        every = [*builtin_tasks(), *user_tasks]
         names: dict[str, None] = {}
         for name in dict.fromkeys(self.tasks):
             if name == ALL:
@@ -214,11 +214,11 @@ def load_suite(name: str) -> Suite:
     """
     if name.endswith(".toml"):
         return read_suite(Path(name))
-    known = suites()
-    if name not in known:
+    shipped = suites()
+    if name not in shipped:
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
-        raise CoarticError(f"{unknown('suite', name, known)}{hint}")
-    return known[name]
+        raise CoarticError(f"{unknown('suite', name, shipped)}{hint}")
+    return shipped[name]
 
 
 def read_suite(path: Path) -> Suite:
@@ -233,7 +233,7 @@ def read_suite(path: Path) -> Suite:
 
 def select_cells(
     suite: Suite,
-    known: Registry,
+    registered: Registry,
     *,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
@@ -253,26 +253,30 @@ def select_cells(
     does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
     by one name, and where nothing is left to run.
     """
-    methods = [method for name in methods for method in methods_named(name, known)]
+    methods = [method for name in methods for method in methods_named(name, registered)]
     files = [Path(name) for name in tasks if name.endswith(".toml")]
     named = [name for name in tasks if not name.endswith(".toml")]
-    own = tasks_of_files(files)
-    tasks = [*itertools.chain(*map(named_by, named)), *own]
-    own = tasks_of_files([*task_files, *files])
-    there = {name for block in suite.cells for name in block.tasks_among(own)}
-    own |= {
+    user_tasks = tasks_of_files(files)
+    tasks = [*itertools.chain(*map(named_by, named)), *user_tasks]
+    user_tasks = tasks_of_files([*task_files, *files])
+    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
+    user_tasks |= {
         name: load_task(name)
         for name in tasks
-        if (address_of(name) or task_of(name)) and name not in there | set(own)
+        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
     }
-    check_size(suite, known, own)
-    cells = [cell for block in suite.cells for cell in cells_of_block(suite, block, known, own)]
-    added, refused = added_cells(cells, known, methods, own)
+    check_size(suite, registered, user_tasks)
+    cells = [
+        cell
+        for block in suite.cells
+        for cell in cells_of_block(suite, block, registered, user_tasks)
+    ]
+    added, refused = added_cells(cells, registered, methods, user_tasks)
     cells = distinct([*cells, *added])
-    known_tasks = list(dict.fromkeys([*(cell.task.name for cell in cells), *own]))
+    task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
     for name in tasks:
-        if name not in known_tasks:
-            raise unknown("task", name, known_tasks)
+        if name not in task_names:
+            raise unknown("task", name, task_names)
     chosen = [
         cell
         for cell in cells
@@ -280,7 +284,7 @@ def select_cells(
     ]
     # A user's own task that nothing applies to is an error, not a silent gap.
     busy = {cell.task.name for cell in chosen}
-    idle = [name for name in own if name not in busy and (not tasks or name in tasks)]
+    idle = [name for name in user_tasks if name not in busy and (not tasks or name in tasks)]
     if idle or not chosen:
         pairs = ", ".join(f"{cell.task.name} x {cell.label}" for cell in cells)
         why = "; ".join(refused) if refused else f"suite {suite.name!r} has {pairs}"
@@ -289,23 +293,25 @@ def select_cells(
     return chosen
 
 
-def methods_named(name: str, known: Registry) -> list[str]:
+def methods_named(name: str, registered: Registry) -> list[str]:
     """Ids of the methods that a name stands for.
 
     A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
     so. Raises CoarticError where there is none.
     """
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
-    found = [method for method in known if fnmatchcase(method, name)] if "*" in name else [name]
-    if not found or found[0] not in known:
-        raise unknown("method", name, [*known, *CONDITIONS, *VARIANTS])
-    return found
+    named = (
+        [method for method in registered if fnmatchcase(method, name)] if "*" in name else [name]
+    )
+    if not named or named[0] not in registered:
+        raise unknown("method", name, [*registered, *CONDITIONS, *VARIANTS])
+    return named
 
 
 def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
     """The user's tasks by name, which no other task may have."""
     files: dict[str, Path] = {}
-    own: dict[str, Task] = {}
+    user_tasks: dict[str, Task] = {}
     for path in map(Path, paths):
         task = load_task(path)
         taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
@@ -313,16 +319,16 @@ def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
             raise CoarticError(f"{path}: the same task file is given twice")
         if taken is not None:
             raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
-        files[task.name], own[task.name] = path, task
-    return own
+        files[task.name], user_tasks[task.name] = path, task
+    return user_tasks
 
 
-def check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
+def check_size(suite: Suite, registered: Registry, user_tasks: Mapping[str, Task]) -> None:
     """Refuse a suite of too many cells before they are made."""
     count = sum(
-        len(block.tasks_among(own))
+        len(block.tasks_among(user_tasks))
         * (1 if block.move is None else len(block.move.by))
-        * len(list(block.methods_among(known)))
+        * len(list(block.methods_among(registered)))
         * math.prod(map(len, block.grid.values()))
         for block in suite.cells
     )
@@ -334,19 +340,22 @@ def check_size(suite: Suite, known: Registry, own: Mapping[str, Task]) -> None:
 
 
 def added_cells(
-    cells: Sequence[Cell], known: Registry, methods: Sequence[str], own: Mapping[str, Task]
+    cells: Sequence[Cell],
+    registered: Registry,
+    methods: Sequence[str],
+    user_tasks: Mapping[str, Task],
 ) -> tuple[list[Cell], list[str]]:
     """What named methods and the user's tasks add to a suite's cells, and why not more."""
     of_suite = list(dict.fromkeys(cell.method for cell in cells))
     others = [name for name in methods if name not in of_suite]
-    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in own}
+    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
     wanted = [(task, name) for task in shipped.values() for name in others]
-    wanted += [(task, name) for task in own.values() for name in methods or of_suite]
+    wanted += [(task, name) for task in user_tasks.values() for name in methods or of_suite]
     added, refused = [], []
     for task, name in wanted:
-        reason = known[name].why_not(task)
+        reason = registered[name].why_not(task)
         if reason is None:
-            added.append(Cell(task, known[name]))
+            added.append(Cell(task, registered[name]))
         else:
             refused.append(reason)
     return added, refused
@@ -358,14 +367,14 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
     Raises CoarticError where different tasks or cells have the same name.
     """
     tasks: dict[str, Task] = {}
-    found: dict[tuple[str, str], Cell] = {}
+    by_name: dict[tuple[str, str], Cell] = {}
     for cell in cells:
         task = tasks.setdefault(cell.task.name, cell.task)
         if task is not cell.task and task != cell.task:
             raise CoarticError(
                 f"two different tasks are called {task.name!r}; give one of them another name"
             )
-        first = found.setdefault((task.name, cell.label), cell)
+        first = by_name.setdefault((task.name, cell.label), cell)
         # As text, since -0.0 equals 0.0.
         if repr(first.parameters) != repr(cell.parameters) and (
             repr(first.all_parameters) != repr(cell.all_parameters)
@@ -374,26 +383,26 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
                 f"two different cells are called {cell.label!r} on task {task.name!r}: "
                 f"{brief_value(dict(first.parameters))} and {brief_value(dict(cell.parameters))}"
             )
-    return list(found.values())
+    return list(by_name.values())
 
 
 def cells_of_block(
-    suite: Suite, block: Block, known: Registry, own: Mapping[str, Task]
+    suite: Suite, block: Block, registered: Registry, user_tasks: Mapping[str, Task]
 ) -> list[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
-        if name not in known and name != ALL:
-            raise unknown(f"method of suite {suite.name!r}", name, known)
+        if name not in registered and name != ALL:
+            raise unknown(f"method of suite {suite.name!r}", name, registered)
     cells = []
-    for name in block.tasks_among(own):
-        if block.move is not None and ALL in block.tasks and name in own:
+    for name in block.tasks_among(user_tasks):
+        if block.move is not None and ALL in block.tasks and name in user_tasks:
             continue
-        task = own.get(name) or load_task(name)
+        task = user_tasks.get(name) or load_task(name)
         if block.free_base:
             task = with_free_base(suite, task)
         variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
-        for variant, method in itertools.product(variants, block.methods_among(known)):
-            reason = known[method].why_not(variant, block.parameters)
+        for variant, method in itertools.product(variants, block.methods_among(registered)):
+            reason = registered[method].why_not(variant, block.parameters)
             if reason is not None and ALL not in (*block.methods, *block.tasks):
                 raise CoarticError(f"suite {suite.name!r}: {reason}")
             if reason is not None:
@@ -401,8 +410,10 @@ def cells_of_block(
             for values in itertools.product(*block.grid.values()):
                 point = dict(zip(block.grid, values, strict=True))
                 parameters = {**block.parameters, **point}
-                known[method].complete(parameters)
-                cells.append(Cell(variant, known[method], tuple(parameters.items()), block.runs))
+                registered[method].complete(parameters)
+                cells.append(
+                    Cell(variant, registered[method], tuple(parameters.items()), block.runs)
+                )
     return cells
 
 

@@ -74,23 +74,23 @@ def brief_value(value: object) -> str:
         return "a number of more than 4300 digits"
 
 
-def problems(source: str, error: ValidationError, known: Iterable[str] = ()) -> str:
+def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
     """One line for each problem of a file, the first :data:`_SHOWN` of them.
 
-    ``known`` are the keys that it may have, wherever they belong.
+    ``keys`` are the keys that it may have, wherever they belong.
     """
-    details, shown, known = causes(error), plain(source), list(known)
-    sentences = (plain(explained(detail, known)) for detail in details[:_SHOWN])
+    details, shown, keys = causes(error), plain(source), list(keys)
+    sentences = (plain(explained(detail, keys)) for detail in details[:_SHOWN])
     lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
     if len(details) > _SHOWN:
         lines.append(f"{shown}: has {len(details) - _SHOWN} more problems")
     return "\n".join(lines)
 
 
-def problems_inline(error: ValidationError, known: Iterable[str] = (), most: int = 3) -> str:
+def problems_inline(error: ValidationError, keys: Iterable[str] = (), most: int = 3) -> str:
     """The same as part of a sentence, the first ``most`` of them."""
-    details, known = causes(error), list(known)
-    shown = "; ".join(plain(explained(detail, known)) for detail in details[:most])
+    details, keys = causes(error), list(keys)
+    shown = "; ".join(plain(explained(detail, keys)) for detail in details[:most])
     return shown + (f" and {len(details) - most} more" if len(details) > most else "")
 
 
@@ -118,8 +118,8 @@ def sentence(text: str) -> PydanticCustomError:
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def explained(detail: ErrorDetails, known: Sequence[str] = ()) -> str:
-    """One sentence for a thing that is wrong; ``known`` is what an unknown key may have meant."""
+def explained(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
+    """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
     key, message = key_of(detail["loc"]), detail["msg"]
     match detail["type"]:
         case "sentence":
@@ -128,8 +128,8 @@ def explained(detail: ErrorDetails, known: Sequence[str] = ()) -> str:
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":
             name, table = str(detail["loc"][-1]), str(detail["loc"][0])
-            if len(detail["loc"]) > 1 and name in known:
+            if len(detail["loc"]) > 1 and name in keys:
                 return f"{key} is an unknown key; {name!r} belongs above the line [{table}]"
-            return f"{key} is an unknown key{did_you_mean(name, known)}"
+            return f"{key} is an unknown key{did_you_mean(name, keys)}"
     message = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value error,) ", "", message)
     return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"

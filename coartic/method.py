@@ -264,7 +264,7 @@ class Session:
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """**A** from ``q`` for goal number ``goal`` (from 1); counts its iterations."""
         self._use(Information.CORRECTIVE_PROCESS)
-        found = correct(
+        correction = correct(
             self._task.robot,
             q,
             hand,
@@ -272,10 +272,10 @@ class Session:
             locked_base=self._task.locked_base,
             model=self.model,
         )
-        self._meter.corrective_iterations += found.iterations
-        self._meter.jacobians += found.iterations
-        self._meter.forward_kinematics += found.iterations + 1
-        return found
+        self._meter.corrective_iterations += correction.iterations
+        self._meter.jacobians += correction.iterations
+        self._meter.forward_kinematics += correction.iterations + 1
+        return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
         """Make one physical trial; counts it, its ticks and its corrections.
@@ -335,29 +335,29 @@ class Session:
             if left <= 0:
                 raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
             codes, given = codes[:left], given[:left]
-        made = make_trials(self._task, codes, given, model=self.model)
+        trials = make_trials(self._task, codes, given, model=self.model)
         if until is not None:
-            better = made.rewards > np.asarray(until)[: len(given)]
+            better = trials.rewards > np.asarray(until)[: len(given)]
             if better.any():
-                made = Trials._make(each[: int(better.argmax()) + 1] for each in made)
-        self._meter.trials += len(made.ticks)
-        self._meter.movement_ticks += int(made.ticks.sum())
-        self._meter.corrections += int(made.corrections.sum())
-        self._meter.corrective_iterations += int(made.iterations.sum())
-        self._meter.jacobians += int(made.iterations.sum())
-        self._meter.forward_kinematics += int(made.evaluations.sum())
-        self._meter.failed_trials += int((~made.completed).sum())
-        rewards: list[int | None] = (-made.ticks).tolist()
-        for failed in np.flatnonzero(~made.completed).tolist():
+                trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
+        self._meter.trials += len(trials.ticks)
+        self._meter.movement_ticks += int(trials.ticks.sum())
+        self._meter.corrections += int(trials.corrections.sum())
+        self._meter.corrective_iterations += int(trials.iterations.sum())
+        self._meter.jacobians += int(trials.iterations.sum())
+        self._meter.forward_kinematics += int(trials.evaluations.sum())
+        self._meter.failed_trials += int((~trials.completed).sum())
+        rewards: list[int | None] = (-trials.ticks).tolist()
+        for failed in np.flatnonzero(~trials.completed).tolist():
             rewards[failed] = None
         self._rewards.extend(rewards)
         if Information.CORRECTIVE_PROCESS in self._told:
-            return made
-        return made._replace(
-            corrections=made.corrections[:0],
-            iterations=made.iterations[:0],
-            targets=made.targets[:0],
-            reached=made.reached[:0],
+            return trials
+        return trials._replace(
+            corrections=trials.corrections[:0],
+            iterations=trials.iterations[:0],
+            targets=trials.targets[:0],
+            reached=trials.reached[:0],
         )
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:

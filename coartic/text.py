@@ -55,9 +55,9 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean 'a'?`` with the known name that is nearest; empty where none is near."""
-    by_letters = {each.lower(): each for each in known}
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """``; did you mean 'a'?`` with the name that is nearest; empty where none is near."""
+    by_letters = {each.lower(): each for each in names}
     close = difflib.get_close_matches(name.lower(), by_letters, n=1)
     return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
 

@@ -37,9 +37,9 @@ def add_meanings() -> None:
     path = Path(__file__).with_name("meanings.toml")
     for owner, meanings in tomllib.loads(path.read_text(encoding="utf-8")).items():
         module, _, name = owner.rpartition(".")
-        known = getattr(importlib.import_module(module), name).__pydantic_fields__
+        fields = getattr(importlib.import_module(module), name).__pydantic_fields__
         for field, meaning in meanings.items():
-            if field not in known:
+            if field not in fields:
                 raise KeyError(f"{path.name}: {owner} has no field {field}")
             ModuleAnalyzer.for_module(module).find_attr_docs()[name, field] = [meaning, ""]
 
@@ -193,7 +193,7 @@ def signatures() -> Iterator[str]:
     }
     for title, kind in kinds.items():
         yield from (f"**{title}**", "")
-        rows = ((own.name, own.extent, own.meaning) for own in kind)
+        rows = ((signature.name, signature.extent, signature.meaning) for signature in kind)
         yield from table(("signature", "unit and range", "meaning"), rows)
 
 
@@ -213,8 +213,8 @@ def claims() -> Iterator[str]:
         text = test_in_words(claim)
         what = [", ".join(claim.compared)] if claim.compared else []
         for by_task in (claim.pairs, claim.runs, claim.cells):
-            for task, own in by_task.items():
-                what.append(f"{task}: {own if isinstance(own, str) else ', '.join(own)}")
+            for task, names in by_task.items():
+                what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
         return text[0].upper() + text[1:] + "." + (f" *{'; '.join(what)}.*" if what else "")
 
     rows = (
@@ -252,15 +252,17 @@ def plainly(
 ) -> tuple[str, str] | None:
     """Show types without metadata, and a model without its signature, which repeats its fields."""
     if what == "class" and "__pydantic_fields__" in vars(thing):
-        own = thing.__annotations__
-        own |= {field: bare(kind) for field, kind in hints(thing).items() if field in own}
+        annotations = thing.__annotations__
+        annotations |= {
+            field: bare(kind) for field, kind in hints(thing).items() if field in annotations
+        }
         return "", ""
     if "Annotated[" not in (signature or ""):
         return None
-    kinds, found = get_type_hints(thing), inspect.signature(thing, bound_method=what == "method")
-    of = [p.replace(annotation=kinds.get(p.name, p.annotation)) for p in found.parameters.values()]
-    found = found.replace(parameters=of)
-    return inspect.stringify_signature(found, show_return_annotation=False), returns
+    kinds, shown = get_type_hints(thing), inspect.signature(thing, bound_method=what == "method")
+    of = [p.replace(annotation=kinds.get(p.name, p.annotation)) for p in shown.parameters.values()]
+    shown = shown.replace(parameters=of)
+    return inspect.stringify_signature(shown, show_return_annotation=False), returns
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

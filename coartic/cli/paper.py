@@ -47,10 +47,10 @@ def readings(
 
     A reading is judged by the results that the paper prints of the one-armed tasks.
     """
-    from coartic.tasks.readings import readings as known
+    from coartic.tasks.readings import readings as all_readings
 
     if judge is None:
-        for reading in known():
+        for reading in all_readings():
             others = ", ".join(choice.written for choice in reading.alternatives)
             question = " ".join(reading.question.split())
             say_pairs([(reading.id, f"{question} {reading.default.written}; or {others}")])

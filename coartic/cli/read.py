@@ -144,10 +144,10 @@ def verify(
         from coartic.benchmarks.registry import registry
         from coartic.benchmarks.reproduce import some_again
 
-        known, count = registry(method_file or []), 0
-        for run_id, found in some_again(folder, again, known):
+        registered, count = registry(method_file or []), 0
+        for run_id, changes in some_again(folder, again, registered):
             count += 1
-            for difference in found:
+            for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
                 different = True
         say(f"{counted(count, 'run')} performed again.")

@@ -141,5 +141,5 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:
-        known = ", ".join(CONDITIONS | VARIANTS)
-        raise CoarticError(f"unknown exploration condition {condition!r}; known: {known}") from None
+        ids = ", ".join(CONDITIONS | VARIANTS)
+        raise CoarticError(f"unknown exploration condition {condition!r}; known: {ids}") from None

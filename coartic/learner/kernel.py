@@ -121,9 +121,9 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
     follows, explored = np.zeros((2, 2, width_of(task.robot)), dtype=np.bool_)
     base = np.array(["x" not in task.locked_base, "y" not in task.locked_base])
     for chosen, hand in enumerate(HANDS):
-        own, others = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
+        of_arm, others = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
         explored[chosen, :2] = condition.modify_chosen & base
-        explored[chosen, own] = condition.modify_chosen
+        explored[chosen, of_arm] = condition.modify_chosen
         explored[chosen, others] = condition.modify_other
         follows[chosen, others] = not condition.modify_other
     return Rules(
@@ -152,8 +152,8 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q, and
     ``target``, q*.
     """
-    known = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
-    tables = np.zeros((runs, len(task.goals), 3, 2), known)
+    learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
+    tables = np.zeros((runs, len(task.goals), 3, 2), learned)
     tables["value"], tables["target"][..., : task.robot.dof] = -np.inf, np.nan
     return tables
 
@@ -317,9 +317,9 @@ def aim(
         if not trial.going:
             continue
         hand = trial.hand
-        known = tables[n, number, previous_hand(trial, rules), hand]
-        stored = known.target
-        trial.stored = trial.aimed = known.value > -math.inf
+        learned = tables[n, number, previous_hand(trial, rules), hand]
+        stored = learned.target
+        trial.stored = trial.aimed = learned.value > -math.inf
         if not trial.stored and rules.explores_unknown and explore and not first:
             trial.aimed = True
             stored = run.q
@@ -463,10 +463,10 @@ def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> N
         hit = log.hits[n, number]
         knows = number > 0 and not rules.goal_alone
         before = log.hits[n, number - 1].hand if knows else NO_HAND
-        known = tables[n, number, before, hit.hand]
-        if credit > known.value or (rules.update_equal and credit == known.value):
-            known.value = credit
-            fill_row(known.target, hit.q)
+        learned = tables[n, number, before, hit.hand]
+        if credit > learned.value or (rules.update_equal and credit == learned.value):
+            learned.value = credit
+            fill_row(learned.target, hit.q)
 
 
 @inlined

@@ -218,11 +218,11 @@ _GENERATOR = types.NumPyRandomGeneratorType("generator")
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """NumPy generators as kernels take them, a row each; they must outlive the call."""
 
-    def found(generator: np.random.Generator) -> list[int | None]:
+    def draws_of(generator: np.random.Generator) -> list[int | None]:
         c = generator.bit_generator.ctypes
         return [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
 
-    return np.array([found(generator) for generator in generators], dtype=np.uintp)
+    return np.array([draws_of(generator) for generator in generators], dtype=np.uintp)
 
 
 @intrinsic

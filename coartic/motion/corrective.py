@@ -28,9 +28,9 @@ from coartic.motion.lanes import (
     lanes_for,
     leave,
     near,
+    padded,
     place,
     runs_for,
-    whole,
     winding,
 )
 from coartic.motion.movement import checked_goal, configuration, largest_square
@@ -132,7 +132,7 @@ def stay_near(at: Any, count: int, how: Any) -> None:
 def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
@@ -146,7 +146,7 @@ def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, 
     ended = 0
     far = 0
     tip = len(at.length)
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         going = at.fate[i] == GOING
@@ -267,8 +267,8 @@ def correct(
     if not 0.0 <= nullspace_gain <= 1.0:
         raise ValueError(f"nullspace_gain is {nullspace_gain}; it must be 0 to 1")
     runs = runs_for(1, robot)
-    run, own = runs[0], slice(robot.dof)
-    run["target"][own] = configuration(robot, q)
+    run, figures = runs[0], slice(robot.dof)
+    run["target"][figures] = configuration(robot, q)
     correct_kernel(
         robot.arm(hand),
         checked_goal(goal),
@@ -277,4 +277,4 @@ def correct(
         lanes_for(robot),
         runs,
     )
-    return Correction(run["target"][own].copy(), bool(run["converged"]), int(run["iterations"]))
+    return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))

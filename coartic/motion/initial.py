@@ -70,8 +70,8 @@ def ranked_sequences(
 
     each = list(sequences)
     trials: list[tuple[str, Execution]] = []
-    made = execute_many(task, map(corrective_movements, each), model=model)
-    for hands, trial in zip(each, made, strict=True):
+    executions = execute_many(task, map(corrective_movements, each), model=model)
+    for hands, trial in zip(each, executions, strict=True):
         if isinstance(trial, Exception):
             raise trial
         trials.append((hands, trial))

@@ -94,7 +94,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
         "distance": (),  # from start to target; its square, before the arm sets off
-        **dict.fromkeys(("step", "last", "whole", "slowness", "bend", "clearance"), ()),
+        **dict.fromkeys(("step", "last", "target_step", "slowness", "bend", "clearance"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing
@@ -177,7 +177,7 @@ def fill(rows: Any, lane: int, last: int) -> None:
 
 
 @inner
-def whole(count: int) -> int:
+def padded(count: int) -> int:
     """Lanes in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
 
     A loop over whole vectors leaves no lanes over that would be worked on one by one.
@@ -192,7 +192,7 @@ _chain = inner(chain)
 def near(at: Any, count: int) -> bool:
     """Whether all angles are surely small enough for the kernels' own cosine: by a bound."""
     far = 0
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
     return far == 0
 
@@ -226,6 +226,6 @@ _far_chains = chains_by(cosine, sine)
 def place(at: Any, count: int, is_near: bool) -> None:
     """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
-        _near_chains(at, whole(count))
+        _near_chains(at, padded(count))
     else:
-        _far_chains(at, whole(count))
+        _far_chains(at, padded(count))

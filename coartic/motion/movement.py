@@ -32,9 +32,9 @@ from coartic.motion.lanes import (
     depart,
     fill,
     lanes_for,
+    padded,
     place,
     runs_for,
-    whole,
     width_of,
     winding,
 )
@@ -122,7 +122,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 def set_off(at: Any, count: int, model: Any) -> bool:
     """Rates, bounds and number of steps of every lane; whether all surely stay near."""
     far = 0
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         distance = math.sqrt(at.distance[i])
         per_step = model.step / distance if distance > 0.0 else 0.0
         base_x = (at.target[0, i] - at.start[0, i]) * per_step
@@ -139,7 +139,7 @@ def set_off(at: Any, count: int, model: Any) -> bool:
         at.distance[i], at.slowness[i], at.bend[i] = distance, 1.0 / speed, bend
         last = np.ceil(distance / model.step)
         at.step[i], at.last[i] = 0.0, last
-        at.whole[i] = -1.0 if model.whole_last_step & (last > 0.0) else last
+        at.target_step[i] = -1.0 if model.whole_last_step & (last > 0.0) else last
         # No joint turns farther than at the farther end, and, where it passes it, a step.
         most = winding(at.start, i) + winding(at.target, i) + model.step * len(at.length)
         far += 0 if most < trigonometry.LARGEST else 1
@@ -153,12 +153,12 @@ def set_off(at: Any, count: int, model: Any) -> bool:
 @lanewise
 def place_between(at: Any, count: int, model: Any) -> None:
     """The point at which each lane is now."""
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         fraction = at.step[i] * model.step / at.distance[i]
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
             between = begin + fraction * (end - begin)
-            at.q[j, i] = end if at.step[i] == at.whole[i] else between
+            at.q[j, i] = end if at.step[i] == at.target_step[i] else between
 
 
 @lanewise
@@ -172,7 +172,7 @@ def look(
     """
     ended = 0
     tip = len(at.length)
-    for i in range(whole(count)):
+    for i in range(padded(count)):
         velocity_x = at.base_rate[0, i]
         velocity_y = at.base_rate[1, i]
         for k in range(tip):
@@ -239,7 +239,7 @@ def move_lanes(
                 continue
             run = runs[at.run[lane]]
             q, target = run.q, run.target
-            at_end = at.step[lane] == at.whole[lane]
+            at_end = at.step[lane] == at.target_step[lane]
             fraction = 0.0 if at_end else at.step[lane] * model.step / at.distance[lane]
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
@@ -283,8 +283,11 @@ def move(
     Each Goal*.
     """
     runs = runs_for(1, robot)
-    run, own = runs[0], slice(robot.dof)
-    run["q"][own], run["target"][own] = configuration(robot, q), configuration(robot, target)
+    run, figures = runs[0], slice(robot.dof)
+    run["q"][figures], run["target"][figures] = (
+        configuration(robot, q),
+        configuration(robot, target),
+    )
     move_kernel(
         robot.arm(hand),
         checked_goal(goal, radius),
@@ -294,7 +297,7 @@ def move(
         runs,
     )
     return MoveResult(
-        run["q"][own].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
+        run["q"][figures].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
     )
 
 

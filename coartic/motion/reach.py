@@ -34,7 +34,7 @@ class Reached(NamedTuple):
     """Whether its hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
     """Control ticks of its movements, shape ``(N,)``."""
-    found: Array
+    corrected: Array
     """Target of its corrective movement, shape ``(N, dof)``; NaN where none was reached."""
     corrections: NDArray[np.int64]
     """Corrective movements reached, 0 or 1: 0 also where **A** did not converge."""
@@ -156,7 +156,7 @@ def correct_missed(
             run.acting = run.converged
             if run.converged:
                 reached.corrections[first + i, g] = 1
-                fill_row(reached.found[first + i, g], run.target)
+                fill_row(reached.corrected[first + i, g], run.target)
     move_acting(first, count, g, goal, rules.model.corrective_arrival, arms, rules, work)
     for i in range(count):
         if work.runs[i].acting:

@@ -64,7 +64,7 @@ def corrective_trials(
         q, ticks = q[whose[first]], ticks[whose[first]]
         going = ~np.isnan(ticks)
         chosen = first[going]
-        made = reach_unchecked(
+        result = reach_unchecked(
             task.robot,
             q[going],
             hand[chosen, g],
@@ -73,8 +73,8 @@ def corrective_trials(
             locked_base=task.locked_base,
             model=model,
         )
-        q[going] = np.where(made.hit[:, None], made.q, np.nan)
-        ticks[going] += np.where(made.hit, made.ticks, np.nan)
+        q[going] = np.where(result.hit[:, None], result.q, np.nan)
+        ticks[going] += np.where(result.hit, result.ticks, np.nan)
         whose = longer
         reached[:, g] = q[whose]
     shape = (sets, len(sequences))

@@ -110,10 +110,10 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     have, a target of the wrong shape or not finite, a locked base that moves. Raises
     ValueError for a model that no movement can be made with, TypeError for what is no task.
     """
-    (made,) = execute_many(task, [solution], model=model)
-    if isinstance(made, Exception):
-        raise made
-    return made
+    (execution,) = execute_many(task, [solution], model=model)
+    if isinstance(execution, Exception):
+        raise execution
+    return execution
 
 
 def execute_many(
@@ -171,7 +171,7 @@ class SolutionRun:
         ]
         self.q = configuration(task.robot, task.q0)
         self.hit = False
-        self.made: list[Movement] = []
+        self.movements: list[Movement] = []
         self.configurations: list[Array] = []
         self.corrections = self.iterations = self.evaluations = 0
         self.reason = ""
@@ -189,7 +189,7 @@ class SolutionRun:
         self.q, self.hit = q, hit
         self.corrections += movement.kind == "corrective"
         target = np.array(movement.target, dtype=np.float64)
-        self.made.append(replace(movement, target=target, ticks=ticks))
+        self.movements.append(replace(movement, target=target, ticks=ticks))
 
     def end_goal(self, number: int) -> None:
         """Note what came of the goal."""
@@ -198,17 +198,17 @@ class SolutionRun:
         if not self.hit:
             self.reason = f"goal {number}: the corrective movement ended outside the goal"
             return
-        if not self.made or self.made[-1].goal != number:  # hit on the way: show the hand
+        if not self.movements or self.movements[-1].goal != number:  # hit on the way: show the hand
             hand = self.due[number - 1][0].hand
-            self.made.append(Movement(number, hand, "corrective", np.array(self.q), 0))
+            self.movements.append(Movement(number, hand, "corrective", np.array(self.q), 0))
         self.configurations.append(np.array(self.q))
 
     def outcome(self) -> Execution:
         """What has happened so far."""
         return Execution(
-            movements=tuple(self.made),
+            movements=tuple(self.movements),
             configurations=np.array(self.configurations).reshape(-1, len(self.q)),
-            ticks=sum(movement.ticks or 0 for movement in self.made),
+            ticks=sum(movement.ticks or 0 for movement in self.movements),
             corrections=self.corrections,
             iterations=self.iterations,
             evaluations=self.evaluations,
@@ -228,11 +228,11 @@ def try_goal(task: Task, number: int, runs: list[SolutionRun], model: MotionMode
         # A movement, which this has always been counted as, also asks where its target is.
         run.evaluations += int(seen.evaluations[n]) + 1
     for place in range(max(len(run.due[number - 1]) for run in runs)):
-        due = [(run, own) for run in runs if (own := run.next(number, place)) is not None]
+        due = [(run, movement) for run in runs if (movement := run.next(number, place)) is not None]
         for run, movement in due:
             if movement.kind == "path":
                 follow_path(task, run, movement, model)
-        straight = [(run, own) for run, own in due if own.kind != "path"]
+        straight = [(run, movement) for run, movement in due if movement.kind != "path"]
         move_straight(
             task, number, [(r, m) for r, m in straight if m.target is not None], "move", model
         )
@@ -270,7 +270,7 @@ def move_straight(task: Task, number: int, due: Due, how: How, model: MotionMode
                     f"with the {movement.hand} hand in {iterations} iterations"
                 )
                 continue
-            movement = replace(movement, target=result.found[n])
+            movement = replace(movement, target=result.corrected[n])
         run.take(movement, result.q[n], int(result.ticks[n]), bool(result.hit[n]))
 
 
@@ -280,7 +280,7 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
     if how == "move":
         targets[:, 0] = [movement.target for _, movement in due]
     ends = [movement.kind != "corrective" or model.corrective_arrival for _, movement in due]
-    made = reach_in_turn(
+    reached = reach_in_turn(
         task.robot,
         np.array([run.q for run, _ in due]),
         np.array([[HANDS.index(movement.hand)] for _, movement in due]),
@@ -294,7 +294,7 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
         locked_base=task.locked_base,
         model=model,
     )
-    return Reached._make(field[:, 0] for field in made)
+    return Reached._make(field[:, 0] for field in reached)
 
 
 def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:

@@ -64,7 +64,7 @@ def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel 
     starts = np.empty((count, task.robot.dof))
     starts[:] = configuration(task.robot, task.q0)
     goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
-    made = reach_in_turn(
+    reached = reach_in_turn(
         task.robot,
         starts,
         hand_codes(task, hands, count),
@@ -76,15 +76,15 @@ def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel 
         locked_base=task.locked_base,
         model=model,
     )
-    made.q[~made.hit] = np.nan
+    reached.q[~reached.hit] = np.nan
     return Trials(
-        ticks=made.ticks.sum(axis=1),
-        completed=made.hit[:, -1].copy(),
-        corrections=made.corrections.sum(axis=1),
-        iterations=made.iterations.sum(axis=1),
-        evaluations=made.evaluations.sum(axis=1),
+        ticks=reached.ticks.sum(axis=1),
+        completed=reached.hit[:, -1].copy(),
+        corrections=reached.corrections.sum(axis=1),
+        iterations=reached.iterations.sum(axis=1),
+        evaluations=reached.evaluations.sum(axis=1),
         targets=given,
-        reached=made.q,
+        reached=reached.q,
     )
 
 

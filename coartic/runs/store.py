@@ -275,7 +275,7 @@ class Store:
                         "runs": cell.runs,
                     },
                 )
-            self._add_joints(dict.fromkeys(name for own in joints.values() for name in own))
+            self._add_joints(dict.fromkeys(name for names in joints.values() for name in names))
 
     def plan(self) -> Plan:
         """What was asked for last. Raises CoarticError where nothing was yet."""
@@ -342,7 +342,7 @@ class Store:
 
     def stale(self) -> int:
         """Runs of what is asked for now that other code made."""
-        found = self._db.execute(
+        rows = self._db.execute(
             """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
             WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
                 WHERE new.asked = old.asked AND new.code != old.code
@@ -350,7 +350,7 @@ class Store:
             AND results.suite_seed = (SELECT seed FROM suite)
             AND old.id NOT IN (SELECT setting FROM cells)"""
         )
-        return int(found.fetchone()[0])
+        return int(rows.fetchone()[0])
 
     # Runs, in and out.
 
@@ -419,10 +419,10 @@ class Store:
 
     def ids(self, prefix: str) -> list[str]:
         """Ids of all runs, asked for or not, that begin so."""
-        found = self._db.execute(
+        rows = self._db.execute(
             "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?", (len(prefix), prefix)
         )
-        return [run_id for (run_id,) in found]
+        return [run_id for (run_id,) in rows]
 
     def frame(self, view: str) -> pd.DataFrame:
         """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""

@@ -33,9 +33,9 @@ def load_task(name_or_path: str | Path) -> Task:
     reconstructed = task_of(name_or_path)
     if reconstructed is not None:
         return members(reconstructed)[name_or_path]
-    known = ", ".join(builtin_tasks())
+    names = ", ".join(builtin_tasks())
     hint = did_you_mean(name_or_path, builtin_tasks()) or "."
     raise TaskError(
-        f"unknown task {name_or_path!r}{hint} Shipped tasks: {known}. "
+        f"unknown task {name_or_path!r}{hint} Shipped tasks: {names}. "
         "A task file's name ends in .toml; an instance is written FAMILY/v1/i017."
     )

@@ -444,8 +444,8 @@ def names_in(text: str) -> list[str]:
 
     Raises TaskError for what is no such range, or one of more than :data:`MOST_CELLS`.
     """
-    found = _RANGE.fullmatch(text)
-    ends = [address_of(found[1] + end) for end in found.groups()[1:]] if found else [None]
+    written = _RANGE.fullmatch(text)
+    ends = [address_of(written[1] + end) for end in written.groups()[1:]] if written else [None]
     first, last = ends[0], ends[-1]
     if first is None or last is None or first.stream != last.stream:
         raise TaskError(
@@ -484,7 +484,7 @@ def family_name(path: Path) -> str:
 def load_family(name: str) -> Family:
     """A family by name, with its version or, without, the newest. Raises TaskError."""
     files = family_files()
-    newest = {known.partition("/")[0]: known for known in sorted(files, key=version_in)}
+    newest = {full_name.partition("/")[0]: full_name for full_name in sorted(files, key=version_in)}
     full = newest.get(name, name)
     if full not in files:
         hint = did_you_mean(full, files) or ";"

@@ -49,10 +49,10 @@ class Draws:
 
     def __init__(self, key: tuple[int, int], *place: int) -> None:
         first, second, third = place
-        self._pairs = self._made(key, (first, second, third))
+        self._pairs = self._pairs_of(key, (first, second, third))
 
     @staticmethod
-    def _made(key: tuple[int, int], place: tuple[int, int, int]) -> Iterator[int]:
+    def _pairs_of(key: tuple[int, int], place: tuple[int, int, int]) -> Iterator[int]:
         for block in range(_WORD):
             a, b, c, d = philox4x32((block, *place), key)
             yield a << 32 | b

@@ -108,17 +108,17 @@ def load_reading(text: str) -> ChosenReading:
     among its choices.
     """
     name, sign, value = (part.strip() for part in str(text).partition("="))
-    known = {reading.id: reading for reading in readings()}
+    by_id = {reading.id: reading for reading in readings()}
     if not sign:
         raise CoarticError(
             f"reading {brief_value(text)}: write it as NAME=VALUE, such as ties=right"
         )
-    if name not in known:
+    if name not in by_id:
         raise CoarticError(
-            f"unknown reading {brief_value(name)}; known: {', '.join(known)}"
-            f"{did_you_mean(name, known)}"
+            f"unknown reading {brief_value(name)}; known: {', '.join(by_id)}"
+            f"{did_you_mean(name, by_id)}"
         )
-    reading = known[name]
+    reading = by_id[name]
     for choice in reading.choices:
         if choice.is_meant_by(value):
             return ChosenReading(reading, choice)

@@ -83,10 +83,10 @@ class Address(NamedTuple):
 
 def address_of(name: str) -> Address | None:
     """The address that a task's name is, ``two-armed/v1/i017`` say; None for other names."""
-    found = _ADDRESS.fullmatch(name)
-    if found is None:
+    parts = _ADDRESS.fullmatch(name)
+    if parts is None:
         return None
-    address = Address(found[1].removesuffix("/"), found[2], int(found[3]))
+    address = Address(parts[1].removesuffix("/"), parts[2], int(parts[3]))
     return address if str(address) == name else None  # i0017 would be i017 again
 
 
