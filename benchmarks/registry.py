@@ -30,7 +30,7 @@ from coartic.learner.learning import METHOD_PREFIX
 from coartic.method import Information, Method
 from coartic.runs.plan import BUILT_IN, SEARCH, DeclaredMethod
 from coartic.tasks.task import Task
-from coartic.text import LONGEST_LINE, did_you_mean, plain
+from coartic.text import LONGEST_LINE, plain
 
 ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
@@ -113,7 +113,7 @@ class Entry:
             complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
         except ValidationError as error:
             wrong, names = problems_inline(error, fields), ", ".join(fields) or "none"
-            raise CoarticError(f"method {self.name!r}: {wrong}. Its parameters: {names}.") from None
+            raise CoarticError(f"method {self.name!r}: {wrong} (its parameters: {names})") from None
         return complete
 
     def with_parameters(self, parameters: Mapping[str, Any]) -> Method:
@@ -202,19 +202,6 @@ def current_code(where: str, name: str) -> str:
         if where.endswith(".py"):
             return {e.name: e.code for e in entries_of_file(Path(where))}.get(name, "none")
         return code_of(file_of(importlib.import_module(where)))
-
-
-def unknown(kind: str, name: str, names: Iterable[str]) -> CoarticError:
-    """An error for a name that is not among the known ones, with the nearest of them."""
-    names = list(names)
-    hint = did_you_mean(name, names) or "."
-    more = f" and {len(names) - _MOST_NAMED} others" if len(names) > _MOST_NAMED else ""
-    return CoarticError(
-        f"unknown {kind} {name!r}{hint} Known: {', '.join(names[:_MOST_NAMED])}{more}."
-    )
-
-
-_MOST_NAMED = 40  # in an error
 
 
 def add_entries(registered: dict[str, Entry], entries: Iterable[Entry]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from coartic.benchmarks.outcome import kept
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.registry import Entry, Registry, unknown
+from coartic.benchmarks.registry import Entry, Registry
 from coartic.benchmarks.worker import Job, job_of
 from coartic.errors import CoarticError
 from coartic.method import Meter
@@ -17,6 +17,7 @@ from coartic.motion.solution import Movement
 from coartic.motion.ticks import Trajectory, trajectory
 from coartic.runs.store import FILE, PARTS, Run, StoredRun, open_store
 from coartic.tasks.task import Task
+from coartic.text import unknown
 
 
 def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
@@ -69,7 +70,7 @@ def performed(entry: Entry, jobs: Sequence[Job], tasks: Sequence[Task]) -> Itera
 def performed_again(stored: StoredRun, registered: Registry) -> Run:
     """A stored run, performed anew by the code that is here now."""
     if stored.method not in registered:
-        raise unknown("method", stored.method, registered)
+        raise CoarticError(unknown("method", stored.method, registered))
     entry = registered[stored.method]
     job = job_of(
         entry,

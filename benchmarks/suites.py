@@ -30,7 +30,7 @@ from coartic import (
     load_task,
     parse_task,
 )
-from coartic.benchmarks.registry import Entry, Registry, unknown
+from coartic.benchmarks.registry import Entry, Registry
 from coartic.inputs import (
     MOST_CELLS,
     MOST_RUNS,
@@ -47,7 +47,7 @@ from coartic.runs.plan import label_of, variant_of
 from coartic.tasks.families import named_by
 from coartic.tasks.members import members, task_of
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
-from coartic.text import Line, plain
+from coartic.text import Line, plain, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
@@ -276,7 +276,7 @@ def select_cells(
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
     for name in tasks:
         if name not in task_names:
-            raise unknown("task", name, task_names)
+            raise CoarticError(unknown("task", name, task_names))
     chosen = [
         cell
         for cell in cells
@@ -304,7 +304,7 @@ def methods_named(name: str, registered: Registry) -> list[str]:
         [method for method in registered if fnmatchcase(method, name)] if "*" in name else [name]
     )
     if not named or named[0] not in registered:
-        raise unknown("method", name, [*registered, *CONDITIONS, *VARIANTS])
+        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *VARIANTS]))
     return named
 
 
@@ -392,7 +392,7 @@ def cells_of_block(
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
         if name not in registered and name != ALL:
-            raise unknown(f"method of suite {suite.name!r}", name, registered)
+            raise CoarticError(unknown(f"method of suite {suite.name!r}", name, registered))
     cells = []
     for name in block.tasks_among(user_tasks):
         if block.move is not None and ALL in block.tasks and name in user_tasks:

@@ -33,6 +33,20 @@ MOST_SECONDS = 1_000_000
 MOST_SEED = 2**63 - 1
 
 _SHOWN = 20  # problems of one file
+_PLAINER = {
+    r"^(Input|String|Tuple|List|Dictionary|Value error,) ": "",
+    r"^should have at least (\d+ \w+) after validation, not \d+": r"needs at least \1",
+    r"^should have at most (\d+ \w+) after validation, not \d+": r"may have at most \1",
+    "greater than or equal to": "at least",
+    "less than or equal to": "at most",
+    "valid integer": "whole number",
+    "valid number": "number",
+    "valid string": "text",
+    "a valid boolean": "true or false",
+    "valid (list|tuple)": "list",
+    r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
+}
+"""Wordings of pydantic, and what they say to a person."""
 _BRIEF = 80  # characters of a value in a sentence
 
 
@@ -131,5 +145,8 @@ def explained(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
             if len(detail["loc"]) > 1 and name in keys:
                 return f"{key} is an unknown key; {name!r} belongs above the line [{table}]"
             return f"{key} is an unknown key{did_you_mean(name, keys)}"
-    message = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value error,) ", "", message)
+        case "string_pattern_mismatch" if key == "name":
+            message = "begins with a letter or digit and may have '.', '_' and '-' besides"
+    for wording, plainer in _PLAINER.items():
+        message = re.sub(wording, plainer, message)
     return f"{key} is {brief_value(detail['input'])}; it {message[:1].lower()}{message[1:]}"

@@ -21,6 +21,7 @@ LONGEST_LINE = 500
 """Characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
 """Characters of a reason that is kept."""
+_MOST_NAMED = 12  # in a sentence
 _DOUBTFUL = re.compile("[^ -~]")  # the rest prints
 
 
@@ -60,6 +61,16 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     by_letters = {each.lower(): each for each in names}
     close = difflib.get_close_matches(name.lower(), by_letters, n=1)
     return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
+
+
+def unknown(kind: str, name: str, names: Iterable[str]) -> str:
+    """A sentence on a name that is not among some names: the nearest of them, or all."""
+    several = list(names)
+    hint = did_you_mean(name, several)
+    more = f" and {len(several) - _MOST_NAMED} others" if len(several) > _MOST_NAMED else ""
+    return f"unknown {kind} {name!r}" + (
+        hint or f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
+    )
 
 
 def is_printable_line(text: str) -> bool:

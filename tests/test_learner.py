@@ -337,7 +337,7 @@ def test_run_without_any_completed_trial():
 
 
 def test_errors():
-    with pytest.raises(CoarticError, match="unknown exploration condition 'EC5'; known: EC1"):
+    with pytest.raises(CoarticError, match="unknown exploration condition 'EC5'; did you mean"):
         learn(load_task("ascending"), "EC5", seed=0)
     with pytest.raises(NotApplicableError, match="has no left hand"):
         learn(load_task("ascending"), "EC3", seed=0)

@@ -14,7 +14,7 @@ from coartic.cli.arguments import at_least
 from coartic.cli.terminal import if_interrupted, say, say_pairs, show_frame, writing
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.text import counted, did_you_mean
+from coartic.text import counted, unknown
 
 _ReportFolder = Annotated[
     Path | None,
@@ -70,7 +70,7 @@ def trace(
         say_pairs([("Tables", ", ".join(tables))])
         return
     if table not in tables:
-        raise CoarticError(f"there is no table {table!r}{did_you_mean(table, tables)}")
+        raise CoarticError(unknown("table", table, tables))
     values, runs = runs_of(tables[table], row)
     if row is None:
         say(*values)

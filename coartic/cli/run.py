@@ -14,7 +14,7 @@ from coartic.cli.arguments import check_numbers, names_in
 from coartic.cli.terminal import performing, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.text import counted, did_you_mean
+from coartic.text import counted, unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
@@ -50,7 +50,7 @@ def run(
 
     check_numbers(jobs, time_limit)
     chosen = load_suite(suite)
-    out = folder_named(folder or f"results/{chosen.name}", "--out")
+    out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     plan = plan_suite(
@@ -149,11 +149,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
             methods = methods_named(name, registered)
         except CoarticError as error:
             names = [*suites(), *builtin_tasks(), *families(), *registered]
-            hint = did_you_mean(name, names)
-            raise CoarticError(
-                f"there is no task, suite, method or family {name!r}"
-                f"{hint or '; `coartic list` shows them all'}."
-            ) from error
+            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
         for method in methods:
             yield from describe_method(registered[method])
 

@@ -200,7 +200,8 @@ class Display:
 
     def close(self) -> None:
         """Leave the terminal as it was."""
-        self._bar.stop()
+        if self._task is not None:
+            self._bar.stop()
 
     def update(self, progress: Progress, what: str) -> None:
         """Show how far the plan is, and what was run last."""

@@ -21,6 +21,7 @@ from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError, need
 from coartic.robot import HANDS, Hand
+from coartic.text import unknown
 
 if TYPE_CHECKING:
     from coartic.tasks.task import Task
@@ -141,5 +142,5 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:
-        ids = ", ".join(CONDITIONS | VARIANTS)
-        raise CoarticError(f"unknown exploration condition {condition!r}; known: {ids}") from None
+        ids = CONDITIONS | VARIANTS
+        raise CoarticError(unknown("exploration condition", condition, ids)) from None

@@ -8,7 +8,7 @@ from coartic.errors import TaskError
 from coartic.tasks.families import check_instance, instance
 from coartic.tasks.members import members, task_of
 from coartic.tasks.task import Task, read_task, shipped_tasks
-from coartic.text import did_you_mean
+from coartic.text import unknown
 
 
 def builtin_tasks() -> tuple[str, ...]:
@@ -33,9 +33,7 @@ def load_task(name_or_path: str | Path) -> Task:
     reconstructed = task_of(name_or_path)
     if reconstructed is not None:
         return members(reconstructed)[name_or_path]
-    names = ", ".join(builtin_tasks())
-    hint = did_you_mean(name_or_path, builtin_tasks()) or "."
     raise TaskError(
-        f"unknown task {name_or_path!r}{hint} Shipped tasks: {names}. "
+        f"{unknown('task', name_or_path, builtin_tasks())} "
         "A task file's name ends in .toml; an instance is written FAMILY/v1/i017."
     )

@@ -50,7 +50,7 @@ from coartic.tasks.task import (
     address_of,
     parse_task,
 )
-from coartic.text import Line, counted, did_you_mean
+from coartic.text import Line, counted, unknown
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 MOST_ATTEMPTS = 10_000
@@ -487,8 +487,7 @@ def load_family(name: str) -> Family:
     newest = {full_name.partition("/")[0]: full_name for full_name in sorted(files, key=version_in)}
     full = newest.get(name, name)
     if full not in files:
-        hint = did_you_mean(full, files) or ";"
-        raise TaskError(f"unknown family {name!r}{hint} the families are {', '.join(files)}")
+        raise TaskError(unknown("family", full, files))
     return read_family(files[full])
 
 

@@ -15,10 +15,10 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from coartic.errors import CoarticError
-from coartic.inputs import brief_value, read_toml
+from coartic.inputs import brief, brief_value, read_toml
 from coartic.model import PAPER, MotionModel
 from coartic.tasks.task import Task, parse_task
-from coartic.text import did_you_mean
+from coartic.text import did_you_mean, unknown
 
 
 class Choice(BaseModel):
@@ -114,10 +114,7 @@ def load_reading(text: str) -> ChosenReading:
             f"reading {brief_value(text)}: write it as NAME=VALUE, such as ties=right"
         )
     if name not in by_id:
-        raise CoarticError(
-            f"unknown reading {brief_value(name)}; known: {', '.join(by_id)}"
-            f"{did_you_mean(name, by_id)}"
-        )
+        raise CoarticError(unknown("reading", brief(name), by_id))
     reading = by_id[name]
     for choice in reading.choices:
         if choice.is_meant_by(value):
