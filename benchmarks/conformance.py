@@ -133,7 +133,7 @@ class MethodChecks:
         hopeless = hopeless_task(self.tasks[0])
         if self.applies_to(hopeless):
             wanted.append(("hopeless", hopeless, self.job(hopeless, within_reach=False)))
-        runs = performed(self.entry, [job for *_, job in wanted], [task for _, task, _ in wanted])
+        runs = performed([job for *_, job in wanted], [task for _, task, _ in wanted])
         return {(what, task.name): run for (what, task, _), run in zip(wanted, runs, strict=True)}
 
     def each(self, what: str) -> Iterator[tuple[str, Run]]:
@@ -191,7 +191,7 @@ class MethodChecks:
         """The same seed gives the same result."""
         self.compare("again", "same seed on {}, same process")
         last = self.tasks[-1]
-        other = next(performed(self.entry, [self.job(last)], [last]))
+        other = next(performed([self.job(last)], [last]))
         for difference in differences(self.runs["first", last.name], other):
             raise BrokenLawError(f"same seed on {last.name}, another process: {difference}")
         if not self.entry.method.stochastic:

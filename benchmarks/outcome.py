@@ -13,16 +13,14 @@ import numpy as np
 
 from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.provenance import environment, now
-from coartic.benchmarks.registry import Entry
-from coartic.benchmarks.worker import Answer, Outcome, PlainMovement
+from coartic.benchmarks.worker import Answer, Outcome
 from coartic.errors import IncompleteError, SolutionError
 from coartic.learner.kernel import PARTS as TENTHS
 from coartic.learner.learning import CORRECTIONS
-from coartic.method import Information, Meter
+from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
 from coartic.robot import Hand
-from coartic.runs.plan import SEARCH
 from coartic.runs.store import PARTS, RESULTS, Environment, Run
 from coartic.tasks.task import Task, hands_of
 from coartic.text import LONGEST_REASON, plain
@@ -31,7 +29,6 @@ MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
 MOST_STEPS = 1_000_000
 """Movement steps along one solution, its targets visited in order: thousands do."""
-_STATUSES = frozenset({"ok", "infeasible", "solver-failed", "crashed"})
 _EMPTY = dict.fromkeys(RESULTS)
 
 
@@ -39,7 +36,6 @@ def kept(
     identities: Sequence[Mapping[str, Any]],
     answer: Answer | Failure,
     task: Task,
-    entry: Entry,
     model: MotionModel,
 ) -> list[Run]:
     """The runs of a job as they are kept, also of one that failed.
@@ -58,9 +54,9 @@ def kept(
         "process_peak_mb": answer.process_peak_mb,
     }
     made_with = environment() if answer.environment is None else Environment(**answer.environment)
-    outcomes = [believed(outcome, entry) for outcome in answer.outcomes]
+    outcomes = list(answer.outcomes)
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
-    solutions = [list(map(movement_from, outcomes[n].parts[part])) for n, part in parts]
+    solutions = [outcomes[n].parts[part] for n, part in parts]
     executions: list[dict[str, Execution]] = [{} for _ in outcomes]
     for (n, part), execution in zip(parts, scored(task, solutions, model), strict=True):
         if isinstance(execution, Execution):
@@ -113,41 +109,9 @@ def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> So
     return None
 
 
-def believed(outcome: Outcome, entry: Entry) -> Outcome:
-    """An outcome, or what becomes of one that its method cannot have."""
-    used = {*outcome.used}
-    solution = outcome.parts.get("solution", [])
-    if any(kind == "corrective" and target is None for _, _, kind, target, _ in solution):
-        used.add(Information.CORRECTIVE_PROCESS.value)
-    undeclared = sorted(used - {*entry.told})
-    if undeclared:
-        why = f"the method used {undeclared[0]!r}, which it does not declare"
-        return Outcome("crashed", why)
-    if outcome.status not in _STATUSES:
-        return Outcome("solver-failed", f"it states the status {outcome.status!r}")
-    if outcome.bound is not None and not entry.name.startswith(SEARCH):
-        why = f"it states a bound, which is for this project's methods {SEARCH}*"
-        return Outcome("solver-failed", why)
-    if outcome.status != "ok":
-        return replace(outcome, parts={}, bound=None)
-    return replace(outcome, parts={"solution": [], **outcome.parts})
-
-
 def ended(outcome: Outcome, status: str, reason: str) -> Outcome:
     """An outcome whose solution is none."""
     return replace(outcome, status=status, reason=reason, parts={}, bound=None)
-
-
-def movement_from(row: PlainMovement) -> Movement:
-    """A movement as a worker states it."""
-    goal, hand, kind, target, waypoints = row
-    return Movement(
-        goal,
-        hand,  # type: ignore[arg-type]
-        kind,  # type: ignore[arg-type]
-        None if target is None else np.array(target),
-        waypoints=None if waypoints is None else np.array(waypoints),
-    )
 
 
 def run_of(

@@ -8,7 +8,7 @@ from typing import Any
 
 from coartic.benchmarks.outcome import kept
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.registry import Entry, Registry
+from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.worker import Job, job_of
 from coartic.errors import CoarticError
 from coartic.method import Meter
@@ -56,7 +56,7 @@ def trajectory_of(stored: StoredRun) -> Trajectory:
     return trajectory(stored.task, run.movements["solution"], stored.model)
 
 
-def performed(entry: Entry, jobs: Sequence[Job], tasks: Sequence[Task]) -> Iterator[Run]:
+def performed(jobs: Sequence[Job], tasks: Sequence[Task]) -> Iterator[Run]:
     """Runs of one method, each a job of one seed, in this order, in one process of their own."""
     answers = dict(Local(1).perform(jobs))
     for number, (job, task) in enumerate(zip(jobs, tasks, strict=True)):
@@ -64,7 +64,7 @@ def performed(entry: Entry, jobs: Sequence[Job], tasks: Sequence[Task]) -> Itera
             "run_id": "", "suite_seed": 0, "run": 0, "seed": job.seeds[0],
             "time_limit_s": job.time_limit_s,
         }  # fmt: skip
-        yield kept([name], answers[number], task, entry, MotionModel(**job.model))[0]
+        yield kept([name], answers[number], task, MotionModel(**job.model))[0]
 
 
 def performed_again(stored: StoredRun, registered: Registry) -> Run:
@@ -81,7 +81,7 @@ def performed_again(stored: StoredRun, registered: Registry) -> Run:
         trial_budget=stored.trial_budget,
         time_limit_s=stored.run.row["time_limit_s"],
     )
-    return next(performed(entry, [job], [stored.task]))
+    return next(performed([job], [stored.task]))
 
 
 def some_again(folder: Path, count: int, registered: Registry) -> Iterator[tuple[str, list[str]]]:

@@ -256,9 +256,7 @@ class SuitePlan:
             }
             for number in numbers
         ]
-        return kept(
-            identities, answer, self.tasks[cell.task], self.entries[cell.method], plan.model
-        )
+        return kept(identities, answer, self.tasks[cell.task], plan.model)
 
 
 def run_suite(

@@ -29,11 +29,9 @@ from coartic.method import (
 )
 from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import Movement
+from coartic.runs.plan import SEARCH
 from coartic.runs.store import PARTS
 from coartic.tasks.task import Task, parse_task
-
-PlainMovement = tuple[int, str, str, list[float] | None, list[list[float]] | None]
-"""Goal, hand, kind, target and waypoints of a movement."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ class Outcome:
 
     status: str
     reason: str = ""
-    parts: dict[str, list[PlainMovement]] = field(default_factory=dict)
+    parts: dict[str, list[Movement]] = field(default_factory=dict)
     """Its solution, and of a learner first trial and replay."""
     bound: int | None = None
     details: dict[str, Any] = field(default_factory=dict)
@@ -138,7 +136,7 @@ def perform(job: Job) -> Answer:
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    outcomes = [outcome_of(*pair) for pair in zip(results, sessions, strict=True)]
+    outcomes = [outcome_of(job, *pair) for pair in zip(results, sessions, strict=True)]
     return Answer(outcomes, wall, cpu, warm, process_peak_mb())
 
 
@@ -176,7 +174,7 @@ def results_of(
     return method.solve_together(sessions)
 
 
-def outcome_of(result: Any, session: Session) -> Outcome:
+def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
@@ -189,13 +187,13 @@ def outcome_of(result: Any, session: Session) -> Outcome:
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **stated(result, session))
+        return Outcome("ok", **spent, **stated(job.method, result, session))
     except UndeclaredError as error:
         return Outcome("crashed", str(error), **spent)
     except BudgetError as error:
         reason = f"the method did not keep to its budget: {error}"
         return Outcome("crashed", reason, **spent)
-    except (_ResultError, SolutionError) as error:
+    except SolutionError as error:
         return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:
         return Outcome("infeasible", str(error), **spent)
@@ -203,25 +201,27 @@ def outcome_of(result: Any, session: Session) -> Outcome:
         return Outcome("crashed", error_line(error), **spent)
 
 
-class _ResultError(ValueError):
-    """What a method returned is no result."""
-
-
-def stated(result: Any, session: Session) -> dict[str, Any]:
-    """What a result says, as plain data. Raises for what cannot be kept."""
+def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
+    """What a method's result says, as plain data. Raises SolutionError for what cannot be kept."""
     if not isinstance(result, Result):
-        raise _ResultError(f"the method returned {type(result).__name__}, not a Result")
+        raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
+    if result.bound is not None and not method.startswith(SEARCH):
+        raise SolutionError(f"it states a bound, which is for this project's methods {SEARCH}*")
     try:
         session.check_solution(tuple(result.solution))
         parts = {
-            part: [plain_movement(movement) for movement in getattr(result, part)] for part in PARTS
+            part: [plain_movement(movement) for movement in getattr(result, part)]
+            for part in PARTS
+            if part == "solution" or getattr(result, part)
         }
         details = plain_details(result.details)
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise _ResultError(f"the method's result cannot be kept: {error_line(error)}") from None
+        raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {
-        "parts": {part: movements for part, movements in parts.items() if movements},
+        "parts": {
+            part: movements for part, movements in parts.items() if movements or part == "solution"
+        },
         "details": details,
         "bound": bound,
     }
@@ -232,13 +232,13 @@ def plain_details(details: Any) -> dict[str, Any]:
     return dict(json.loads(json.dumps(details, allow_nan=False)))
 
 
-def plain_movement(movement: Movement) -> PlainMovement:
-    """A movement as plain data."""
+def plain_movement(movement: Movement) -> Movement:
+    """A movement of plain numbers, texts and arrays."""
     target, waypoints = movement.target, movement.waypoints
-    return (
+    return Movement(
         int(movement.goal),
-        str(movement.hand),
-        str(movement.kind),
-        None if target is None else np.asarray(target, dtype=np.float64).tolist(),
-        None if waypoints is None else np.asarray(waypoints, dtype=np.float64).tolist(),
+        str(movement.hand),  # type: ignore[arg-type]
+        str(movement.kind),  # type: ignore[arg-type]
+        None if target is None else np.array(target, dtype=np.float64),
+        waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
     )
