@@ -96,5 +96,5 @@ def _remote(job: Job) -> Answer | Failure:
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     ((_, answer),) = Local(1).perform([job])
     if isinstance(answer, Answer):
-        answer.environment = environment()._asdict()
+        answer.environment = environment()
     return answer

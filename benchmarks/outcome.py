@@ -21,7 +21,7 @@ from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
 from coartic.robot import Hand
-from coartic.runs.store import PARTS, RESULTS, Environment, Run
+from coartic.runs.store import PARTS, RESULTS, Run
 from coartic.tasks.task import Task, hands_of
 from coartic.text import LONGEST_REASON, plain
 
@@ -53,7 +53,7 @@ def kept(
         "together": len(identities),
         "process_peak_mb": answer.process_peak_mb,
     }
-    made_with = environment() if answer.environment is None else Environment(**answer.environment)
+    made_with = answer.environment or environment()
     outcomes = list(answer.outcomes)
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
     solutions = [outcomes[n].parts[part] for n, part in parts]
@@ -120,7 +120,7 @@ def run_of(
     executions: Mapping[str, Execution],
     times: Mapping[str, Any],
     task: Task | None = None,
-    made_with: Environment | None = None,
+    made_with: dict[str, Any] | None = None,
 ) -> Run:
     """A run as it is kept."""
     solution = executions.get("solution")

@@ -16,8 +16,6 @@ from typing import Any
 import coartic
 from coartic.learner.learning import threads_for
 from coartic.motion.compiled import PACKAGE, source_fingerprint
-from coartic.runs.plan import hash_of
-from coartic.runs.store import Environment
 from coartic.text import LONGEST_LINE, plain
 from coartic.threads import ONE_THREAD
 
@@ -38,25 +36,19 @@ _LIBRARIES = (
 
 
 @cache
-def environment() -> Environment:
+def environment() -> dict[str, Any]:
     """With what this process makes results: versions, platform, commit."""
-    packages, commit = library_versions(), commit_of_checkout()
-    python = platform.python_version()
-    return Environment(
-        content={
-            "coartic": coartic.__version__,
-            "model_code": source_fingerprint(),
-            "commit": commit,
-            "python": python,
-            "packages": packages,
-            "platform": plain(platform.platform(), LONGEST_LINE),
-            "processor": plain(processor_name(), LONGEST_LINE),
-            "cores": threads_for(-1),
-            "threads": ONE_THREAD,
-        },
-        commit=None if commit is None else commit["id"] + "+" * commit["dirty"],
-        packages=hash_of([python, packages])[:8],
-    )
+    return {
+        "coartic": coartic.__version__,
+        "model_code": source_fingerprint(),
+        "commit": commit_of_checkout(),
+        "python": platform.python_version(),
+        "packages": {name: metadata.version(name) for name in _LIBRARIES},
+        "platform": plain(platform.platform(), LONGEST_LINE),
+        "processor": plain(processor_name(), LONGEST_LINE),
+        "cores": threads_for(-1),
+        "threads": ONE_THREAD,
+    }
 
 
 def now() -> str:
@@ -81,13 +73,6 @@ def process_peak_mb() -> float | None:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
-@cache
-def library_versions() -> dict[str, str]:
-    """Versions of the libraries that results may hang on."""
-    return {name: metadata.version(name) for name in _LIBRARIES}
-
-
-@cache
 def commit_of_checkout() -> dict[str, Any] | None:
     """Commit of the checkout the code runs from and whether it was changed since."""
     root = PACKAGE.parent

@@ -82,6 +82,8 @@ class Progress:
     """Runs performed now."""
     failed: int = 0
     """Of all runs, those that are not ok."""
+    crashed: int = 0
+    """Of all runs, those that crashed."""
 
 
 Watcher = Callable[[Progress, str], None]
@@ -97,8 +99,6 @@ class RunReport:
     progress: Progress
     wall_s: float
     """Seconds from the call until the last run was kept, or nothing found to do."""
-    crashed: int
-    """Runs that crashed, now or before."""
     others: int
     """Runs in the folder that were not asked for."""
 
@@ -169,10 +169,10 @@ class SuitePlan:
                 cell = self.plan.cells[position]
                 progress.done += 1
                 progress.failed += run.status != "ok"
+                progress.crashed += run.status == "crashed"
                 watch(progress, f"{cell.task} {cell.method}")
             wall_s = time.perf_counter() - clock
-            crashed = store.statuses().get("crashed", 0)
-            return RunReport(folder, progress, wall_s, crashed, store.count() - self.plan.size)
+            return RunReport(folder, progress, wall_s, store.count() - self.plan.size)
 
     def missing_runs(
         self, store: Store, retry_failed: bool, redo: bool
@@ -188,6 +188,7 @@ class SuitePlan:
                 missing[position].discard(number)
                 progress.present += 1
                 progress.failed += status != "ok"
+                progress.crashed += status == "crashed"
         return progress, {p: sorted(numbers) for p, numbers in missing.items() if numbers}
 
     def perform_lots(

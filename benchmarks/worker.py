@@ -218,13 +218,7 @@ def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
-    return {
-        "parts": {
-            part: movements for part, movements in parts.items() if movements or part == "solution"
-        },
-        "details": details,
-        "bound": bound,
-    }
+    return {"parts": parts, "details": details, "bound": bound}
 
 
 def plain_details(details: Any) -> dict[str, Any]:

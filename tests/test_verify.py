@@ -24,11 +24,11 @@ from coartic.motion.movement import follow
 from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
 from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
-from coartic.runs.store import FILE, PARTS, RESULTS, Environment, Run, writing
+from coartic.runs.store import FILE, PARTS, RESULTS, Run, writing
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task, uneven_task
 
-NOWHERE = Environment({}, None, "")
+NOWHERE: dict[str, object] = {}
 NARROW = {5: {"other_arm": "still"}, 6: {"base": "y"}}
 
 

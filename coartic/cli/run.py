@@ -79,7 +79,7 @@ def run(
 
         pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
-    if report.crashed:
+    if report.progress.crashed:
         sys.exit(1)
 
 

@@ -26,7 +26,7 @@ from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Movement
 from coartic.robot import Array
-from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
+from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell, hash_of
 from coartic.tasks.task import Task, parse_task
 
 if TYPE_CHECKING:
@@ -153,24 +153,14 @@ PARTS = ("solution", "initial", "replay")
 trial with what it has learned."""
 
 
-class Environment(NamedTuple):
-    """With what something was made."""
-
-    content: dict[str, Any]
-    """Versions, platform, processor, threads, commit."""
-    commit: str | None
-    """Id of the commit, with a plus where files were changed since."""
-    packages: str
-    """Hash of Python's and all libraries' versions."""
-
-
 @dataclass
 class Run:
     """One run as it is stored."""
 
     row: dict[str, Any]
     """Its columns of table ``results``, but for ``setting``."""
-    environment: Environment
+    environment: dict[str, Any]
+    """With what it was made: versions, platform, processor, threads, commit."""
     movements: dict[str, tuple[Movement, ...]] = field(default_factory=dict)
     """By part (:data:`PARTS`); those of a part that there is not are missing."""
     rewards: list[int | None] = field(default_factory=list)
@@ -220,7 +210,7 @@ class Store:
 
     # What was asked for.
 
-    def ask(self, plan: Plan, environment: Environment, command: list[str], date: str) -> None:
+    def ask(self, plan: Plan, environment: dict[str, Any], command: list[str], date: str) -> None:
         """Say what is asked for from here on; runs of earlier plans stay, and are not shown."""
         with self._writing():
             for table in ("suite", "tasks", "methods", "cells"):
@@ -331,11 +321,6 @@ class Store:
         order = "ORDER BY position, results.run"
         yield from map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR} {order}"))
 
-    def statuses(self) -> dict[str, int]:
-        """How many of the runs asked for ended in which way."""
-        rows = self._db.execute(f"SELECT status, count(*) {_ASKED_FOR} GROUP BY status")
-        return {status: count for status, count in rows}  # noqa: C416
-
     def count(self) -> int:
         """Number of runs, asked for or not."""
         return int(self._db.execute("SELECT count(*) FROM results").fetchone()[0])
@@ -399,11 +384,7 @@ class Store:
         rewards = [] if blob is None else unpacked(blob["rewards"]).tolist()
         run = Run(
             {name: row[name] for name in RESULTS if name not in ("setting", "environment")},
-            Environment(
-                json.loads(environment["content"]),
-                environment["commit_id"],
-                environment["packages"],
-            ),
+            json.loads(environment["content"]),
             {part: movements for part, movements in parts.items() if movements},
             [None if reward == FAILED else reward for reward in rewards],
         )
@@ -487,11 +468,16 @@ class Store:
             self._settings[key] = self._insert("settings", setting) if row is None else row["id"]
         return self._settings[key]
 
-    def _environment(self, environment: Environment) -> int:
-        text = to_json(environment.content, sort_keys=True)
+    def _environment(self, environment: dict[str, Any]) -> int:
+        text = to_json(environment, sort_keys=True)
         if text not in self._environments:
             row = self._one("SELECT id FROM environments WHERE content = ?", text)
-            facts = {"commit_id": environment.commit, "packages": environment.packages}
+            commit = environment.get("commit")
+            versions = [environment.get("python"), environment.get("packages")]
+            facts = {
+                "commit_id": commit and commit["id"] + "+" * commit["dirty"],
+                "packages": hash_of(versions)[:8],
+            }
             self._environments[text] = (
                 self._insert("environments", {"content": text} | facts)
                 if row is None
