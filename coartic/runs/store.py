@@ -196,8 +196,6 @@ class Store:
         self.folder = folder
         self._db = connection
         self._cells: list[tuple[int, tuple[str, ...]]] = []  # setting, and joints in their order
-        self._settings: dict[tuple[str, str], int] = {}
-        self._environments: dict[str, int] = {}
 
     def __enter__(self) -> Store:
         return self
@@ -254,12 +252,13 @@ class Store:
                     "trial_budget": plan.trial_budget,
                     "told": ", ".join(method.told),
                 }
-                self._cells.append((self._setting(setting), joints[cell.task]))
+                number = self._id_of("settings", setting, "asked", "code")
+                self._cells.append((number, joints[cell.task]))
                 self._insert(
                     "cells",
                     {
                         "position": position,
-                        "setting": self._cells[-1][0],
+                        "setting": number,
                         "variant": cell.variant,
                         "parameters": to_json(cell.parameters),
                         "runs": cell.runs,
@@ -318,8 +317,7 @@ class Store:
         """Position of the cell, number, status and time limit of the runs asked for that there
         are."""
         columns = "position, results.run, status, time_limit_s"
-        order = "ORDER BY position, results.run"
-        yield from map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR} {order}"))
+        yield from map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}"))
 
     def count(self) -> int:
         """Number of runs, asked for or not."""
@@ -439,12 +437,8 @@ class Store:
             with self._db:
                 self._db.execute("BEGIN")
                 yield
-        except BaseException as error:
-            self._environments.clear()
-            self._settings.clear()
-            if isinstance(error, sqlite3.OperationalError):
-                raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
-            raise
+        except sqlite3.OperationalError as error:
+            raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
         names = ", ".join(f'"{name}"' for name in row)
@@ -461,29 +455,21 @@ class Store:
         row: sqlite3.Row | None = self._db.execute(query, values).fetchone()
         return row
 
-    def _setting(self, setting: dict[str, Any]) -> int:
-        key = setting["asked"], setting["code"]
-        if key not in self._settings:
-            row = self._one("SELECT id FROM settings WHERE asked = ? AND code = ?", *key)
-            self._settings[key] = self._insert("settings", setting) if row is None else row["id"]
-        return self._settings[key]
+    def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
+        """Id of the row with these keys, which is inserted where there is none."""
+        condition = " AND ".join(f"{key} = ?" for key in keys)
+        query = f"SELECT id FROM {table} WHERE {condition}"
+        stored = self._one(query, *(row[key] for key in keys))
+        return self._insert(table, row) if stored is None else int(stored["id"])
 
-    def _environment(self, environment: dict[str, Any]) -> int:
-        text = to_json(environment, sort_keys=True)
-        if text not in self._environments:
-            row = self._one("SELECT id FROM environments WHERE content = ?", text)
-            commit = environment.get("commit")
-            versions = [environment.get("python"), environment.get("packages")]
-            facts = {
-                "commit_id": commit and commit["id"] + "+" * commit["dirty"],
-                "packages": hash_of(versions)[:8],
-            }
-            self._environments[text] = (
-                self._insert("environments", {"content": text} | facts)
-                if row is None
-                else row["id"]
-            )
-        return self._environments[text]
+    def _environment(self, content: dict[str, Any]) -> int:
+        commit = content.get("commit")
+        row = {
+            "content": to_json(content, sort_keys=True),
+            "commit_id": commit and commit["id"] + "+" * commit["dirty"],
+            "packages": hash_of([content.get("python"), content.get("packages")])[:8],
+        }
+        return self._id_of("environments", row, "content")
 
     def _add_joints(self, names: Iterable[str]) -> None:
         """Columns for these joints, and the views anew, which show them."""
