@@ -348,8 +348,7 @@ def plan_cells(
     chosen = load_readings([*suite.readings, *readings])
     model, read = model_under(chosen), condition_under(chosen)
     trials = suite.trials if trials is None else trials
-    planned: list[PlannedCell] = []
-    names: dict[str, PlannedCell] = {}
+    planned: dict[str, PlannedCell] = {}
     entries: dict[str, Entry] = {}
     tasks: dict[str, Task] = {}
     for cell in cells:
@@ -376,14 +375,10 @@ def plan_cells(
             complete=complete,
             runs=count if entry.method.stochastic else 1,
         )
-        first = names.setdefault(hash_of([name, entry.name, complete]), planned_cell)
-        if first is not planned_cell:
-            raise CoarticError(
-                f"{first.label!r} and {planned_cell.label!r} on task {name!r} are the same runs; "
-                "leave one of them out"
-            )
-        planned.append(planned_cell)
-    if (count := sum(cell.runs for cell in planned)) > MOST_PLANNED:
+        # What is written in two ways is performed once.
+        planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
+    cells_once = tuple(planned.values())
+    if (count := sum(cell.runs for cell in cells_once)) > MOST_PLANNED:
         raise CoarticError(
             f"{count:_} runs are planned; at most {MOST_PLANNED:_} can be run at once"
         )
@@ -391,13 +386,13 @@ def plan_cells(
         suite=suite.name,
         seed=seed,
         runs=runs or suite.runs,
-        trials=max((trials_in(cell.complete) for cell in planned), default=0),
+        trials=max((trials_in(cell.complete) for cell in cells_once), default=0),
         readings=tuple(map(str, chosen)),
         time_limit_s=suite.time_limit_s if time_limit_s is None else time_limit_s,
         trial_budget=trial_budget,
         tasks={name: task.model_dump(mode="json") for name, task in tasks.items()},
         methods={name: entry.declared for name, entry in entries.items()},
-        cells=tuple(planned),
+        cells=cells_once,
     )
     return SuitePlan(plan, entries, tasks)
 

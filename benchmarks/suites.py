@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -47,42 +47,21 @@ from coartic.runs.plan import label_of, variant_of
 from coartic.tasks.families import named_by
 from coartic.tasks.members import members, task_of
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
-from coartic.text import Line, plain, unknown
+from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 ALL = "*"
 _MEMBERS = "-*"
-LONGEST_WORD = 100
-"""Characters of a parameter's value."""
-LARGEST_INTEGER = 2**53
-"""Of a parameter: up to here every program reads the same number."""
-MOST_PARAMETERS = 50
-"""Of a block of cells."""
 Scalar = bool | int | float | str
 
 
 def plain_scalar(value: Any) -> Scalar:
-    """A value that prints in one way, on one line, and reads as what was written."""
-    match value:
-        case bool():
-            is_plain = True
-        case int():
-            is_plain = abs(value) <= LARGEST_INTEGER
-        case float():
-            is_plain = math.isfinite(value)
-        case str():
-            is_plain = plain(value, LONGEST_WORD) == value
-        case _:
-            is_plain = False
-    if not is_plain:
-        raise PydanticCustomError(
-            "scalar",
-            "should be true, false, a finite number (integers up to 2^53), "
-            "or one line of up to {most} printable characters",
-            {"most": LONGEST_WORD},
-        )
-    scalar: Scalar = value
-    return scalar
+    """The value of a parameter."""
+    is_finite = not isinstance(value, float) or math.isfinite(value)
+    if isinstance(value, bool | int | float | str) and is_finite:
+        return value
+    problem = "should be true, false, a finite number or a text"
+    raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
 _Value = Annotated[Scalar, PlainValidator(plain_scalar)]
@@ -114,11 +93,8 @@ class Block(SuitePart):
     """Whether the base moves in both directions, whatever the task locks."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs per cell, where it is not the suite's number."""
-    parameters: Annotated[dict[str, _Value], Field(max_length=MOST_PARAMETERS)] = {}
-    grid: Annotated[
-        dict[str, Annotated[tuple[_Value, ...], Field(min_length=1, max_length=MOST_CELLS)]],
-        Field(max_length=MOST_PARAMETERS),
-    ] = {}
+    parameters: dict[str, _Value] = {}
+    grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = {}
 
     @model_validator(mode="after")
     def says_everything_once(self) -> Block:
@@ -129,10 +105,6 @@ class Block(SuitePart):
             if len(set(values)) < len(values):
                 raise sentence(f"{brief_value(name)} has the same value twice in the grid")
         return self
-
-    def methods_among(self, registered: Iterable[str]) -> Iterable[str]:
-        """Ids of the methods that the block asks for."""
-        return registered if ALL in self.methods else self.methods
 
     def tasks_among(self, user_tasks: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
@@ -150,8 +122,6 @@ class Block(SuitePart):
             else:
                 stands_for = named_by(name)
             names |= dict.fromkeys(stands_for)
-            if len(names) > MOST_CELLS:  # which is said where all blocks are counted
-                break
         return list(names)
 
 
@@ -248,29 +218,28 @@ def select_cells(
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named; so does an instance of a
     family that ``tasks`` names, alone or in a range, or a member of an ensemble, and the suite
-    does not. Raises CoarticError
-    for unknown names, for a task file whose name is taken, for parameters that a method
-    does not take, for more than :data:`MOST_CELLS` cells, for different cells that would go
-    by one name, and where nothing is left to run.
+    does not. Raises CoarticError for unknown names, for a task file whose name is taken, for
+    parameters that a method does not take, for more than :data:`MOST_CELLS` cells, for different
+    cells that would go by one name, and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
     files = [Path(name) for name in tasks if name.endswith(".toml")]
     named = [name for name in tasks if not name.endswith(".toml")]
-    user_tasks = tasks_of_files(files)
-    tasks = [*itertools.chain(*map(named_by, named)), *user_tasks]
     user_tasks = tasks_of_files([*task_files, *files])
+    tasks = [*itertools.chain(*map(named_by, named)), *(load_task(path).name for path in files)]
     there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
     user_tasks |= {
         name: load_task(name)
         for name in tasks
         if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
     }
-    check_size(suite, registered, user_tasks)
-    cells = [
-        cell
-        for block in suite.cells
-        for cell in cells_of_block(suite, block, registered, user_tasks)
-    ]
+    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
+    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
+    if len(cells) > MOST_CELLS:
+        raise CoarticError(
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
+            "(tasks x moves x methods x grid)"
+        )
     added, refused = added_cells(cells, registered, methods, user_tasks)
     cells = distinct([*cells, *added])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
@@ -300,10 +269,8 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     so. Raises CoarticError where there is none.
     """
     name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
-    named = (
-        [method for method in registered if fnmatchcase(method, name)] if "*" in name else [name]
-    )
-    if not named or named[0] not in registered:
+    named = [method for method in registered if fnmatchcase(method, name)]
+    if not named:
         raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *VARIANTS]))
     return named
 
@@ -321,22 +288,6 @@ def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
             raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
         files[task.name], user_tasks[task.name] = path, task
     return user_tasks
-
-
-def check_size(suite: Suite, registered: Registry, user_tasks: Mapping[str, Task]) -> None:
-    """Refuse a suite of too many cells before they are made."""
-    count = sum(
-        len(block.tasks_among(user_tasks))
-        * (1 if block.move is None else len(block.move.by))
-        * len(list(block.methods_among(registered)))
-        * math.prod(map(len, block.grid.values()))
-        for block in suite.cells
-    )
-    if count > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for {count:_} cells (tasks x moves x methods x grid); "
-            f"at most {MOST_CELLS:_} can be run at once"
-        )
 
 
 def added_cells(
@@ -388,12 +339,12 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
 
 def cells_of_block(
     suite: Suite, block: Block, registered: Registry, user_tasks: Mapping[str, Task]
-) -> list[Cell]:
+) -> Iterator[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
         if name not in registered and name != ALL:
             raise CoarticError(unknown(f"method of suite {suite.name!r}", name, registered))
-    cells = []
+    methods = registered if ALL in block.methods else block.methods
     for name in block.tasks_among(user_tasks):
         if block.move is not None and ALL in block.tasks and name in user_tasks:
             continue
@@ -401,7 +352,7 @@ def cells_of_block(
         if block.free_base:
             task = with_free_base(suite, task)
         variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
-        for variant, method in itertools.product(variants, block.methods_among(registered)):
+        for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
             if reason is not None and ALL not in (*block.methods, *block.tasks):
                 raise CoarticError(f"suite {suite.name!r}: {reason}")
@@ -411,10 +362,7 @@ def cells_of_block(
                 point = dict(zip(block.grid, values, strict=True))
                 parameters = {**block.parameters, **point}
                 registered[method].complete(parameters)
-                cells.append(
-                    Cell(variant, registered[method], tuple(parameters.items()), block.runs)
-                )
-    return cells
+                yield Cell(variant, registered[method], tuple(parameters.items()), block.runs)
 
 
 def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:

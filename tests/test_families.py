@@ -109,7 +109,7 @@ def test_a_family_is_there_whatever_another_file_holds(tmp_path, monkeypatch):
     monkeypatch.setattr(coartic.tasks.families, "FAMILY_FOLDER", tmp_path)
     assert load_family("two-armed/v1") == shipped
     with pytest.raises(TaskError, match="broken.v1.toml: is not valid TOML"):
-        load_family("broken")
+        load_family("broken/v1")
 
 
 @pytest.mark.parametrize("name", RELEASED)
@@ -203,7 +203,7 @@ BROKEN = {
     "outside": lambda: changed(good(), 1, (7001, 0)),
     "overlap": lambda: changed(good(), 1, (5063 + 298, -303 + 30)),
     "reach": lambda: replace(changed(good(), 1, (3888, 3901)), base="rail", family=good(
-        region=load_family("long").region.model_copy(update={"y": (-9000, 9000)})).family),
+        region=load_family("long/v1").region.model_copy(update={"y": (-9000, 9000)})).family),
     "straight": lambda: replace(good(), angles=good().angles | {"left": (1800, 199, -199, 0)}),
     "start-hit": lambda: changed(good(), 2, at_hand(good())),
     CORRECTIVE: lambda: replace(good(bent=0), base="locked", angles=STRAIGHT, goals=ALONG),

@@ -137,10 +137,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
-    elif name in families() or name in {family.partition("/")[0] for family in families()}:
-        family = next(
-            each for key, each in families().items() if name in (key, key.partition("/")[0])
-        )
+    elif name in families() or f"{name}/v1" in families():
+        family = families().get(name) or families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
         yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
         yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"

@@ -482,19 +482,11 @@ def family_name(path: Path) -> str:
 
 
 def load_family(name: str) -> Family:
-    """A family by name, with its version or, without, the newest. Raises TaskError."""
+    """A family by name with version, as ``two-armed/v1``. Raises TaskError."""
     files = family_files()
-    newest = {full_name.partition("/")[0]: full_name for full_name in sorted(files, key=version_in)}
-    full = newest.get(name, name)
-    if full not in files:
-        raise TaskError(unknown("family", full, files))
-    return read_family(files[full])
-
-
-def version_in(name: str) -> int:
-    """The version in a family's name, 2 of ``two-armed/v2``; 0 where it is none."""
-    number = name.partition("/v")[2]
-    return int(number) if number.isdecimal() else 0
+    if name not in files:
+        raise TaskError(unknown("family", name, files))
+    return read_family(files[name])
 
 
 @cache
