@@ -14,7 +14,7 @@ import numpy as np
 from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.worker import Answer, Outcome
-from coartic.errors import IncompleteError, SolutionError
+from coartic.errors import SolutionError
 from coartic.learner.kernel import PARTS as TENTHS
 from coartic.learner.learning import CORRECTIONS
 from coartic.method import Meter
@@ -59,13 +59,13 @@ def kept(
     solutions = [outcomes[n].parts[part] for n, part in parts]
     executions: list[dict[str, Execution]] = [{} for _ in outcomes]
     for (n, part), execution in zip(parts, scored(task, solutions, model), strict=True):
-        if isinstance(execution, Execution):
-            executions[n][part] = execution
-        elif isinstance(execution, IncompleteError):
-            outcomes[n] = ended(outcomes[n], "infeasible", str(execution))
-        else:
+        if isinstance(execution, Exception):
             why = f"the solution cannot be executed: {execution}"
             outcomes[n] = ended(outcomes[n], "solver-failed", why)
+        elif execution.completed:
+            executions[n][part] = execution
+        else:
+            outcomes[n] = ended(outcomes[n], "infeasible", execution.reason)
     return [
         run_of(identity, outcome, parts if outcome.status == "ok" else {}, times, task, made_with)
         for identity, outcome, parts in zip(identities, outcomes, executions, strict=True)
@@ -77,19 +77,12 @@ def scored(
 ) -> list[Execution | Exception]:
     """Execute solutions side by side: the only scores that count.
 
-    In place of an execution, a SolutionError for a solution that breaks the task's rules, an
-    IncompleteError for one that does not hit every goal.
+    In place of an execution, the error of a solution that breaks the task's rules.
     """
     errors = [too_long(task, solution, model) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(task, short, model=model))
-    outcomes: list[Execution | Exception] = []
-    for error in errors:
-        outcome = next(executions) if error is None else error
-        if isinstance(outcome, Execution) and not outcome.completed:
-            outcome = IncompleteError(outcome.reason)
-        outcomes.append(outcome)
-    return outcomes
+    return [next(executions) if error is None else error for error in errors]
 
 
 def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:

@@ -107,13 +107,15 @@ class Entry:
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, defaults included, as plain data; CoarticError names the ones that are
         wrong."""
-        fields = self.method.Parameters.model_fields
+        names = list(self.method.Parameters.model_fields)
         try:
             typed = self.with_parameters(parameters).parameters
             complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
         except ValidationError as error:
-            wrong, names = problems_inline(error, fields), ", ".join(fields) or "none"
-            raise CoarticError(f"method {self.name!r}: {wrong} (its parameters: {names})") from None
+            wrong, listed = problems_inline(error, names), ", ".join(names) or "none"
+            raise CoarticError(
+                f"method {self.name!r}: {wrong} (its parameters: {listed})"
+            ) from None
         return complete
 
     def with_parameters(self, parameters: Mapping[str, Any]) -> Method:

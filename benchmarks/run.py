@@ -287,11 +287,14 @@ def plan_suite(
     trials: int | None = None,
     seed: int = 0,
     select: Selection = ALL_OF_IT,
+    cells: Iterable[Cell] | None = None,
     time_limit_s: float | None = None,
     trial_budget: int | None = None,
     readings: Sequence[str] = (),
 ) -> SuitePlan:
     """Every run of a suite: a shipped one by name, a file by path (``.toml``), or a Suite.
+
+    ``cells`` made by hand stand in place of the suite's and of what is selected of them.
 
     ``runs`` per cell, ``trials`` per run and the time limit are the suite's own by default.
     ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
@@ -302,37 +305,14 @@ def plan_suite(
     check_list("readings", readings)
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
-    cells = select_cells(
-        suite,
-        registry(map(Path, select.method_files)),
-        tasks=select.tasks,
-        methods=select.methods,
-        task_files=[Path(path) for path in select.task_files],
-    )
-    return plan_cells(
-        suite,
-        cells,
-        runs=runs,
-        trials=trials,
-        seed=seed,
-        time_limit_s=time_limit_s,
-        trial_budget=trial_budget,
-        readings=readings,
-    )
-
-
-def plan_cells(
-    suite: Suite,
-    cells: Iterable[Cell],
-    *,
-    runs: int | None = None,
-    trials: int | None = None,
-    seed: int = 0,
-    time_limit_s: float | None = None,
-    trial_budget: int | None = None,
-    readings: Sequence[str] = (),
-) -> SuitePlan:
-    """As :func:`plan_suite`, of cells made by hand in place of the suite's."""
+    if cells is None:
+        cells = select_cells(
+            suite,
+            registry(map(Path, select.method_files)),
+            tasks=select.tasks,
+            methods=select.methods,
+            task_files=[Path(path) for path in select.task_files],
+        )
     for name, number, least, most in (
         ("runs", runs, 1, MOST_RUNS),
         ("trials", trials, 1, MOST_TRIALS),

@@ -17,10 +17,6 @@ class SolutionError(CoarticError):
     """A solution that breaks the rules of its task."""
 
 
-class IncompleteError(SolutionError):
-    """A solution that, executed, does not hit every goal."""
-
-
 class NotApplicableError(CoarticError):
     """A method asked to run on a task it does not apply to."""
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
     from pydantic_core import ErrorDetails
 
-MOST_BYTES = 1_000_000
-"""Of a file: a thousand times a usual task, and parsed within a second or so."""
 MOST_CELLS = 10_000
 """Of a suite: sixty times the largest one shipped."""
 MOST_RUNS = 1_000_000
@@ -51,11 +49,9 @@ _BRIEF = 80  # characters of a value in a sentence
 
 
 def read_text(path: str | Path, *, error: type[CoarticError] = CoarticError) -> str:
-    """The text of a file in UTF-8. Raises ``error`` where there is none, or it is very long."""
+    """The text of a file in UTF-8. Raises ``error`` where there is none."""
     shown = plain(str(path))
     try:
-        if Path(path).stat().st_size > MOST_BYTES:
-            raise error(f"{shown}: is longer than {MOST_BYTES:_} bytes, the most that is read")
         return Path(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise error(f"{shown}: is not a text file in UTF-8") from None
@@ -82,10 +78,7 @@ def brief(text: str) -> str:
 
 def brief_value(value: object) -> str:
     """A value as it would be written in Python, as :func:`brief` shows it."""
-    try:
-        return brief(repr(value))
-    except ValueError:  # Python's own bound, which hexadecimal input evades
-        return "a number of more than 4300 digits"
+    return brief(repr(value))
 
 
 def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
@@ -101,11 +94,9 @@ def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> s
     return "\n".join(lines)
 
 
-def problems_inline(error: ValidationError, keys: Iterable[str] = (), most: int = 3) -> str:
-    """The same as part of a sentence, the first ``most`` of them."""
-    details, keys = causes(error), list(keys)
-    shown = "; ".join(plain(explained(detail, keys)) for detail in details[:most])
-    return shown + (f" and {len(details) - most} more" if len(details) > most else "")
+def problems_inline(error: ValidationError, keys: Sequence[str]) -> str:
+    """The same as part of a sentence."""
+    return "; ".join(plain(explained(detail, keys)) for detail in causes(error)[:_SHOWN])
 
 
 def causes(error: ValidationError) -> list[ErrorDetails]:

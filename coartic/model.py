@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Integral
 from typing import NamedTuple
 
@@ -46,6 +47,14 @@ class MotionModel(NamedTuple):
 
 PAPER = MotionModel()
 _KINDS: dict[type, type | tuple[type, ...]] = {bool: bool, int: Integral, float: (float, int)}
+_BOUNDS = {
+    "step": (1e-6, 1e6),
+    "arrival_tolerance": (0.0, 1e6),
+    "gain": (1e-6, 1e6),
+    "correction_tolerance": (1e-6, 1e6),
+    "max_iterations": (0, math.inf),
+    "arrival_tick": (0, 1),
+}
 
 
 def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
@@ -60,18 +69,10 @@ def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionM
         kind = type(getattr(PAPER, name))
         if not isinstance(value, _KINDS[kind]) or isinstance(value, bool) != (kind is bool):
             raise TypeError(f"model.{name} is {value!r}; it must be of type {kind.__name__}")
-    for name in ("step", "gain", "correction_tolerance"):
+    for name, (least, most) in _BOUNDS.items():
         value = getattr(model, name)
-        if not 1e-6 <= value <= 1e6:
-            raise ValueError(f"model.{name} is {value}; it must be between 1e-6 and 1e6")
-    if not 0.0 <= model.arrival_tolerance <= 1e6:
-        raise ValueError(
-            f"model.arrival_tolerance is {model.arrival_tolerance}; it must be 0 to 1e6"
-        )
-    if model.arrival_tick not in (0, 1):
-        raise ValueError(f"model.arrival_tick is {model.arrival_tick}; it must be 0 or 1")
-    if model.max_iterations < 0:
-        raise ValueError(f"model.max_iterations is {model.max_iterations}; it must not be negative")
+        if not least <= value <= most:
+            raise ValueError(f"model.{name} is {value}; it must be from {least:g} to {most:g}")
     if radius is not None and model.correction_tolerance >= radius:
         raise ValueError(
             f"model.correction_tolerance {model.correction_tolerance} is not below the goals' "

@@ -9,7 +9,6 @@ through :func:`one_line` wherever it comes from: each language escapes its own m
 from __future__ import annotations
 
 import difflib
-import re
 import unicodedata
 from collections.abc import Iterable
 from typing import Annotated
@@ -22,13 +21,12 @@ LONGEST_LINE = 500
 LONGEST_REASON = 2000
 """Characters of a reason that is kept."""
 _MOST_NAMED = 12  # in a sentence
-_DOUBTFUL = re.compile("[^ -~]")  # the rest prints
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Text as one printable line (:func:`one_line`) of at most ``most`` characters."""
-    shown = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
-    return shown if len(shown) <= most else shown[: most - 1] + "…"
+    line = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
+    return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def one_line(text: str) -> str:
@@ -37,18 +35,20 @@ def one_line(text: str) -> str:
     Lines are joined by `` | ``; what else does not print (control characters, escape sequences,
     marks that turn the direction of writing) is shown as its escape, such as ``\\x1b``.
     """
-    if is_printable_line(text):
+    if text.isprintable() or all(map(prints, text)):
         return text
-    return " | ".join(printed(part.strip()) for part in text.splitlines() if part.strip())
+    parts = (part.strip() for part in text.splitlines())
+    return " | ".join("".join(map(shown, part)) for part in parts if part)
 
 
-def printed(text: str) -> str:
-    """Text with an escape for every character that does not print, line breaks among them."""
+def prints(c: str) -> bool:
+    """Whether a character prints."""
+    return c.isprintable() or unicodedata.category(c) == "Zs"
 
-    def shown(match: re.Match[str]) -> str:
-        return match[0] if prints(match[0]) else match[0].encode("unicode_escape").decode()
 
-    return _DOUBTFUL.sub(shown, text)
+def shown(c: str) -> str:
+    """A character, or its escape where it does not print."""
+    return c if prints(c) else c.encode("unicode_escape").decode()
 
 
 def counted(count: int, thing: str) -> str:
@@ -73,25 +73,14 @@ def unknown(kind: str, name: str, names: Iterable[str]) -> str:
     )
 
 
-def is_printable_line(text: str) -> bool:
-    """Whether a text prints on one line."""
-    return text.isprintable() or all(map(prints, text))
-
-
-def prints(c: str) -> bool:
-    """Whether a character prints."""
-    return c.isprintable() or unicodedata.category(c) == "Zs"
-
-
 def refuse_unprintable(text: str) -> str:
     """The text itself; a validation error where it is not one printable line."""
-    for c in "" if text.isprintable() else text:
+    for c in text:
         if not prints(c):
-            escape = c.encode("unicode_escape").decode()
             raise PydanticCustomError(
                 "not_plain",
                 "should be one line of printable text, without {escape}",
-                {"escape": escape},
+                {"escape": shown(c)},
             )
     return text
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +29,21 @@ def at_least(least: int, most: int | None = None) -> Callable[[str], int]:
         return number
 
     return parse
+
+
+def processes(text: str) -> int:
+    """Reads a number of processes, which is -1 for one for each core."""
+    if (number := at_least(-1)(text)) == 0:
+        raise typer.BadParameter("give a number of processes, or -1 for one for each core.")
+    return number
+
+
+def seconds(text: str) -> float:
+    """Reads how long a run may take."""
+    with suppress(ValueError):
+        if 0 < float(text) <= MOST_SECONDS:
+            return float(text)
+    raise typer.BadParameter(f"{text} is not a number above 0 and up to {MOST_SECONDS:_}.")
 
 
 def _suites() -> Iterable[str]:
@@ -111,7 +127,7 @@ Trials = Annotated[
     int | None, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
 ]
 Jobs = Annotated[
-    int, typer.Option(parser=at_least(-1), metavar="N", help="Processes; -1 is one for each core.")
+    int, typer.Option(parser=processes, metavar="N", help="Processes; -1 is one for each core.")
 ]
 Tasks = Annotated[
     str | None,
@@ -141,7 +157,8 @@ MethodFiles = Annotated[
 ]
 Seed = Annotated[int, typer.Option(parser=at_least(0), metavar="N", help="Seed of the suite.")]
 TimeLimit = Annotated[
-    float | None, typer.Option(metavar="SECONDS", help="Longest that a run may take.")
+    float | None,
+    typer.Option(parser=seconds, metavar="SECONDS", help="Longest that a run may take."),
 ]
 TrialBudget = Annotated[
     int | None,
@@ -166,14 +183,3 @@ def names_in(text: str | None, option: str) -> list[str]:
     if not all(names):
         raise CoarticError(f"{option} {text!r} has an empty name. Write for example a,b.")
     return names
-
-
-def check_numbers(jobs: int, time_limit: float | None) -> None:
-    """Raises CoarticError for what the options' bounds let pass."""
-    if jobs == 0:
-        raise CoarticError("--jobs 0: give a number of processes, or -1 for one for each core.")
-    if time_limit is not None and not 0 < time_limit <= MOST_SECONDS:
-        raise CoarticError(
-            f"--time-limit {time_limit:g}: give a number of seconds above 0 and up to "
-            f"{MOST_SECONDS:_}."
-        )

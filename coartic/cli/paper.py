@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import at_least, check_numbers
+from coartic.cli.arguments import at_least
 from coartic.cli.terminal import say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import check_folder, folder_named, publish
@@ -57,7 +57,6 @@ def readings(
         return
     from coartic.analysis.reconstruction.readings import combinations, judge_readings
 
-    check_numbers(jobs, None)
     folder = checked_folder(judge, ["readings.csv"], "--judge")
     table = judge_readings(
         combinations(pairs),
@@ -91,7 +90,6 @@ def goals(
     from coartic.analysis.reconstruction.ensemble import reconstruct
     from coartic.analysis.reconstruction.search import search_for
 
-    check_numbers(jobs, None)
     names = [f"{task}-members.csv", f"{task}-tried.csv"]
     search = search_for(task, readings=tuple(reading or ()), jobs=jobs)
     out = checked_folder(folder, names)
@@ -121,7 +119,6 @@ def results(
     """Compare every printed result of a task with fresh runs."""
     from coartic.analysis.reconstruction.scoring import beside_printed
 
-    check_numbers(jobs, None)
     folder = None if out is None else checked_folder(out, ["printed.csv"])
     table = beside_printed(
         tasks,
@@ -155,7 +152,6 @@ def claims(
     from coartic.analysis.figures.robustness import specification_curve, verdicts
     from coartic.analysis.reconstruction.robustness import judged_specifications, shares
 
-    check_numbers(jobs, None)
     tables = ("specifications.csv", "shares.csv")
     pictures = [f"{name}{kind}" for name in ("verdicts", "specification-curve") for kind in FORMATS]
     folder = checked_folder(out, [*tables, *pictures])

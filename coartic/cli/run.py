@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import check_numbers, names_in
+from coartic.cli.arguments import names_in
 from coartic.cli.terminal import performing, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -48,7 +48,6 @@ def run(
     from coartic.benchmarks.run import Selection, plan_suite
     from coartic.benchmarks.suites import load_suite
 
-    check_numbers(jobs, time_limit)
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")

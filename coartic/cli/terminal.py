@@ -128,40 +128,10 @@ _FROM_COMPILED = frozenset({"numba", "llvmlite", "pydantic"})
 signal there, makes another one of it, or crashes."""
 
 
-class Interrupts:
-    """Until they end, Ctrl-C is a KeyboardInterrupt that does not get lost."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._before = signal.getsignal(signal.SIGINT)
-        if self._before is not signal.SIG_IGN:  # as it is in the background
-            signal.signal(signal.SIGINT, self._interrupt)
-
-    def _interrupt(self, _: int, frame: FrameType | None) -> None:
-        self.asked = True
-        while frame is not None:
-            if frame.f_globals.get("__name__", "").partition(".")[0] in _FROM_COMPILED:
-                return  # until the next check
-            frame = frame.f_back
-        raise KeyboardInterrupt
-
-    def check(self) -> None:
-        """Raise again what was raised.
-
-        An exception that a signal raises in a destructor or a callback is printed and dropped.
-        """
-        if self.asked:
-            raise KeyboardInterrupt
-
-    def end(self) -> None:
-        """From here on Ctrl-C is what it was before."""
-        signal.signal(signal.SIGINT, self._before)
-
-
 class Display:
     """Runs done, failures and time left: live on a terminal, plain lines elsewhere.
 
-    While the runs are performed, Ctrl-C is a KeyboardInterrupt.
+    While the runs are performed, Ctrl-C is a KeyboardInterrupt that does not get lost.
     """
 
     EVERY_S = 30.0  # between plain lines
@@ -171,6 +141,7 @@ class Display:
         from rich.console import Console
 
         self.done = 0
+        self.interrupted = False
         self._suite = suite
         self._console = Console(stderr=True, **_AS_IT_IS)
         self._bar = progress.Progress(
@@ -186,17 +157,22 @@ class Display:
         self._started = self._last = time.monotonic()  # set anew when work begins
 
     def __enter__(self) -> Display:
-        self._interrupts = Interrupts()
+        self._before = signal.getsignal(signal.SIGINT)
+        if self._before is not signal.SIG_IGN:  # as it is in the background
+            signal.signal(signal.SIGINT, self._interrupt)
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-        self._interrupts.end()
+        signal.signal(signal.SIGINT, self._before)
 
-    @property
-    def interrupted(self) -> bool:
-        """Whether there was a Ctrl-C, whatever became of its exception."""
-        return self._interrupts.asked
+    def _interrupt(self, _: int, frame: FrameType | None) -> None:
+        self.interrupted = True
+        while frame is not None:
+            if frame.f_globals.get("__name__", "").partition(".")[0] in _FROM_COMPILED:
+                return  # until the next update
+            frame = frame.f_back
+        raise KeyboardInterrupt
 
     def close(self) -> None:
         """Leave the terminal as it was."""
@@ -206,7 +182,8 @@ class Display:
     def update(self, progress: Progress, what: str) -> None:
         """Show how far the plan is, and what was run last."""
         self._show(progress, what)
-        self._interrupts.check()
+        if self.interrupted:  # and the exception was lost, as in a destructor
+            raise KeyboardInterrupt
 
     def _show(self, progress: Progress, what: str) -> None:
         self.done = progress.done

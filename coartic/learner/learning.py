@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from numbers import Integral
@@ -206,13 +206,11 @@ def learn_many(
     trials: int = TRIALS,
     model: MotionModel = PAPER,
     jobs: int = -1,
-    on_done: Callable[[LearningRun], None] | None = None,
 ) -> list[LearningRun]:
     """Run :func:`learn` for many seeds; one run per seed, in their order.
 
     Runs go on side by side, on ``jobs`` threads, -1 for one per core; neither changes
-    anything but the time. ``on_done`` is called with each run that has ended. Raises what
-    :func:`learn` does.
+    anything but the time. Raises what :func:`learn` does.
     """
     need(task, Task, LOADED)
     condition = load_condition(condition)
@@ -229,11 +227,7 @@ def learn_many(
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
     def perform(lot: Sequence[int]) -> list[LearningRun]:
-        runs = learn_together(task, condition, model, search, lot, trials)
-        if on_done is not None:
-            for run in runs:
-                on_done(run)
-        return runs
+        return learn_together(task, condition, model, search, lot, trials)
 
     compile_learner(task, condition, model, search)
     if threads == 1:

@@ -8,7 +8,7 @@ from coartic import load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import plan_cells
+from coartic.benchmarks.run import plan_suite
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
 from coartic.benchmarks.worker import perform
 from coartic.runs.store import TIMINGS
@@ -55,9 +55,9 @@ def suite_of(tmp_path, *blocks):
 
 def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial_budget=None):
     """A plan of some cells, or of those of the paper."""
-    return plan_cells(
-        load_suite("paper"),
-        paper_cells() if cells is None else cells,
+    return plan_suite(
+        "paper",
+        cells=cells,
         runs=runs,
         trials=trials,
         seed=seed,
