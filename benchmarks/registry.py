@@ -48,10 +48,6 @@ MODULES = (
 """Where this project's methods are, each in its module's ``METHODS``."""
 
 
-class MethodFileError(CoarticError):
-    """A method file or plug-in that cannot be used."""
-
-
 @dataclass(frozen=True)
 class Entry:
     """One method as the harness knows it."""
@@ -144,7 +140,7 @@ Registry = Mapping[str, Entry]
 def registry(method_files: Iterable[Path] = ()) -> dict[str, Entry]:
     """Every known method by id.
 
-    A plug-in that cannot be loaded is a warning. Raises MethodFileError for a file that
+    A plug-in that cannot be loaded is a warning. Raises CoarticError for a file that
     cannot be loaded, holds no method, or takes an id that is reserved or already there.
     """
     entries = dict(built_in())
@@ -178,7 +174,7 @@ def method_at(where: str, name: str) -> type[Method]:
     for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
         if method.name == name:
             return method  # type: ignore[no-any-return]
-    raise MethodFileError(f"{where} defines no method {name!r}")
+    raise CoarticError(f"{where} defines no method {name!r}")
 
 
 def file_module(path: Path) -> ModuleType:
@@ -207,15 +203,15 @@ def current_code(where: str, name: str) -> str:
 
 
 def add_entries(registered: dict[str, Entry], entries: Iterable[Entry]) -> None:
-    """Add methods by id. Raises MethodFileError for an id that is reserved or taken."""
+    """Add methods by id. Raises CoarticError for an id that is reserved or taken."""
     for entry in entries:
         if entry.name.startswith(RESERVED):
-            raise MethodFileError(
+            raise CoarticError(
                 f"{entry.origin}: method id {entry.name!r} is reserved: ids that begin with "
                 f"{' or '.join(map(repr, RESERVED))} are this project's"
             )
         if entry.name in registered:
-            raise MethodFileError(
+            raise CoarticError(
                 f"{entry.origin}: method id {entry.name!r} is already taken "
                 f"({registered[entry.name].origin})"
             )
@@ -223,36 +219,36 @@ def add_entries(registered: dict[str, Entry], entries: Iterable[Entry]) -> None:
 
 
 def entries_of_file(path: Path) -> Iterator[Entry]:
-    """The methods of a file. Raises MethodFileError where there is none that can be used."""
+    """The methods of a file. Raises CoarticError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
     if not path.is_file():
-        raise MethodFileError(f"{shown}: there is no such file")
+        raise CoarticError(f"{shown}: there is no such file")
     try:
         module = file_module(path)
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"{shown}: cannot be imported: {error_line(error)}") from None
+        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
     yield from entries_of_module(module, methods_in(module), shown, str(path))
 
 
 def entries_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[Entry]:
-    """The methods of an installed plug-in. Raises MethodFileError."""
+    """The methods of an installed plug-in. Raises CoarticError."""
     try:
         target = point.load()
     except (Exception, SystemExit) as error:
-        raise MethodFileError(f"cannot be imported: {error_line(error)}") from None
+        raise CoarticError(f"cannot be imported: {error_line(error)}") from None
     if not inspect.isclass(target):
         yield from entries_of_module(target, methods_in(target), origin, target.__name__)
     elif issubclass(target, Method):
         module = sys.modules[target.__module__]
         yield from entries_of_module(module, [target], origin, module.__name__)
     else:
-        raise MethodFileError(f"{target!r} is not a subclass of coartic.method.Method")
+        raise CoarticError(f"{target!r} is not a subclass of coartic.method.Method")
 
 
 def entries_of_module(
     module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
 ) -> Iterator[Entry]:
-    """Methods of a module with their code. Raises MethodFileError where there is none."""
+    """Methods of a module with their code. Raises CoarticError where there is none."""
     methods = list(methods)
     for method in methods:
         check_declaration(method, origin)
@@ -261,12 +257,12 @@ def entries_of_module(
         try:
             code = code_of(file, data)
         except OSError as error:
-            raise MethodFileError(
+            raise CoarticError(
                 f"{origin}: method {method.name!r} declares a file that cannot be read: "
                 f"{error.filename}"
             ) from None
         except (SyntaxError, ValueError) as error:
-            raise MethodFileError(
+            raise CoarticError(
                 f"{origin}: it imports what is no Python: {error_line(error)}"
             ) from None
         yield Entry(method, origin, where, code)
@@ -278,34 +274,32 @@ def entries_of_module(
             and value is not Method
         ]  # fmt: skip
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
-        raise MethodFileError(f"{origin}: defines no subclass of coartic.method.Method{why}")
+        raise CoarticError(f"{origin}: defines no subclass of coartic.method.Method{why}")
 
 
 def check_declaration(method: type[Method], origin: str) -> None:
-    """Raises MethodFileError where a method does not declare what every method does."""
+    """Raises CoarticError where a method does not declare what every method does."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)
         if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
-            raise MethodFileError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+            raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
     if not _NAME.fullmatch(method.name):
-        raise MethodFileError(
+        raise CoarticError(
             f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
         )
     told = getattr(method, "told", None)
     if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
-        raise MethodFileError(f"{where}: told must be a set of Information, not {told!r}")
+        raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
     for attribute, kind, what in (
         ("stochastic", bool, "True or False"),
         ("secondary", tuple | list, "a tuple of texts"),
         ("files", tuple | list, "a tuple of names"),
     ):
         if not isinstance(value := getattr(method, attribute), kind):
-            raise MethodFileError(f"{where}: {attribute} must be {what}, not {value!r}")
+            raise CoarticError(f"{where}: {attribute} must be {what}, not {value!r}")
     if not inspect.isclass(method.Parameters) or not issubclass(method.Parameters, BaseModel):
-        raise MethodFileError(
-            f"{where}: Parameters must be a subclass of coartic.method.Parameters"
-        )
+        raise CoarticError(f"{where}: Parameters must be a subclass of coartic.method.Parameters")
 
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

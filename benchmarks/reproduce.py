@@ -11,6 +11,7 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.worker import Job, job_of
 from coartic.errors import CoarticError
+from coartic.inputs import brief_value
 from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Movement
@@ -105,7 +106,7 @@ def some_again(folder: Path, count: int, registered: Registry) -> Iterator[tuple
 def differences(a: Run, b: Run) -> list[str]:
     """In what the results of two runs differ; times and surroundings apart."""
     changes = [
-        f"{name}: {shown(a.row[name])} against {shown(b.row[name])}"
+        f"{name}: {brief_value(a.row[name])} against {brief_value(b.row[name])}"
         for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
         if a.row[name] != b.row[name]
     ]
@@ -130,12 +131,6 @@ def plain_movements(movements: Sequence[Movement]) -> list[Any]:
         )
         for m in movements
     ]
-
-
-def shown(value: Any) -> str:
-    """A value in at most 200 characters."""
-    text = repr(value)
-    return text if len(text) <= 200 else f"{text[:200]}..."
 
 
 def first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:

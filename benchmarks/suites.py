@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     PlainValidator,
     ValidationError,
@@ -36,6 +34,7 @@ from coartic.inputs import (
     MOST_RUNS,
     MOST_SECONDS,
     MOST_TRIALS,
+    FileData,
     brief_value,
     problems,
     read_toml,
@@ -68,13 +67,7 @@ _Value = Annotated[Scalar, PlainValidator(plain_scalar)]
 _Names = Annotated[tuple[str, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
-class SuitePart(BaseModel):
-    """A part of a suite file."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Move(SuitePart):
+class Move(FileData):
     """A family of tasks that differ in where one goal is."""
 
     goal: Annotated[int, Field(ge=1, strict=True)]
@@ -83,7 +76,7 @@ class Move(SuitePart):
     """Displacements in x and y, length unit; one task each."""
 
 
-class Block(SuitePart):
+class Block(FileData):
     """Some methods on some tasks, under all combinations of some parameters."""
 
     tasks: _Names
@@ -93,8 +86,10 @@ class Block(SuitePart):
     """Whether the base moves in both directions, whatever the task locks."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs per cell, where it is not the suite's number."""
-    parameters: dict[str, _Value] = {}
-    grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = {}
+    parameters: dict[str, _Value] = Field(default_factory=dict)
+    grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = Field(
+        default_factory=dict
+    )
 
     @model_validator(mode="after")
     def says_everything_once(self) -> Block:
@@ -125,7 +120,7 @@ class Block(SuitePart):
         return list(names)
 
 
-class Suite(SuitePart):
+class Suite(FileData):
     """A suite as its file states it."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]

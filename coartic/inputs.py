@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import BaseModel, ConfigDict
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import CoarticError
@@ -48,23 +49,21 @@ _PLAINER = {
 _BRIEF = 80  # characters of a value in a sentence
 
 
-def read_text(path: str | Path, *, error: type[CoarticError] = CoarticError) -> str:
-    """The text of a file in UTF-8. Raises ``error`` where there is none."""
-    shown = plain(str(path))
-    try:
-        return Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise error(f"{shown}: is not a text file in UTF-8") from None
-    except (OSError, ValueError) as failure:
-        why = getattr(failure, "strerror", None) or failure
-        raise error(f"{shown}: cannot be read: {why}") from None
+class FileData(BaseModel):
+    """What a file states: it cannot be changed, and every key is known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
     """The content of a TOML file. Raises ``error`` for one that cannot be used."""
-    text, shown = read_text(path, error=error), plain(str(path))
+    shown = plain(str(path))
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError:
+        raise error(f"{shown}: is not a text file in UTF-8") from None
+    except OSError as failure:
+        raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
     except (ValueError, RecursionError) as failure:  # TOMLDecodeError is a ValueError
         raise error(f"{shown}: is not valid TOML: {brief(str(failure))}") from None
 

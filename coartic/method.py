@@ -426,15 +426,12 @@ class Session:
                 raise ValueError(f"counter {name!r}: {count} is negative")
             setattr(self._meter, name, getattr(self._meter, name) + int(count))
 
-    def add_solving(self, wall_s: float) -> None:
-        """Count wall time as solving: of runs that are solved side by side, each has its share."""
-        self._needs_trust("add_solving")
-        self._meter.solve_s += wall_s
-
-    def record_rewards(self, rewards: Iterable[int | None]) -> None:
-        """Rewards of the trials of a compiled method (trusted methods only)."""
-        self._needs_trust("record_rewards")
+    def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
+        """Rewards of the trials of a compiled method of this project, and its time for them: of
+        runs that are solved side by side, each has its share."""
+        self._needs_trust("record")
         self._rewards.extend(rewards)
+        self._meter.solve_s += solve_s
 
     @contextmanager
     def building(self) -> Iterator[None]:

@@ -127,9 +127,8 @@ class DualProcess(Method):
 
 
 def _result(session: Session, run: LearningRun) -> Result | MethodError:
-    session.add_solving(run.wall_s)
     session.spend(**vars(run.counters))
-    session.record_rewards(run.rewards.tolist())  # None where a trial failed
+    session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
     if run.status != "ok":
         return MethodError("infeasible", run.reason)
     return Result(

@@ -220,21 +220,18 @@ class Store:
                     "seed": plan.seed,
                     "runs": plan.runs,
                     "trials": plan.trials,
-                    "readings": to_json(plan.readings),
+                    "readings": plan.readings,
                     "time_limit_s": plan.time_limit_s,
                     "trial_budget": plan.trial_budget,
-                    "command": to_json(command),
+                    "command": command,
                     "date": date,
                     "environment": self._environment(environment),
                 },
             )
             for name, definition in plan.tasks.items():
-                self._insert("tasks", {"name": name, "definition": to_json(definition)})
+                self._insert("tasks", {"name": name, "definition": definition})
             for name, method in plan.methods.items():
-                facts = asdict(method)
-                facts |= {key: to_json(facts[key]) for key in ("told", "secondary", "defaults")}
-                self._insert("methods", {"name": name, **facts})
-            model = to_json(plan.model._asdict())
+                self._insert("methods", {"name": name, **asdict(method)})
             joints = {
                 name: parse_task(task, name).robot.joint_names for name, task in plan.tasks.items()
             }
@@ -245,10 +242,10 @@ class Store:
                     "asked": plan.asked[position],
                     "code": method.code,
                     "task": cell.task,
-                    "definition": to_json(plan.tasks[cell.task]),
+                    "definition": plan.tasks[cell.task],
                     "method": cell.method,
                     "parameters": to_json(cell.complete, sort_keys=True),
-                    "model": model,
+                    "model": plan.model._asdict(),
                     "trial_budget": plan.trial_budget,
                     "told": ", ".join(method.told),
                 }
@@ -260,7 +257,7 @@ class Store:
                         "position": position,
                         "setting": number,
                         "variant": cell.variant,
-                        "parameters": to_json(cell.parameters),
+                        "parameters": cell.parameters,
                         "runs": cell.runs,
                     },
                 )
@@ -444,7 +441,8 @@ class Store:
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        return int(self._db.execute(text, list(row.values())).lastrowid or 0)
+        values = [to_json(v) if isinstance(v, dict | list | tuple) else v for v in row.values()]
+        return int(self._db.execute(text, values).lastrowid or 0)
 
     def _insert_many(self, table: str, names: Iterable[str], rows: list[tuple[Any, ...]]) -> None:
         listed = ", ".join(f'"{name}"' for name in names)

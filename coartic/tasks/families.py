@@ -28,9 +28,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     ValidationError,
     model_validator,
@@ -38,7 +36,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, problems, read_toml, sentence
+from coartic.inputs import MOST_CELLS, FileData, problems, read_toml, sentence
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, key_of
@@ -108,11 +106,7 @@ _Links = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
 _Bases = tuple[Base, ...]
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Region(_Data):
+class Region(FileData):
     """Where goals are: a box, of whose sides a share is drawn and placed within it."""
 
     x: Span
@@ -123,7 +117,7 @@ class Region(_Data):
     """Share of both sides that an instance's own box has, from, to."""
 
 
-class Alignment(_Data):
+class Alignment(FileData):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
     steps: Annotated[tuple[_Positive, _Positive], _Ordered]
@@ -132,7 +126,7 @@ class Alignment(_Data):
     """Distance of the one goal from the line, to either side, length unit, from, to."""
 
 
-class Posture(_Data):
+class Posture(FileData):
     """An arm at the start."""
 
     first: Span
@@ -145,7 +139,7 @@ class Posture(_Data):
 _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
-class Postures(_Data):
+class Postures(FileData):
     """Both arms at the start; an arm whose hand has nothing to do is parked at 0."""
 
     left: Posture = _PARKED
@@ -154,7 +148,7 @@ class Postures(_Data):
     """The right arm."""
 
 
-class Family(_Data):
+class Family(FileData):
     """Distributions of tasks, and what no instance may be.
 
     Lengths, angles and shares are kept in thousandths of what the file says.

@@ -12,19 +12,17 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from coartic.errors import CoarticError
-from coartic.inputs import brief, brief_value, read_toml
+from coartic.inputs import FileData, brief, brief_value, read_toml
 from coartic.model import PAPER, MotionModel
 from coartic.tasks.task import Task, parse_task
 from coartic.text import did_you_mean, unknown
 
 
-class Choice(BaseModel):
+class Choice(FileData):
     """One way to read the text."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     value: bool | int | float | str
     """Of the parameter; lengths in the model's length unit."""
@@ -48,10 +46,8 @@ class Choice(BaseModel):
             return False
 
 
-class Reading(BaseModel):
+class Reading(FileData):
     """An open question about the paper's text."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
     question: str

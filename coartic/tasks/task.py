@@ -17,8 +17,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     ValidationError,
     ValidationInfo,
@@ -26,7 +24,7 @@ from pydantic import (
 )
 
 from coartic.errors import TaskError
-from coartic.inputs import brief_value, problems, read_toml, sentence
+from coartic.inputs import FileData, brief_value, problems, read_toml, sentence
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, counted, did_you_mean
@@ -90,11 +88,7 @@ def address_of(name: str) -> Address | None:
     return address if str(address) == name else None  # i0017 would be i017 again
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-
-
-class Provenance(_Frozen):
+class Provenance(FileData):
     """Where a figure of a task comes from."""
 
     status: Literal["printed", "inferred", "chosen"]
@@ -102,7 +96,7 @@ class Provenance(_Frozen):
     source: Line
 
 
-class Start(_Frozen):
+class Start(FileData):
     """Starting configuration q_0: base in length units, joint angles in rad."""
 
     base: Point = (0.0, 0.0)
@@ -110,7 +104,7 @@ class Start(_Frozen):
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
 
 
-class Task(_Frozen):
+class Task(FileData):
     """A sequence of spatial goals to be hit, each with one of the robot's hands."""
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)]
@@ -129,7 +123,7 @@ class Task(_Frozen):
     the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
     robot: Robot = Robot()
-    provenance: dict[str, Provenance] = {}
+    provenance: dict[str, Provenance] = Field(default_factory=dict)
     """Source and status of the figures, by key."""
 
     @cached_property
