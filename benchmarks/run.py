@@ -103,11 +103,8 @@ class RunReport:
     """Runs in the folder that were not asked for."""
 
     def __repr__(self) -> str:
-        return self.sentence(self.wall_s)
-
-    def sentence(self, seconds: float) -> str:
-        """How many runs were made in so many seconds, how many failed, and where they are."""
-        progress = self.progress
+        """How many runs were made in how long, how many failed, and where they are."""
+        progress, seconds = self.progress, self.wall_s
         time_taken = (
             f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min {seconds % 60:.0f} s"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
@@ -62,17 +61,14 @@ def run(
         trial_budget=trial_budget,
         readings=reading or (),
     )
-    started = time.monotonic()
     with performing(chosen.name, out) as display:
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = plan.perform(
             out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
         )
-    say(report.sentence(time.monotonic() - started))
+    say(str(report))
     pairs = []
-    if (
-        report.progress.present < report.progress.total
-    ):  # else they are as they were; to work them out takes a while
+    if report.progress.done:  # else the answers are as they were, and take a while
         from coartic.analysis.report.text import answers
         from coartic.analysis.study import load
 
