@@ -1,5 +1,7 @@
 """Runs side by side: each comes out as it does alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.testing as npt
 import pytest
@@ -195,7 +197,7 @@ class Forges(InProcess):
         for number, answer in super().perform(jobs):
             if len(answer.outcomes) == LANES:
                 fifth, seventh = (answer.outcomes[run].parts["solution"] for run in (5, 7))
-                fifth[0][3].pop()
+                fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
             yield number, answer
 
