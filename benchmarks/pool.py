@@ -1,7 +1,8 @@
 """Worker processes on this machine, with a time limit for each run.
 
-Methods of this project share workers; any other method has workers of its own, so that what one
-changes in its process changes no other.
+Methods of this project share workers; any other method has workers of its own. On Linux these may
+write to a temporary folder of theirs alone: that keeps a careless method out of the results, of
+other methods and of the kernels.
 """
 
 from __future__ import annotations
@@ -71,19 +72,19 @@ class Local:
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
         """The number of each job with its answer, as they come."""
         numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
-        for _, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
-            yield from self.perform_together(list(jobs_of_owner))
+        for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
+            yield from self.perform_together(list(jobs_of_owner), foreign=bool(owner))
 
     def perform_together(
-        self, jobs: list[tuple[int, Job]]
+        self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer | Failure]]:
-        """The same for numbered jobs that share workers."""
+        """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, learned) for (_, learned), task in kernels.items()]
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
-                workers, initializer=begin_worker, initargs=(folder, workers, tasks),
+                workers, initializer=begin_worker, initargs=(folder, foreign, workers, tasks),
                 context=context(),
             )  # fmt: skip
             running: dict[Future[Answer], tuple[int, float]] = {}
@@ -154,7 +155,9 @@ def last_words(file: Path) -> str:
     return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
 
 
-def begin_worker(folder: str, workers: int, tasks: list[tuple[dict[str, Any], bool]]) -> None:
+def begin_worker(
+    folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
+) -> None:
     """What a worker does first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
@@ -165,6 +168,10 @@ def begin_worker(folder: str, workers: int, tasks: list[tuple[dict[str, Any], bo
         ctypes.CDLL(None).prctl(kill_with_parent, signal.SIGKILL, 0, 0, 0)
     bound_memory(workers)
     prepare(tasks)
+    if foreign:
+        tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
+        os.chdir(tempfile.tempdir)
+        confine(Path(folder))
 
 
 def bound_memory(workers: int) -> None:
@@ -177,6 +184,42 @@ def bound_memory(workers: int) -> None:
         return
     share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
     resource.setrlimit(resource.RLIMIT_DATA, (share, share))
+
+
+def landlock_version() -> int:
+    """Version of the system's Landlock interface; 0 or less where there is none."""
+    if sys.platform != "linux":
+        return 0
+    return int(ctypes.CDLL(None).syscall(444, None, 0, 1))
+
+
+def confine(folder: Path) -> None:
+    """Let this process write below a folder alone, for good, where the system can (Linux 5.13 with
+    Landlock); nothing where it cannot."""
+    if landlock_version() < 1:
+        return
+    libc = ctypes.CDLL(None, use_errno=True)
+    create, add, restrict = 444, 445, 446  # of system calls
+    write_file, truncate = 1 << 1, 1 << 14
+    # Remove files and make them of all kinds; a right that a kernel does not know is an error.
+    writes = write_file | sum(1 << bit for bit in (4, 5, 6, 7, 8, 9, 10, 11, 12))
+    if landlock_version() >= 3:
+        writes |= truncate
+    rights = ctypes.c_uint64(writes)
+    rules = libc.syscall(create, ctypes.byref(rights), ctypes.sizeof(rights), 0)
+    if rules < 0:
+        return
+    for allowed in (folder, Path("/dev/null"), Path("/dev/shm")):
+        with contextlib.suppress(OSError):
+            place = os.open(allowed, os.O_PATH | os.O_CLOEXEC)
+            allowed_rights = writes if allowed.is_dir() else writes & (write_file | truncate)
+            rule = allowed_rights.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
+            libc.syscall(add, rules, 1, rule, 0)
+            os.close(place)
+    no_new_privileges = 38
+    libc.prctl(no_new_privileges, 1, 0, 0, 0)
+    libc.syscall(restrict, rules, 0)
+    os.close(rules)
 
 
 _START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
