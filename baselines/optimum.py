@@ -102,7 +102,7 @@ class Optimum(Method):
                 raise MethodError(
                     "infeasible", f"none of {solves} solves found a path that hits every goal"
                 )
-            made, ticks = self.fewest_ticks(session, task, problem, best)
+            solution, ticks = self.fewest_ticks(session, task, problem, best)
         ranked = sorted(best.values(), key=lambda entry: entry[1].cost)
         bound, proof = self.proof(session, task, ticks)
         details = {
@@ -113,7 +113,7 @@ class Optimum(Method):
             "sequences_planned": len(best),
             **proof,
         }
-        return Result(made, details, bound=bound)
+        return Result(solution, details, bound=bound)
 
     def proof(self, session: Session, task: Task, ticks: int) -> tuple[int | None, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
@@ -145,10 +145,10 @@ class Optimum(Method):
         best: dict[tuple[Hand, ...], tuple[Instance, Plan]],
     ) -> tuple[tuple[Movement, ...], int]:
         """The fewest ticks over all plans, roundings and mergers, as executed."""
-        found: tuple[int, int, tuple[Movement, ...]] | None = None
+        fewest: tuple[int, int, tuple[Movement, ...]] | None = None
 
         def worth(ticks: int) -> bool:
-            return found is None or ticks < found[0]
+            return fewest is None or ticks < fewest[0]
 
         for instance, plan in sorted(best.values(), key=lambda entry: entry[1].cost):
             rounding = Rounding(problem, instance, session.model.step)
@@ -159,28 +159,28 @@ class Optimum(Method):
             for merged, shortest in rounding.plans(plan, task, worth):
                 if not worth(rounding.least(shortest, merged)):
                     continue
-                for whole in rounding.every(shortest, merged):
-                    if not worth(whole.ticks):
+                for rounded in rounding.every(shortest, merged):
+                    if not worth(rounded.ticks):
                         continue
-                    made, evaluations = movements(
+                    planned, evaluations = movements(
                         task,
-                        whole.hands,
-                        whole.configurations,
+                        rounded.hands,
+                        rounded.configurations,
                         instance.held,
                         session.model,
-                        whole.steps,
+                        rounded.steps,
                     )
-                    execution = execute(task, made, model=session.model)
+                    execution = execute(task, planned, model=session.model)
                     session.spend(forward_kinematics=evaluations + execution.evaluations)
-                    entry = execution.ticks, execution.corrections, tuple(made)
-                    if execution.completed and (found is None or entry[:2] < found[:2]):
-                        found = entry
+                    entry = execution.ticks, execution.corrections, tuple(planned)
+                    if execution.completed and (fewest is None or entry[:2] < fewest[:2]):
+                        fewest = entry
                     if not worth(rounding.least(shortest, merged)):
                         break  # no other rounding takes fewer
             session.spend(**rounding.spent)
-        if found is None:
+        if fewest is None:
             raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
-        return found[2], found[0]
+        return fewest[2], fewest[0]
 
 
 class DynamicProgramming(Optimum):
@@ -234,19 +234,19 @@ class BranchAndBound(DynamicProgramming):
     def proof(self, session: Session, task: Task, ticks: int) -> tuple[int, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
         with session.solving():
-            found = certify(
+            certificate = certify(
                 task,
                 ticks,
                 still=self.parameters.other_arm == "still",
                 model=session.model,
                 most_nodes=self.parameters.most_nodes,
             )
-        session.spend(solver_iterations=found.iterations)
-        return -found.ticks, {
-            "proven_optimal": found.proven,
-            "nodes": found.nodes,
-            "open_nodes": found.open_nodes,
-            "ticks_left": ticks - found.ticks,
+        session.spend(solver_iterations=certificate.iterations)
+        return -certificate.ticks, {
+            "proven_optimal": certificate.proven,
+            "nodes": certificate.nodes,
+            "open_nodes": certificate.open_nodes,
+            "ticks_left": ticks - certificate.ticks,
         }
 
 
@@ -286,15 +286,15 @@ def corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):
-        found = correct(
+        correction = correct(
             task.robot, q, hand, goal, locked_base=task.locked_base, model=session.model
         )
         session.spend(
-            corrective_iterations=found.iterations,
-            jacobians=found.iterations,
-            forward_kinematics=found.iterations + 1,
+            corrective_iterations=correction.iterations,
+            jacobians=correction.iterations,
+            forward_kinematics=correction.iterations + 1,
         )
-        q = found.q
+        q = correction.q
         configurations.append(q)
     return np.array(configurations)
 

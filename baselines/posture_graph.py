@@ -145,8 +145,8 @@ class PostureGraph:
             longer = [more for beginning in kept for more in self.longer(beginning, None)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        for whole in kept:
-            yield self.chain_of(whole)
+        for complete in kept:
+            yield self.chain_of(complete)
 
     def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
         """Why there is no chain: the first goal without a posture; empty where there is one."""
@@ -194,9 +194,9 @@ class PostureGraph:
                     came[:, i], reached[:, i] = least_of_columns(total)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
-    def chain_of(self, whole: Beginning) -> Chain:
+    def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
-        hands, cost, back = whole.hands, whole.cost, whole.back
+        hands, cost, back = complete.hands, complete.cost, complete.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
         for goal in reversed(range(len(hands))):
@@ -230,7 +230,7 @@ def cheapest_chains(
 
     Raises MethodError where a goal has no posture.
     """
-    made = 0
+    yielded = 0
     for number in itertools.count(1):
         graph = PostureGraph.sampled(task, nodes, rng)
         session.spend(**vars(graph.spent))
@@ -238,9 +238,9 @@ def cheapest_chains(
         if missing:
             raise MethodError("infeasible", missing)
         for chain in graph.chains(only, most):
-            made += 1
+            yielded += 1
             yield chain
-        if number >= graphs and made >= chains:
+        if number >= graphs and yielded >= chains:
             return
 
 
