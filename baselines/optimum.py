@@ -102,6 +102,7 @@ class Optimum(Method):
                 problem,
                 self.starts(session, task),
                 still=parameters.other_arm == "still",
+                radius=task.radius,
             )
             best = fewest_ticks(session, task, problem, plans)
         bound, proof = self.proof(session, task, best.execution.ticks)

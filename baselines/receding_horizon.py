@@ -9,11 +9,12 @@ a horizon of all goals it is the search for the optimum itself, so that its gap 
 what the search alone costs.
 
 A window is planned as ``optimum/dynamic-programming`` plans a task (:mod:`coartic.baselines.
-shortest_paths`): chains of posture graphs, IPOPT, whole ticks. Two things differ, for speed: of
-the chains only the shortest ``starts`` are polished, and there are fewer graphs. Without whole
+shortest_paths`): chains of posture graphs, IPOPT, whole ticks. Two things differ, for speed: the
+graphs are fewer and smaller, and only the shortest ``starts`` of them are polished. Without whole
 ticks in every window each goal would lose half a tick for a reason that has nothing to do with
-the horizon; with them a window loses half a tick at its last goal only, which is all that a
-horizon of 0 has.
+the horizon. With them a window loses half a tick at its last goal alone: that is once in all, but
+at every goal with a horizon of 0. ``path_length`` in the details has no such loss: it adds up the
+plans as they were before the rounding, from where the robot stood.
 
 The horizon limits choice of hand and posture alike. With ``hands`` ``optimal`` it limits postures
 alone: the hands are those of the plan with all goals. What the hands alone lose, followed by the
@@ -24,12 +25,11 @@ sequence.
 shortest by the weighted path length (:func:`coartic.motion.costs.segment_lengths`). The score
 remains ticks; the weighted path length of a stored solution follows from its
 :func:`~coartic.motion.ticks.trajectory`. Ticks are not weighted, so that such a window is not
-rounded: each of its movements ends with the first step inside the disc.
+rounded: it aims a little inside the discs, and each movement ends with the first step inside.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -55,8 +55,6 @@ from coartic.robot import BASE_DOF, HANDS, Array
 from coartic.tasks.task import MOST_GOALS, hands_of
 from coartic.tasks.task import Start as Posture
 
-_SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
-
 
 class RecedingHorizonParameters(Parameters):
     """How far it looks ahead, what it minimises, and how long it searches."""
@@ -70,13 +68,15 @@ class RecedingHorizonParameters(Parameters):
     """Joints whose movement costs more than that of the others."""
     cost_factor: Annotated[float, Field(ge=0.01, le=100)] = 3.0
     """How many times as much, where there are such joints."""
-    nodes: Annotated[int, Field(ge=10, le=1000)] = 100
-    """Postures per goal and hand of a posture graph."""
+    nodes: Annotated[int, Field(ge=10, le=1000)] = 200
+    """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
     graphs: Annotated[int, Field(ge=1)] = 3
-    """Independent graphs for each window."""
+    """Independent graphs for each window, or more, until there are as many ``chains``."""
+    chains: Annotated[int, Field(ge=1)] = 50
+    """Chains of each window, over all graphs and hand sequences."""
     starts: Annotated[int, Field(ge=1)] = 16
-    """Chains of a window that are polished, the shortest of all graphs and hand sequences, each
-    with and without the other arm spread out."""
+    """Starts of each window that are polished, the shortest: all chains, and all of them with the
+    other arm spread out, are ranked by length."""
     most_sequences: Annotated[int, Field(ge=1)] = 64
     """Hand sequences that are planned for each graph: all where there are no more, with two
     hands up to six goals; else those that a beam of this width over the goals ends with."""
@@ -170,9 +170,9 @@ class Planner:
             self.session,
             task,
             self.rng,
-            nodes=parameters.nodes,
+            nodes=parameters.nodes // len(task.hands),
             graphs=parameters.graphs,
-            chains=1,
+            chains=parameters.chains,
             most=parameters.most_sequences,
             spread=True,
             only=only,
@@ -180,13 +180,18 @@ class Planner:
         )
         shortest = sorted(starts, key=lambda start: self.length_from(task, start))
         plans = shortest_plans(
-            self.session, task, problem, shortest[: parameters.starts], still=False
+            self.session,
+            task,
+            problem,
+            shortest[: parameters.starts],
+            still=False,
+            radius=task.radius - (self.session.model.arrival_tolerance if weighted else 0.0),
         )
         self.windows += 1
         self.solves += plans.solves
         self.failed += plans.failed
         if weighted:
-            return steps_of_shortest(self.session, task, plans)
+            return shortest_as_it_is(self.session, task, plans)
         return fewest_ticks(self.session, task, problem, plans)
 
     def length_from(self, task: Task, start: Start) -> float:
@@ -203,13 +208,11 @@ def remaining(task: Task, q: Array, first: int, end: int) -> Task:
     return task.model_copy(update={"goals": goals, "start": start})
 
 
-def steps_of_shortest(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
-    """The shortest plan itself; each movement ends with the first step inside the disc."""
+def shortest_as_it_is(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
+    """The shortest plan without rounding; its movements end with the first step inside a disc."""
     instance, plan = plans.ranked[0]
-    lengths = plan.lengths(instance.q0) / session.model.step
-    steps = tuple(math.ceil(length - _SLACK) for length in lengths.tolist())
     planned, evaluations = movements(
-        task, instance.hands, plan.configurations, instance.held, session.model, steps
+        task, instance.hands, plan.configurations, instance.held, session.model
     )
     execution = execute(task, planned, model=session.model)
     session.spend(forward_kinematics=evaluations + execution.evaluations)

@@ -88,15 +88,17 @@ def shortest_plans(
     starts: Iterable[Start],
     *,
     still: bool,
+    radius: float,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Raises MethodError where no solve finds a path.
+    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
+    solve finds a path.
     """
     best: dict[Hands, tuple[Instance, Plan]] = {}
     solves = failed = 0
     for hands, start in starts:
-        instance = Instance.of(task, hands, still=still, radius=task.radius)
+        instance = Instance.of(task, hands, still=still, radius=radius)
         plan = problem.solve(instance, start)
         session.spend(**plan.spent)
         solves += 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from coartic.robot import BASE_DOF, Array, Robot
 
-CostlyJoints = Literal["none", "base", "left-arm", "right-arm"]
+CostlyJoints = Literal["none", "base", "arms", "left-arm", "right-arm"]
 
 
 def joint_costs(robot: Robot, costly: CostlyJoints, factor: float) -> Array:
@@ -17,6 +17,8 @@ def joint_costs(robot: Robot, costly: CostlyJoints, factor: float) -> Array:
     costs = np.ones(robot.dof)
     if costly == "base":
         costs[:BASE_DOF] = factor
+    elif costly == "arms":
+        costs[BASE_DOF:] = factor
     elif costly != "none":
         costs[robot.joints("left" if costly == "left-arm" else "right")] = factor
     return costs
