@@ -72,9 +72,9 @@ class RecedingHorizonParameters(Parameters):
     """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
     graphs: Annotated[int, Field(ge=1)] = 3
     """Independent graphs for each window, or more, until there are as many ``chains``."""
-    chains: Annotated[int, Field(ge=1)] = 50
+    chains: Annotated[int, Field(ge=1)] = 24
     """Chains of each window, over all graphs and hand sequences."""
-    starts: Annotated[int, Field(ge=1)] = 16
+    starts: Annotated[int, Field(ge=1)] = 24
     """Starts of each window that are polished, the shortest: all chains, and all of them with the
     other arm spread out, are ranked by length."""
     most_sequences: Annotated[int, Field(ge=1)] = 64
@@ -104,14 +104,12 @@ class RecedingHorizon(Method):
     )
     stochastic = False
     Parameters = RecedingHorizonParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "starts": 4}
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
         """Plan, make a movement, and plan again, until the last goal is in view."""
         check_ticks(session.model)
-        task = session.hand_over(*self.told)
-        with session.solving():
-            return Planner(session, task, self.parameters).solve()
+        return Planner(session, session.hand_over(*self.told), self.parameters).solve()
 
 
 METHODS = (RecedingHorizon,)
@@ -157,42 +155,44 @@ class Planner:
 
     def plan(self, task: Task, only: Hands | None) -> PlanInTicks:
         """The shortest movements through all goals of a task, or of what remains of one."""
-        parameters = self.parameters
-        weighted = parameters.costs != "none"
-        problem = trajectory_problem(
-            task.robot,
-            task.hands,
-            len(task.goals),
-            "path-length",
-            tuple(self.costs.tolist()) if weighted else None,
-        )
+        weighted = self.parameters.costs != "none"
+        costs = tuple(self.costs.tolist()) if weighted else None
+        with self.session.building():
+            problem = trajectory_problem(
+                task.robot, task.hands, len(task.goals), "path-length", costs
+            )
+        with self.session.solving():
+            plans = shortest_plans(
+                self.session,
+                task,
+                problem,
+                self.shortest_starts(task, only),
+                still=False,
+                radius=task.radius - (self.session.model.arrival_tolerance if weighted else 0.0),
+            )
+            self.windows += 1
+            self.solves += plans.solves
+            self.failed += plans.failed
+            if weighted:
+                return shortest_as_it_is(self.session, task, plans)
+            return fewest_ticks(self.session, task, problem, plans)
+
+    def shortest_starts(self, task: Task, only: Hands | None) -> list[Start]:
+        """The starts that are polished."""
         starts = chain_starts(
             self.session,
             task,
             self.rng,
-            nodes=parameters.nodes // len(task.hands),
-            graphs=parameters.graphs,
-            chains=parameters.chains,
-            most=parameters.most_sequences,
-            spread=True,
+            nodes=self.parameters.nodes // len(task.hands),
+            graphs=self.parameters.graphs,
+            chains=self.parameters.chains,
+            most=self.parameters.most_sequences,
+            spread=len(task.goals) > 1,  # with one goal it is the chain itself
             only=only,
             costs=self.costs,
         )
-        shortest = sorted(starts, key=lambda start: self.length_from(task, start))
-        plans = shortest_plans(
-            self.session,
-            task,
-            problem,
-            shortest[: parameters.starts],
-            still=False,
-            radius=task.radius - (self.session.model.arrival_tolerance if weighted else 0.0),
-        )
-        self.windows += 1
-        self.solves += plans.solves
-        self.failed += plans.failed
-        if weighted:
-            return shortest_as_it_is(self.session, task, plans)
-        return fewest_ticks(self.session, task, problem, plans)
+        ranked = sorted(starts, key=lambda start: self.length_from(task, start))
+        return ranked[: self.parameters.starts]
 
     def length_from(self, task: Task, start: Start) -> float:
         """Weighted path length of a start as it is."""
