@@ -114,14 +114,14 @@ class Cascade:
     def solve_level(self, level: Literal[1, 2], program: Program) -> Array:
         """The variables of a level. Raises CascadeError where the solver fails."""
         try:
-            found = _SOLVERS[self.solver](program, SETTINGS[self.solver])
+            solved = _SOLVERS[self.solver](program, SETTINGS[self.solver])
         except ValueError as error:  # of what is no number
             raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
         self.solves += 1
-        self.iterations += found.iterations
-        if not found.optimal:
-            raise CascadeError(f"level {level}: {self.solver} ended {found.status}")
-        return np.array(found.variables, dtype=np.float64)
+        self.iterations += solved.iterations
+        if not solved.optimal:
+            raise CascadeError(f"level {level}: {self.solver} ended {solved.status}")
+        return np.array(solved.variables, dtype=np.float64)
 
 
 def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
@@ -180,5 +180,5 @@ def damped_projection(
     square = float(row @ row)
     left = least * square / (square + damping**2) if least > 0 else least
     missing = max(0.0, left - float(row @ preferred))
-    found: Array = preferred + row * (missing / square if missing else 0.0)
-    return found
+    rates: Array = preferred + row * (missing / square if missing else 0.0)
+    return rates

@@ -240,10 +240,10 @@ class ProofSearch:
         for hand in self._robot_hands:
             hands = (*part.hands[:goal], hand, *part.hands[goal + 1 :])
             root = self.relaxation(hands, part.merged)
-            own = root.goal_of == goal
-            box = np.empty((len(own), 2))
-            box[~own] = part.box
-            box[own] = root.first_box(self.longest(part.moves))[own]
+            of_goal = root.goal_of == goal
+            box = np.empty((len(of_goal), 2))
+            box[~of_goal] = part.box
+            box[of_goal] = root.first_box(self.longest(part.moves))[of_goal]
             able = set(mergeable(self._task, hands))
             still_open = tuple(g for g in part.open if g in able)
             self.add(Part(hands, part.merged, still_open, box), node.length)
@@ -253,10 +253,10 @@ class ProofSearch:
         if part.moves >= self._ticks:
             return
         root = self.relaxation(part.hands, part.merged)
-        found, point, count = root.solve(part.box)
+        multipliers, point, count = root.solve(part.box)
         self.solved += 1
         self.iterations += count
-        lagrangian = root.lagrangian(found, self.longest(0))
+        lagrangian = root.lagrangian(multipliers, self.longest(0))
         slack = self.shortfall(lagrangian, part.box, part.moves)
         length = max(parent, self.longest(part.moves) - slack)
         if slack < 0.0 or length > self.longest(part.moves):

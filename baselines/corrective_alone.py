@@ -58,7 +58,7 @@ class EverySequence(Method):
 
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""
-        found: list[tuple[int, int, Execution]] = []
+        completed: list[tuple[int, int, Execution]] = []
         ordered: list[Hand] = sorted(session.hands)
         for hands in itertools.product(ordered, repeat=session.goals_count):
             if session.trials_left == 0:
@@ -67,10 +67,10 @@ class EverySequence(Method):
                 execution = session.trial(_corrective(hands))
             if execution.reward is not None:
                 changes = changes_of_hand(execution.hands)
-                found.append((-execution.reward, changes, execution))
-        if not found:
+                completed.append((-execution.reward, changes, execution))
+        if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
-        return Result(min(found, key=lambda entry: entry[:2])[2].movements)
+        return Result(min(completed, key=lambda entry: entry[:2])[2].movements)
 
 
 METHODS: tuple[type[Method], ...] = (GivenHands, EverySequence)

@@ -143,7 +143,7 @@ class Controller:
             q = self.moved(q, length * rates)
             waypoints.append(q)
         path = np.array(waypoints or [start])
-        found = follow(
+        followed = follow(
             self.task.robot,
             start,
             path,
@@ -152,29 +152,29 @@ class Controller:
             self.task.radius,
             model=self.session.model,
         )
-        self.session.spend(forward_kinematics=found.evaluations)
+        self.session.spend(forward_kinematics=followed.evaluations)
         movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
         kept = dict(zip(aims[1:], postures[1:], strict=True))
-        return Leg(movement, found.ticks, found.q, rates, kept)
+        return Leg(movement, followed.ticks, followed.q, rates, kept)
 
-    def postures(self, q: Array, aims: tuple[Aim, ...], known: dict[Aim, Array]) -> list[Array]:
+    def postures(self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]) -> list[Array]:
         """The posture of each aim, those first that the way from ``q`` passes first.
 
         Of what is not known yet each is looked for from the one before it, as the nearest.
         """
-        found: list[Array] = []
+        postures: list[Array] = []
         for aim in aims:
-            before = found[-1] if found else q
-            posture, change = known.get(aim, before), np.inf
-            for _ in range(_POSTURE_STEPS if aim not in known else 0):
+            before = postures[-1] if postures else q
+            posture, change = earlier.get(aim, before), np.inf
+            for _ in range(_POSTURE_STEPS if aim not in earlier else 0):
                 posture, change = self.step_nearer(posture, before, aim)
                 if change <= _POSTURE_TOLERANCE:
                     break
-            found.append(posture)
+            postures.append(posture)
         for _ in range(_POSTURE_STEPS if len(aims) > 1 else 0):
-            if self.sweep(q, aims, found) <= _POSTURE_TOLERANCE:
+            if self.sweep(q, aims, postures) <= _POSTURE_TOLERANCE:
                 break
-        return found
+        return postures
 
     def nearest_hands(self, q: Array, goal: int) -> list[Hand]:
         """The hands, the nearest to a goal first, the left one of equally near ones."""

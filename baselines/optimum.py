@@ -17,23 +17,24 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from coartic import Movement, Task, TaskError, execute, parse_task
+from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
-from coartic.baselines.posture_graph import cheapest_chains, spread_out
+from coartic.baselines.shortest_paths import (
+    Start,
+    chain_starts,
+    check_ticks,
+    fewest_ticks,
+    shortest_plans,
+)
 from coartic.baselines.trajectory_problem import (
-    Instance,
-    Plan,
-    TrajectoryProblem,
     trajectory_problem,
 )
-from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.corrective import correct
 from coartic.motion.initial import hand_sequences, too_many_sequences
 from coartic.robot import Array, Hand
 from coartic.tasks.task import hands_of, letters_of
 
-Start = tuple[tuple[Hand, ...], Array]
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
 CITATION = "This package; docs/model.md derives the bound on reward."
 
@@ -90,97 +91,36 @@ class Optimum(Method):
     def solve(self, session: Session) -> Result:
         """Search; the solution has the fewest ticks found."""
         parameters: OptimumParameters = self.parameters
-        if (session.model.arrival_tick, session.model.whole_last_step) != (1, False):
-            raise MethodError("infeasible", "proof and rounding need a tick for each arrival "
-                              "and a last step that ends at the target")  # fmt: skip
+        check_ticks(session.model)
         task = with_locks(session.hand_over(*self.told), parameters.base)
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
         with session.solving():
-            best, solves, failed = self.shortest_plans(session, task, problem)
-            if not best:
-                raise MethodError(
-                    "infeasible", f"none of {solves} solves found a path that hits every goal"
-                )
-            made, ticks = self.fewest_ticks(session, task, problem, best)
-        ranked = sorted(best.values(), key=lambda entry: entry[1].cost)
-        bound, proof = self.proof(session, task, ticks)
+            plans = shortest_plans(
+                session,
+                task,
+                problem,
+                self.starts(session, task),
+                still=parameters.other_arm == "still",
+                radius=task.radius,
+            )
+            best = fewest_ticks(session, task, problem, plans)
+        bound, proof = self.proof(session, task, best.execution.ticks)
         details = {
-            "path_length": ranked[0][1].cost,
-            "path_lengths": {letters_of(i.hands): plan.cost for i, plan in ranked[:MOST_KEPT]},
-            "solves": solves,
-            "failed_solves": failed,
-            "sequences_planned": len(best),
+            "path_length": plans.ranked[0][1].cost,
+            "path_lengths": {
+                letters_of(instance.hands): plan.cost for instance, plan in plans.ranked[:MOST_KEPT]
+            },
+            "solves": plans.solves,
+            "failed_solves": plans.failed,
+            "sequences_planned": len(plans.by_hands),
             **proof,
         }
-        return Result(made, details, bound=bound)
+        return Result(best.movements, details, bound=bound)
 
     def proof(self, session: Session, task: Task, ticks: int) -> tuple[int | None, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
         return None, {}
-
-    def shortest_plans(
-        self, session: Session, task: Task, problem: TrajectoryProblem
-    ) -> tuple[dict[tuple[Hand, ...], tuple[Instance, Plan]], int, int]:
-        """The shortest plan of each hand sequence; solves made; those that failed."""
-        best: dict[tuple[Hand, ...], tuple[Instance, Plan]] = {}
-        solves = failed = 0
-        for hands, start in self.starts(session, task):
-            instance = Instance.of(
-                task, hands, still=self.parameters.other_arm == "still", radius=task.radius
-            )
-            plan = problem.solve(instance, start)
-            session.spend(**plan.spent)
-            solves += 1
-            failed += not plan.converged
-            if plan.converged and (hands not in best or plan.cost < best[hands][1].cost):
-                best[hands] = instance, plan
-        return best, solves, failed
-
-    def fewest_ticks(
-        self,
-        session: Session,
-        task: Task,
-        problem: TrajectoryProblem,
-        best: dict[tuple[Hand, ...], tuple[Instance, Plan]],
-    ) -> tuple[tuple[Movement, ...], int]:
-        """The fewest ticks over all plans, roundings and mergers, as executed."""
-        found: tuple[int, int, tuple[Movement, ...]] | None = None
-
-        def worth(ticks: int) -> bool:
-            return found is None or ticks < found[0]
-
-        for instance, plan in sorted(best.values(), key=lambda entry: entry[1].cost):
-            rounding = Rounding(problem, instance, session.model.step)
-            # A merger saves one tick a goal and never shortens the path.
-            most = len(instance.hands)
-            if not worth(rounding.least(plan) - most):
-                continue
-            for merged, shortest in rounding.plans(plan, task, worth):
-                if not worth(rounding.least(shortest, merged)):
-                    continue
-                for whole in rounding.every(shortest, merged):
-                    if not worth(whole.ticks):
-                        continue
-                    made, evaluations = movements(
-                        task,
-                        whole.hands,
-                        whole.configurations,
-                        instance.held,
-                        session.model,
-                        whole.steps,
-                    )
-                    execution = execute(task, made, model=session.model)
-                    session.spend(forward_kinematics=evaluations + execution.evaluations)
-                    entry = execution.ticks, execution.corrections, tuple(made)
-                    if execution.completed and (found is None or entry[:2] < found[:2]):
-                        found = entry
-                    if not worth(rounding.least(shortest, merged)):
-                        break  # no other rounding takes fewer
-            session.spend(**rounding.spent)
-        if found is None:
-            raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
-        return found[2], found[0]
 
 
 class DynamicProgramming(Optimum):
@@ -204,7 +144,7 @@ class DynamicProgramming(Optimum):
     def starts(self, session: Session, task: Task) -> Iterator[Start]:
         """The chain of every sequence; with a free other arm also with that arm spread out."""
         parameters: GraphParameters = self.parameters
-        for chain in cheapest_chains(
+        return chain_starts(
             session,
             task,
             np.random.default_rng(parameters.sampling_seed),
@@ -212,10 +152,8 @@ class DynamicProgramming(Optimum):
             graphs=parameters.graphs,
             chains=parameters.chains,
             most=parameters.most_sequences,
-        ):
-            yield chain.hands, chain.configurations
-            if parameters.other_arm == "free" and len(task.hands) > 1:
-                yield chain.hands, spread_out(task, chain)
+            spread=parameters.other_arm == "free",
+        )
 
 
 class BranchAndBound(DynamicProgramming):
@@ -234,19 +172,19 @@ class BranchAndBound(DynamicProgramming):
     def proof(self, session: Session, task: Task, ticks: int) -> tuple[int, dict[str, Any]]:
         """Reward that is proven never to be exceeded, and how hard that was."""
         with session.solving():
-            found = certify(
+            certificate = certify(
                 task,
                 ticks,
                 still=self.parameters.other_arm == "still",
                 model=session.model,
                 most_nodes=self.parameters.most_nodes,
             )
-        session.spend(solver_iterations=found.iterations)
-        return -found.ticks, {
-            "proven_optimal": found.proven,
-            "nodes": found.nodes,
-            "open_nodes": found.open_nodes,
-            "ticks_left": ticks - found.ticks,
+        session.spend(solver_iterations=certificate.iterations)
+        return -certificate.ticks, {
+            "proven_optimal": certificate.proven,
+            "nodes": certificate.nodes,
+            "open_nodes": certificate.open_nodes,
+            "ticks_left": ticks - certificate.ticks,
         }
 
 
@@ -286,15 +224,15 @@ def corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):
-        found = correct(
+        correction = correct(
             task.robot, q, hand, goal, locked_base=task.locked_base, model=session.model
         )
         session.spend(
-            corrective_iterations=found.iterations,
-            jacobians=found.iterations,
-            forward_kinematics=found.iterations + 1,
+            corrective_iterations=correction.iterations,
+            jacobians=correction.iterations,
+            forward_kinematics=correction.iterations + 1,
         )
-        q = found.q
+        q = correction.q
         configurations.append(q)
     return np.array(configurations)
 

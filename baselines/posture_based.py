@@ -136,10 +136,10 @@ class PostureBased(Method):
         if len(session.hands) ** session.goals_count <= most:
             return itertools.product(sorted(session.hands), repeat=session.goals_count)
         task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
-        found = cheapest_chains(
+        chains = cheapest_chains(
             session, task, session.rng, nodes=_BEAM_POSTURES, graphs=1, chains=1, most=most
         )
-        return [chain.hands for chain in found]
+        return [chain.hands for chain in chains]
 
 
 class OneGoal(PostureBased):
@@ -298,13 +298,15 @@ class Planner:
             searches = [
                 self.searches_of(*entry, ahead) for entry in zip(plans, retrieved, strict=True)
             ]
-            possible = [bool(own) for own in searches]
+            possible = [bool(choices) for choices in searches]
             if not any(possible):
                 raise self.out_of_reach(plans[-1], retrieved[-1])
             plans = list(itertools.compress(plans, possible))
-            chains = iter(self.generate([search for own in searches for search in own], ahead))
-            for plan, own in zip(plans, filter(None, searches), strict=True):
-                chain = min(itertools.islice(chains, len(own)), key=lambda chain: chain.cost)
+            chains = iter(
+                self.generate([search for choices in searches for search in choices], ahead)
+            )
+            for plan, choices in zip(plans, filter(None, searches), strict=True):
+                chain = min(itertools.islice(chains, len(choices)), key=lambda chain: chain.cost)
                 self.adopt(plan, chain)
         return plans
 
@@ -336,8 +338,8 @@ class Planner:
             miss = self.goals[goal] - self.session.forward_kinematics(postures, hand)
             postures[..., :BASE_DOF] += miss * self.movable[:BASE_DOF]
             there = self.correct(postures, goal, hand, _RETRIEVED)
-            for i, found, at in zip(asking, postures, there, strict=True):
-                retrieved[i][goal, hand] = found[at]
+            for i, candidates, reached in zip(asking, postures, there, strict=True):
+                retrieved[i][goal, hand] = candidates[reached]
         return retrieved
 
     def searches_of(self, plan: GrowingPlan, retrieved: Layers, goals: range) -> list[Search]:
@@ -414,8 +416,8 @@ class Planner:
                 if lengths[k, better[0]] < costs[k]:
                     best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
         return [
-            PostureChain(search.hands, *found)
-            for search, *found in zip(searches, best, costs.tolist(), strict=True)
+            PostureChain(search.hands, postures_of_search, cost)
+            for search, postures_of_search, cost in zip(searches, best, costs.tolist(), strict=True)
         ]
 
     def correct_generated(
@@ -429,11 +431,13 @@ class Planner:
         before = np.broadcast_to(start, (*postures.shape[:2], postures.shape[-1])).copy()
         for k, goal in enumerate(goals):
             for hand in self.session.hands:
-                own = [i for i, chosen in enumerate(hands) if chosen[k] == hand]
-                if own:
-                    posture = np.where(self.free_joints(hand), postures[own, :, k], before[own])
-                    accurate[own] &= self.correct(posture, goal, hand, _GENERATED)
-                    postures[own, :, k] = before[own] = posture
+                with_hand = [i for i, chosen in enumerate(hands) if chosen[k] == hand]
+                if with_hand:
+                    posture = np.where(
+                        self.free_joints(hand), postures[with_hand, :, k], before[with_hand]
+                    )
+                    accurate[with_hand] &= self.correct(posture, goal, hand, _GENERATED)
+                    postures[with_hand, :, k] = before[with_hand] = posture
         return accurate
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:

@@ -103,9 +103,13 @@ class PostureGraph:
     layers: dict[tuple[int, Hand], Array]
     """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
     spent: Spent = field(default_factory=Spent)
+    costs: Array | float = 1.0
+    """What the movement of each joint costs, shape ``(dof,)``, or of all of them."""
 
     @classmethod
-    def sampled(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
+    def sampled(
+        cls, task: Task, count: int, rng: np.random.Generator, costs: Array | float = 1.0
+    ) -> PostureGraph:
         """A graph with at most ``count`` nodes per goal and hand.
 
         Half of a layer is sampled around the nodes of the goal before, by whichever hand: of
@@ -123,7 +127,7 @@ class PostureGraph:
                     starts[half] = before[rng.integers(len(before), size=count // 2)]
                 layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
-        return cls(task, layers, spent)
+        return cls(task, layers, spent, costs)
 
     def chains(
         self, only: tuple[Hand, ...] | None = None, most: int | None = None
@@ -145,8 +149,8 @@ class PostureGraph:
             longer = [more for beginning in kept for more in self.longer(beginning, None)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        for whole in kept:
-            yield self.chain_of(whole)
+        for complete in kept:
+            yield self.chain_of(complete)
 
     def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
         """Why there is no chain: the first goal without a posture; empty where there is one."""
@@ -176,8 +180,10 @@ class PostureGraph:
             if layer is None or not len(layer):
                 continue
             last = hands[-1] if hands else hand
-            base = squared_distances(nodes[last], layer, slice(0, BASE_DOF))
-            arm = squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
+            weighted = layer * self.costs
+            base = squared_distances(nodes[last] * self.costs, weighted, slice(0, BASE_DOF))
+            joints = self.task.robot.joints(hand)
+            arm = squared_distances(nodes[hand] * self.costs, weighted, joints)
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
                 step = np.sqrt(base + arm)
@@ -194,9 +200,9 @@ class PostureGraph:
                     came[:, i], reached[:, i] = least_of_columns(total)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
-    def chain_of(self, whole: Beginning) -> Chain:
+    def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
-        hands, cost, back = whole.hands, whole.cost, whole.back
+        hands, cost, back = complete.hands, complete.cost, complete.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
         for goal in reversed(range(len(hands))):
@@ -223,24 +229,26 @@ def cheapest_chains(
     chains: int,
     most: int,
     only: tuple[Hand, ...] | None = None,
+    costs: Array | float = 1.0,
 ) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
-    :meth:`PostureGraph.chains`. The session spends what it takes.
+    :meth:`PostureGraph.chains`, ``costs`` of joints as in :class:`PostureGraph`. The session
+    spends what it takes.
 
     Raises MethodError where a goal has no posture.
     """
-    made = 0
+    yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sampled(task, nodes, rng)
+        graph = PostureGraph.sampled(task, nodes, rng, costs)
         session.spend(**vars(graph.spent))
         missing = graph.why_none(only)
         if missing:
             raise MethodError("infeasible", missing)
         for chain in graph.chains(only, most):
-            made += 1
+            yielded += 1
             yield chain
-        if number >= graphs and made >= chains:
+        if number >= graphs and yielded >= chains:
             return
 
 

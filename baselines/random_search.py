@@ -127,12 +127,12 @@ class _Search:
             # What comes next is known until a centre moves, which is rare.
             state = self._rng.bit_generator.state
             drawn, following = self._ahead(hands, best, min(ahead, self._practice.left))
-            made, moved = self._around(drawn)
+            tried, moved = self._around(drawn)
             ahead = min(2 * ahead, _AHEAD)
             if moved:  # then what was drawn beyond that was not to come
                 self._rng.bit_generator.state = state
-                self._ahead(hands, best, made)
-                following, ahead = None, made
+                self._ahead(hands, best, tried)
+                following, ahead = None, tried
 
     def _begin(self, hands: str) -> None:
         """The first trial of a hand sequence."""

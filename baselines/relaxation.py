@@ -84,7 +84,9 @@ class Relaxation:
             self._stiff[g, stiff_joints(task, hand, still)] = True
         self._stiff[list(merged)] = True
         self.goal_of = np.array([g for g, _ in links], dtype=np.intp)
-        self._own = np.array([g * dof + arms[g].first + k for g, k in links], dtype=np.intp)
+        self._joint_columns = np.array(
+            [g * dof + arms[g].first + k for g, k in links], dtype=np.intp
+        )
         self._tip = np.array([k + 1 == len(arms[g].links) for g, k in links], dtype=np.bool_)
         discs = [disc_of(task, arm) for arm in chosen]
         shoulders = np.array([shoulder for shoulder, _ in discs])
@@ -103,18 +105,18 @@ class Relaxation:
             for joint in range(dof):
                 cones.add_change(q0, g, joint)
             cones.close(clarabel.SecondOrderConeT)
-            own = [
+            links_of_arm = [
                 (int(self._directions[number]), float(self._lengths[number]))
                 for number in np.flatnonzero(self.goal_of == g)
             ]
             cones.add({}, self._radii[g])
             self._hand_rows[g] = len(cones.rows) + np.arange(2)
             for axis in range(2):
-                reach = {column + axis: link for column, link in own}
+                reach = {column + axis: link for column, link in links_of_arm}
                 away = float(shoulders[g, axis]) - task.goals[g][axis]
                 cones.add({g * dof + axis: 1.0, **reach}, away)
             cones.close(clarabel.SecondOrderConeT)
-            for column, _ in own:
+            for column, _ in links_of_arm:
                 cones.add({}, 1.0)
                 cones.add({column: 1.0}, 0.0)
                 cones.add({column + 1: 1.0}, 0.0)
@@ -158,23 +160,23 @@ class Relaxation:
         # Within the unit ball over the joints that may move; without limit over the others.
         norms = np.sqrt((np.where(self._stiff, 0.0, pulls) ** 2).sum(axis=1, keepdims=True))
         pulls = np.where(self._stiff, pulls, pulls / np.maximum(norms, 1.0))
-        found = Multipliers(pulls, -dual[self._hand_rows])
-        return found, np.nan_to_num(np.array(solution.x)), solution.iterations
+        multipliers = Multipliers(pulls, -dual[self._hand_rows])
+        return multipliers, np.nan_to_num(np.array(solution.x)), solution.iterations
 
-    def lagrangian(self, found: Multipliers, longest: float) -> Lagrangian:
+    def lagrangian(self, multipliers: Multipliers, longest: float) -> Lagrangian:
         """What multipliers say of the paths that are no longer than ``longest``."""
-        weights = found.pulls.copy()
-        weights[:-1] -= found.pulls[1:]
-        turns = weights.ravel()[self._own]
+        weights = multipliers.pulls.copy()
+        weights[:-1] -= multipliers.pulls[1:]
+        turns = weights.ravel()[self._joint_columns]
         rest = weights.copy()
-        rest[:, :BASE_DOF] += found.forces
-        rest.ravel()[self._own] = 0.0
+        rest[:, :BASE_DOF] += multipliers.forces
+        rest.ravel()[self._joint_columns] = 0.0
         slopes = turns.copy()
         slopes[:-1] -= np.where(self._tip[:-1], 0.0, turns[1:])
-        forces = found.forces[self.goal_of] * self._lengths[:, None]
+        forces = multipliers.forces[self.goal_of] * self._lengths[:, None]
         constant = (
-            float((found.forces * self._offset).sum())
-            - float((self._radii * np.sqrt((found.forces**2).sum(axis=1))).sum())
+            float((multipliers.forces * self._offset).sum())
+            - float((self._radii * np.sqrt((multipliers.forces**2).sum(axis=1))).sum())
             - longest * float(np.abs(rest).sum())
             - float(slopes @ self._start_angles)
         )
@@ -295,16 +297,16 @@ class Lagrangian:
         """
         limit = self.least(box) + slack
         size = np.maximum(self.sizes, 1e-12)
-        found = box.copy()
+        narrowed = box.copy()
         for side, sign in ((0, 1.0), (1, -1.0)):
-            angles = found[:, side]
+            angles = narrowed[:, side]
             for _ in range(_PARABOLAS):
                 excess = np.maximum(self.at(angles) - limit, 0.0)
                 rise = sign * (self.slopes - self.sizes * directions(angles - self.towards)[..., 1])
                 safe = (rise + np.sqrt(rise**2 + 2.0 * size * excess)) / size
                 angles = np.where(excess > 0.0, angles + sign * safe, angles)
-            found[:, side] = angles
-        return found
+            narrowed[:, side] = angles
+        return narrowed
 
 
 def disc_of(task: Task, arm: Arm | None) -> tuple[Array, float]:
@@ -375,13 +377,13 @@ def half_space_normals(half: Array) -> Array:
     normal is valid: the offsets make it so. More of them bound no better in the same time.
     """
     zero, one = np.zeros_like(half), np.ones_like(half)
-    found = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero)]
+    normals = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero)]
     cosine, sine = directions(np.minimum(0.5 * half, math.pi / 2)).T
     end = directions(np.minimum(half, math.pi))
-    found += [(zero, one, -cosine), (zero, -one, cosine), (one, zero, sine), (one, zero, -sine)]
+    normals += [(zero, one, -cosine), (zero, -one, cosine), (one, zero, sine), (one, zero, -sine)]
     slope = end[:, 1] / np.maximum(half, 1e-12)
-    found += [(zero, one, -slope), (zero, -one, slope)]
-    return np.array(found).swapaxes(0, 1)
+    normals += [(zero, one, -slope), (zero, -one, slope)]
+    return np.array(normals).swapaxes(0, 1)
 
 
 def support_of(normals: Array, half: Array) -> Array:

@@ -111,14 +111,14 @@ class TrajectoryOptimisation(Method):
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
             instance, plan = min(plans, key=lambda entry: entry[1].cost)
-            made = self.movements_of(session, task, problem, instance, plan)
+            solution = self.movements_of(session, task, problem, instance, plan)
         details = {
             "cost": plan.cost,
             "path_length": float(plan.lengths(task.q0).sum()),
             "costs": {letters_of(i.hands): p.cost for i, p in plans},
             "failed": failed,
         }
-        return Result(tuple(made), details)
+        return Result(tuple(solution), details)
 
     def plans(
         self,
@@ -136,7 +136,7 @@ class TrajectoryOptimisation(Method):
                 still=self.parameters.other_arm == "still",
                 radius=self.target_radius(session, task),
             )
-            found = []
+            converged = []
             for start in starts:
                 plan = problem.solve(
                     instance,
@@ -145,9 +145,9 @@ class TrajectoryOptimisation(Method):
                 )
                 session.spend(**plan.spent)
                 if plan.converged:
-                    found.append(plan)
-            if found:
-                plans.append((instance, min(found, key=lambda plan: plan.cost)))
+                    converged.append(plan)
+            if converged:
+                plans.append((instance, min(converged, key=lambda plan: plan.cost)))
             else:
                 failed[letters_of(hands)] = plan.reason
         return plans, failed
@@ -173,15 +173,15 @@ class TrajectoryOptimisation(Method):
             most=parameters.most_sequences,
             only=only,
         ):
-            known = starts.setdefault(chain.hands, [])
-            known.append(chain.configurations)
+            starts_of_hands = starts.setdefault(chain.hands, [])
+            starts_of_hands.append(chain.configurations)
             if parameters.other_arm == "free" and len(task.hands) > 1:
-                known.append(spread_out(task, chain))
-        for known in starts.values():
-            first = known[0]
+                starts_of_hands.append(spread_out(task, chain))
+        for starts_of_hands in starts.values():
+            first = starts_of_hands[0]
             for _ in range(parameters.noisy_starts):
                 spread = 0.1 * 10.0 ** rng.random()
-                known.append(first + spread * rng.standard_normal(first.shape))
+                starts_of_hands.append(first + spread * rng.standard_normal(first.shape))
         return starts
 
     def target_radius(self, session: Session, task: Task) -> float:
@@ -197,11 +197,11 @@ class TrajectoryOptimisation(Method):
         plan: Plan,
     ) -> list[Movement]:
         """The movements of a plan; the session spends what they take."""
-        made, evaluations = movements(
+        planned, evaluations = movements(
             task, instance.hands, plan.configurations, instance.held, session.model
         )
         session.spend(forward_kinematics=evaluations)
-        return made
+        return planned
 
 
 class PathLength(TrajectoryOptimisation):
@@ -228,20 +228,20 @@ class PathLength(TrajectoryOptimisation):
         if not self.parameters.whole_ticks:
             return super().movements_of(session, task, problem, instance, plan)
         rounding = Rounding(problem, instance, session.model.step)
-        whole = rounding.nearest(plan)
+        rounded = rounding.nearest(plan)
         session.spend(**rounding.spent)
-        if whole is None:  # aimed inside the discs it is a plan all the same
+        if rounded is None:  # aimed inside the discs it is a plan all the same
             inside = replace(instance, radius=super().target_radius(session, task))
             plan = problem.solve(inside, plan.configurations)
             session.spend(**plan.spent)
             if not plan.converged:
                 raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
             return super().movements_of(session, task, problem, inside, plan)
-        made, evaluations = movements(
-            task, whole.hands, whole.configurations, instance.held, session.model, whole.steps
+        planned, evaluations = movements(
+            task, rounded.hands, rounded.configurations, instance.held, session.model, rounded.steps
         )
         session.spend(forward_kinematics=evaluations)
-        return made
+        return planned
 
 
 class Smooth(TrajectoryOptimisation):
@@ -270,20 +270,20 @@ def path_movements(
     piece then begins the next movement, so that the whole path is followed: but for joints
     held on the way to the next goal, which stay where they are.
     """
-    made: list[Movement] = []
+    paths: list[Movement] = []
     here, rest = np.array(task.q0), np.empty((0, task.robot.dof))
     for goal, (hand, piece) in enumerate(zip(instance.hands, path, strict=True)):
         ahead = np.where(instance.held[goal], here, np.vstack([rest, piece]))
-        found = follow(
+        followed = follow(
             task.robot, here, ahead, hand, task.goals[goal], task.radius, model=session.model
         )
-        session.spend(forward_kinematics=found.evaluations)
-        made.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
+        session.spend(forward_kinematics=followed.evaluations)
+        paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
         steps = np.diff(np.vstack([here, ahead]), axis=0)
         ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
-        steps_made = found.ticks - session.model.arrival_tick
-        here, rest = found.q, ahead[ends > steps_made * session.model.step]
-    return made
+        steps_made = followed.ticks - session.model.arrival_tick
+        here, rest = followed.q, ahead[ends > steps_made * session.model.step]
+    return paths
 
 
 _PLANNER = frozenset(

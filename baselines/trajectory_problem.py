@@ -104,10 +104,21 @@ class Plan:
 
 
 class TrajectoryProblem:
-    """The compiled programme of one cost, for every task of a robot with so many goals."""
+    """The compiled programme of one cost, for every task of a robot with so many goals.
 
-    def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
+    ``joint_costs`` weigh the joints in path lengths (:mod:`coartic.motion.costs`).
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        hands: tuple[Hand, ...],
+        goals: int,
+        cost: Cost,
+        joint_costs: tuple[float, ...] | None = None,
+    ) -> None:
         self.robot, self.goals, self.cost = robot, goals, cost
+        self._joint_costs = 1.0 if joint_costs is None else np.array(joint_costs)
         self._order = _DERIVATIVES[cost]
         dof, order = robot.dof, self._order
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
@@ -129,7 +140,8 @@ class TrajectoryProblem:
             limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
-            limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
+            weighted = steps if joint_costs is None else casadi.diag(joint_costs) @ steps
+            limits += [casadi.sumsqr(weighted[:, g]) - lengths[g] ** 2 for g in range(goals)]
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
@@ -214,7 +226,7 @@ class TrajectoryProblem:
         """Lengths of the segments to start from, with their least and most."""
         if self.cost != "path-length":
             return np.zeros(self.goals), np.zeros(self.goals), np.zeros(self.goals)
-        at = np.sqrt((steps**2).sum(axis=1))
+        at = np.sqrt(((steps * self._joint_costs) ** 2).sum(axis=1))
         low, high = np.zeros(self.goals), np.full(self.goals, np.inf)
         if lengths is not None:
             given = ~np.isnan(lengths)
@@ -288,10 +300,14 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 
 @lru_cache(maxsize=32)
 def trajectory_problem(
-    robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
+    robot: Robot,
+    hands: tuple[Hand, ...],
+    goals: int,
+    cost: Cost,
+    joint_costs: tuple[float, ...] | None = None,
 ) -> TrajectoryProblem:
     """The compiled problem, built once per process."""
-    return TrajectoryProblem(robot, hands, goals, cost)
+    return TrajectoryProblem(robot, hands, goals, cost, joint_costs)
 
 
 def spline(plan: Plan, q0: Array, samples: int) -> list[Array]:

@@ -41,7 +41,7 @@ class Practice:
         left = session.trials_left
         self.left = parameters.trials if left is None else min(parameters.trials, left)
         """Trials left."""
-        self.made = 0
+        self.trials_made = 0
         self.reward = -math.inf
         """Best reward so far."""
         self.hands = ""
@@ -82,12 +82,12 @@ class Practice:
 
     def result(self, **details: Any) -> Result:
         """The best trial's movements; MethodError where no trial hit every goal."""
-        if not self.made:
+        if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:
             raise MethodError(
                 "infeasible",
-                f"the corrective process failed in all {self.made} trials made; "
+                f"the corrective process failed in all {self.trials_made} trials made; "
                 "no trial hit every goal",
                 details,
             )
@@ -100,7 +100,7 @@ class Practice:
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
             self.reward, self.hands = float(rewards[best]), hands[best]
-            self._best_trial, self._targets = self.made + best, trials.targets[best]
-        self.made += len(rewards)
+            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
+        self.trials_made += len(rewards)
         self.left -= len(rewards)
         return trials

@@ -75,9 +75,9 @@ class Rounding:
             key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
         )
         for steps in ranked[:MOST_ROUNDINGS]:
-            found = self.divided(plan, list(steps), merged)
-            if found is not None:
-                yield found
+            rounded = self.divided(plan, list(steps), merged)
+            if rounded is not None:
+                yield rounded
 
     def least(self, plan: Plan, merged: tuple[int, ...] = ()) -> int:
         """Ticks that no rounding of a plan as long as this one can go below."""
@@ -105,27 +105,27 @@ class Rounding:
                 continue
             for g in further:
                 more = (*merged, g)
-                found = self.solve_around(plan.configurations, np.full(goals, np.nan), more)
-                if found.converged:
-                    waiting.append((more, found))
+                merger = self.solve_around(plan.configurations, np.full(goals, np.nan), more)
+                if merger.converged:
+                    waiting.append((more, merger))
 
     def divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
         """The plan with these steps to all goals but the last, and as few as can be to that."""
         lengths = np.array([*steps, np.nan]) * self._step
-        found = self.solve_around(plan.configurations, lengths, merged)
-        if not found.converged:
+        shortest = self.solve_around(plan.configurations, lengths, merged)
+        if not shortest.converged:
             return None
-        last = found.lengths(self._instance.q0)[-1] / self._step
+        last = shortest.lengths(self._instance.q0)[-1] / self._step
         lengths[-1] = math.ceil(last - _SLACK) * self._step
         # Hands as deep inside the discs as these lengths allow: safe against rounding, and
         # above all those that are to be there before another hand hits.
         deep = merged or range(len(lengths))
-        centred = self.solve_around(found.configurations, lengths, merged, deep=deep)
+        centred = self.solve_around(shortest.configurations, lengths, merged, deep=deep)
         if not centred.converged:
             return None
         lengths[list(merged)] = 0.0
-        whole = tuple(round(length / self._step) for length in lengths)
-        return TickPlan(self._instance.hands, whole, centred.configurations)
+        rounded = tuple(round(length / self._step) for length in lengths)
+        return TickPlan(self._instance.hands, rounded, centred.configurations)
 
     def solve_around(
         self,
@@ -181,12 +181,12 @@ def movements(
     each movement aims through the rim to hit after so many; where no target beyond does,
     it aims at the plan's own configuration.
     """
-    made: list[Movement] = []
+    planned: list[Movement] = []
     q, evaluations = np.array(task.q0), 0
     for goal, hand in enumerate(hands):
         wanted = np.where(held[goal], q, configurations[goal])
         if steps is not None and not steps[goal]:
-            made.append(Movement(goal + 1, hand, "corrective", wanted))
+            planned.append(Movement(goal + 1, hand, "corrective", wanted))
             continue
         targets = [wanted]
         if steps is not None:
@@ -199,5 +199,5 @@ def movements(
             if steps is None or (result.hit and result.ticks <= steps[goal] + 1):
                 break
         q = result.q
-        made.append(Movement(goal + 1, hand, "planned", target))
-    return made, evaluations
+        planned.append(Movement(goal + 1, hand, "planned", target))
+    return planned, evaluations

@@ -43,6 +43,7 @@ MODULES = (
     "coartic.baselines.nullspace_qp",
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",
+    "coartic.baselines.receding_horizon",
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""

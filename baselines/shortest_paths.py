@@ -1,0 +1,164 @@
+"""The shortest path over all hand sequences, in whole control ticks.
+
+What the searches for the optimum and the planner with a receding horizon share: each start is
+polished by IPOPT, the shortest plan of each hand sequence is kept, and every plan that may be
+the best one is rounded to whole ticks in every way, with and without goals that are hit as their
+turn comes because the other hand is already there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from coartic import Execution, MotionModel, Movement, Task, execute
+from coartic.baselines.posture_graph import cheapest_chains, spread_out
+from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic.baselines.whole_ticks import Rounding, movements
+from coartic.method import MethodError, Session
+from coartic.robot import Array, Hand
+
+Hands = tuple[Hand, ...]
+Start = tuple[Hands, Array]
+"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+
+
+class ShortestPlans(NamedTuple):
+    """What polishing many starts came to."""
+
+    by_hands: dict[Hands, tuple[Instance, Plan]]
+    """The shortest plan of each hand sequence that has one."""
+    solves: int
+    failed: int
+
+    @property
+    def ranked(self) -> list[tuple[Instance, Plan]]:
+        """The plans, the shortest first."""
+        return sorted(self.by_hands.values(), key=lambda entry: entry[1].cost)
+
+
+class PlanInTicks(NamedTuple):
+    """A plan in whole ticks."""
+
+    movements: tuple[Movement, ...]
+    execution: Execution
+    plan: Plan
+    """The plan that was rounded."""
+
+
+def check_ticks(model: MotionModel) -> None:
+    """MethodError for a motion model whose ticks the rounding does not know."""
+    if (model.arrival_tick, model.whole_last_step) != (1, False):
+        raise MethodError("infeasible", "proof and rounding need a tick for each arrival "
+                          "and a last step that ends at the target")  # fmt: skip
+
+
+def chain_starts(
+    session: Session,
+    task: Task,
+    rng: np.random.Generator,
+    *,
+    nodes: int,
+    graphs: int,
+    chains: int,
+    most: int,
+    spread: bool,
+    only: Hands | None = None,
+    costs: Array | float = 1.0,
+) -> Iterator[Start]:
+    """The chains of :func:`~coartic.baselines.posture_graph.cheapest_chains`.
+
+    With ``spread``, each of a robot with two hands also with its other arm spread out.
+    """
+    for chain in cheapest_chains(
+        session, task, rng,
+        nodes=nodes, graphs=graphs, chains=chains, most=most, only=only, costs=costs,
+    ):  # fmt: skip
+        yield chain.hands, chain.configurations
+        if spread and len(task.hands) > 1:
+            yield chain.hands, spread_out(task, chain)
+
+
+def shortest_plans(
+    session: Session,
+    task: Task,
+    problem: TrajectoryProblem,
+    starts: Iterable[Start],
+    *,
+    still: bool,
+    radius: float,
+) -> ShortestPlans:
+    """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
+
+    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
+    solve finds a path.
+    """
+    best: dict[Hands, tuple[Instance, Plan]] = {}
+    solves = failed = 0
+    for hands, start in starts:
+        instance = Instance.of(task, hands, still=still, radius=radius)
+        plan = problem.solve(instance, start)
+        session.spend(**plan.spent)
+        solves += 1
+        failed += not plan.converged
+        if plan.converged and (hands not in best or plan.cost < best[hands][1].cost):
+            best[hands] = instance, plan
+    if not best:
+        raise MethodError(
+            "infeasible", f"none of {solves} solves found a path that hits every goal"
+        )
+    return ShortestPlans(best, solves, failed)
+
+
+def fewest_ticks(
+    session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
+) -> PlanInTicks:
+    """The fewest ticks over all plans, roundings and mergers, as executed.
+
+    Of equal ones the one with the fewest corrections, then the one of the shortest plan. Raises
+    MethodError where no rounding can be solved.
+    """
+    fewest: PlanInTicks | None = None
+
+    def worth(ticks: int) -> bool:
+        return fewest is None or ticks < fewest.execution.ticks
+
+    for instance, plan in plans.ranked:
+        rounding = Rounding(problem, instance, session.model.step)
+        # A merger saves one tick a goal and never shortens the path.
+        most = len(instance.hands)
+        if not worth(rounding.least(plan) - most):
+            continue
+        for merged, shortest in rounding.plans(plan, task, worth):
+            if not worth(rounding.least(shortest, merged)):
+                continue
+            for rounded in rounding.every(shortest, merged):
+                if not worth(rounded.ticks):
+                    continue
+                planned, evaluations = movements(
+                    task,
+                    rounded.hands,
+                    rounded.configurations,
+                    instance.held,
+                    session.model,
+                    rounded.steps,
+                )
+                execution = execute(task, planned, model=session.model)
+                session.spend(forward_kinematics=evaluations + execution.evaluations)
+                if execution.completed and (
+                    fewest is None or price(execution) < price(fewest.execution)
+                ):
+                    fewest = PlanInTicks(tuple(planned), execution, shortest)
+                if not worth(rounding.least(shortest, merged)):
+                    break  # no other rounding takes fewer
+        session.spend(**rounding.spent)
+    if fewest is None:
+        raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
+    return fewest
+
+
+def price(execution: Execution) -> tuple[int, int]:
+    """Ticks, and of as many ticks the corrections."""
+    return execution.ticks, execution.corrections

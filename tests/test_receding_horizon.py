@@ -1,0 +1,188 @@
+"""The planner with a receding horizon, and path lengths in which joints cost unlike."""
+
+import math
+
+import numpy as np
+import pytest
+
+from coartic import PAPER, Robot, execute, load_task
+from coartic.baselines.optimum import DynamicProgramming
+from coartic.baselines.receding_horizon import RecedingHorizon, remaining
+from coartic.benchmarks.suites import load_suite, select_cells
+from coartic.method import Session
+from coartic.motion.costs import joint_costs, segment_lengths
+from coartic.motion.ticks import trajectory
+from tests.support.strategies import tiny_task
+from tests.support.suites import KNOWN, run_and_write, suite_of
+
+FEW = {"graphs": 1, "chains": 1}
+# With four links, for which kernels are compiled anyway.
+INSTANCES = [
+    "one-armed/v1/d001", "one-armed/v1/d004", "two-armed/v1/d001", "two-armed/v1/d005",
+    "aligned/v1/d001", "aligned/v1/d008", "redundancy/v1/d007", "redundancy/v1/d009",
+]  # fmt: skip
+
+
+def solved(task, method=RecedingHorizon, **parameters):
+    """Result and execution of a method on a task."""
+    session = Session(task, 0, method.told, trusted=True)
+    result = method(method.Parameters(**{**FEW, **parameters})).solve(session)
+    return result, execute(task, result.solution)
+
+
+def weighted_length(task, solution, costs):
+    return segment_lengths(trajectory(task, solution).configurations, costs).sum()
+
+
+@pytest.mark.parametrize("name", ["descending", "two-armed/v1/d006", "redundancy/v1/d009"])
+def test_with_all_goals_in_view_it_is_the_search_for_the_optimum(name):
+    task = load_task(name)
+    nodes = 60
+    result, execution = solved(task, nodes=nodes * len(task.hands), horizon=50, starts=1000)
+    reference, best = solved(task, DynamicProgramming, nodes=nodes)
+    assert execution.reward == best.reward
+    assert result.details["windows"] == 1
+    # The plan with the fewest ticks, which need not be the very shortest.
+    shortest = reference.details["path_length"]
+    assert shortest - 1e-8 <= result.details["path_length"] < shortest + PAPER.step
+
+
+def planar_task(**changes):
+    """A short arm of two links on a fixed base, whose other arm has nothing to do."""
+    robot = Robot(right_links=(1.0, 0.8))
+    content = {
+        "robot": {"right_links": list(robot.right_links)},
+        "start": {"base": [0.0, 0.0], "left": [0.0] * 4, "right": [0.4, 0.9]},
+        "goals": [[1.4, 1.3], [-0.6, 1.0]],
+        "hands": ["right"],
+        "locked_base": ["x", "y"],
+    }
+    return tiny_task(**{**content, **changes})
+
+
+def nearest_by_grid(task, q, goal, spacing=0.004):
+    """Least joint-space distance from ``q`` to a posture of the two links that hits a goal.
+
+    All angles that a shortest way may lead to, on a grid; the hand by trigonometry.
+    """
+    first, second = (np.arange(q[-2 + k] - math.pi, q[-2 + k] + math.pi, spacing) for k in (0, 1))
+    a, b = np.meshgrid(first, second, indexing="ij")
+    links, (x, y) = task.robot.right_links, task.robot.right_shoulder
+    hand_x = x + links[0] * np.cos(a) + links[1] * np.cos(a + b)
+    hand_y = y + links[0] * np.sin(a) + links[1] * np.sin(a + b)
+    inside = np.hypot(hand_x - task.goals[goal][0], hand_y - task.goals[goal][1]) <= task.radius
+    return np.hypot(a - q[-2], b - q[-1])[inside].min()
+
+
+@pytest.mark.parametrize("goals", [[[1.4, 1.3], [-0.6, 1.0]], [[0.6, -1.2], [1.9, 0.6]]])
+def test_without_look_ahead_each_goal_is_reached_the_shortest_way(goals):
+    task = planar_task(goals=goals)
+    _, execution = solved(task, horizon=0)
+    q = task.q0
+    for goal, ticks in enumerate(execution.ticks_by_goal()):
+        length = nearest_by_grid(task, q, goal)
+        assert abs(ticks - (math.ceil(length / PAPER.step) + 1)) <= 1
+        q = execution.configurations[goal]
+
+
+def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view():
+    rewards = {horizon: [] for horizon in (0, 1, 9)}
+    for name in INSTANCES:
+        task = load_task(name)
+        for horizon, of_horizon in rewards.items():
+            of_horizon.append(solved(task, horizon=horizon, nodes=150)[1].reward)
+    gaps = [np.mean(np.divide(rewards[horizon], rewards[9]) - 1) for horizon in (0, 1)]
+    assert gaps[0] > gaps[1] > 0
+    # By luck of rounding it may be a tick better.
+    assert all(np.array(rewards[9]) >= np.array(rewards[0]) - 1)
+
+
+def test_same_parameters_same_movements_and_all_corrections_are_avoided():
+    task = load_task("two-armed/v1/d005")
+    results = [solved(task, horizon=1, nodes=60) for _ in range(2)]
+    targets = [np.array([m.target for m in result.solution]) for result, _ in results]
+    assert np.array_equal(*targets)
+    assert results[0][0].details == results[1][0].details
+    assert results[0][1].corrections == 0
+    assert results[0][0].details["windows"] == 2
+
+
+def test_with_hands_given_only_postures_look_ahead():
+    task = load_task("two-armed/v1/d005")
+    _, best = solved(task, horizon=9, nodes=100)
+    _, postures_alone = solved(task, horizon=0, nodes=100, hands="optimal")
+    assert postures_alone.hands == best.hands
+    assert postures_alone.reward <= best.reward
+
+
+def test_what_remains_of_a_task_begins_where_the_robot_stands():
+    task = load_task("redundancy/v1/d009")
+    q = np.linspace(-1.0, 1.0, task.robot.dof)
+    rest = remaining(task, q, 1, 3)
+    assert np.array_equal(rest.q0, q)
+    assert rest.goals == task.goals[1:3]
+
+
+def test_weighted_lengths_by_hand():
+    robot = Robot(left_links=(1.0,), right_links=(1.0, 1.0))
+    assert joint_costs(robot, "none", 3.0).tolist() == [1, 1, 1, 1, 1]
+    assert joint_costs(robot, "base", 3.0).tolist() == [3, 3, 1, 1, 1]
+    assert joint_costs(robot, "arms", 2.0).tolist() == [1, 1, 2, 2, 2]
+    assert joint_costs(robot, "left-arm", 3.0).tolist() == [1, 1, 3, 1, 1]
+    assert joint_costs(robot, "right-arm", 3.0).tolist() == [1, 1, 1, 3, 3]
+    rows = np.array([[0, 0, 0, 0, 0], [1, 0, 4, 0, 0], [1, 0, 4, 0, 2]], dtype=float)
+    costs = joint_costs(robot, "base", 3.0)
+    assert segment_lengths(rows, costs).tolist() == [5, 2]
+
+
+def test_costly_joints_move_less():
+    task = load_task("redundancy/v1/d009")
+    costs = joint_costs(task.robot, "base", 4.0)
+    equal, execution = solved(task, horizon=9, nodes=200)
+    weighted, _ = solved(task, horizon=9, nodes=200, costs="base", cost_factor=4.0)
+    lengths = [weighted_length(task, plan.solution, costs) for plan in (equal, weighted)]
+    assert lengths[1] < 0.98 * lengths[0]
+    # Each movement may go a step too far, of which the base's part costs four times as much.
+    most = 4.0 * PAPER.step * len(task.goals)
+    assert abs(lengths[1] - weighted.details["path_length"]) < most
+    # Without costly joints the executed path is that of the ticks, less one for each arrival.
+    steps = execution.ticks - np.count_nonzero(execution.ticks_by_goal())
+    plain = weighted_length(task, equal.solution, np.ones(task.robot.dof))
+    assert plain == pytest.approx(steps * PAPER.step)
+
+
+def test_costs_that_are_equal_give_the_plan_without_costs():
+    task = load_task("descending")
+    plain, _ = solved(task, horizon=9, nodes=60)
+    same, execution = solved(task, horizon=9, nodes=60, costs="base", cost_factor=1.0)
+    # It aims a little inside the discs, at most by the radius that is left out.
+    assert 0 < same.details["path_length"] - plain.details["path_length"] < 0.03
+    assert execution.corrections == 0
+
+
+def test_the_suite_has_test_instances_of_all_families():
+    cells = select_cells(load_suite("horizon"), KNOWN)
+    tasks = {cell.task.name: cell.task for cell in cells}
+    assert len(tasks) >= 200
+    assert {task.split for task in tasks.values()} == {"test"}
+    assert {len(task.goals) for task in tasks.values()} == set(range(2, 9))
+    planned = [cell for cell in cells if cell.method == RecedingHorizon.name]
+    plain = {"hands": "planned", "costs": "none"}
+    curve = [cell for cell in planned if plain.items() <= cell.all_parameters.items()]
+    for name, task in tasks.items():
+        seen = {cell.all_parameters["horizon"] for cell in curve if cell.task.name == name}
+        assert {0, 1, 2, 3} < seen
+        assert max(seen) >= len(task.goals) - 1
+
+
+def test_a_small_suite(tmp_path):
+    block = """
+tasks = ["two-armed/v1/d006"]
+methods = ["receding-horizon"]
+parameters = { nodes = 40, graphs = 1, chains = 1 }
+grid = { horizon = [0, 7] }
+"""
+    study = run_and_write(tmp_path / "results", suite_of(tmp_path, block), runs=1)
+    runs = study.runs
+    assert runs.status.tolist() == ["ok", "ok"]
+    assert runs.reward.is_monotonic_increasing
