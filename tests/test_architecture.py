@@ -53,14 +53,14 @@ def imported(path):
     return names
 
 
-@pytest.mark.parametrize("path", sources(), ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_imports_point_one_way(path):
-    relative = path.relative_to(ROOT).as_posix()
-    package = relative.split("/")[0]
-    others = {package_of(name) for name in imported(path)} & set(PACKAGES) - {package}
-    if not relative.startswith(COMMAND_LINE):
-        assert others <= ALLOWED[package]
-        assert not any(name.startswith("coartic.cli") for name in imported(path))
+def test_imports_point_one_way():
+    for path in sources():
+        relative = path.relative_to(ROOT).as_posix()
+        package = relative.split("/")[0]
+        others = {package_of(name) for name in imported(path)} & set(PACKAGES) - {package}
+        if not relative.startswith(COMMAND_LINE):
+            assert others <= ALLOWED[package], path
+            assert not any(name.startswith("coartic.cli") for name in imported(path)), path
 
 
 def module_of(path):
@@ -191,7 +191,8 @@ def without_posix(out):
     from coartic.benchmarks.run import Selection, plan_suite
     from tests.support.suites import InProcess
 
-    select = Selection(methods=["EC1", "random-search/climbing", "nullspace-qp/next-goal"])
+    methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
+    select = Selection(tasks=["ascending"], methods=methods)
     suite = plan_suite("quick", runs=2, trials=5, select=select)
     assert suite.perform(out, executor=InProcess()).progress.failed == 0
     runs = load(out).runs

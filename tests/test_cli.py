@@ -147,6 +147,7 @@ def test_draw(coartic, tmp_path):
     for name in ("one.png", "one.svg", "one.pdf"):
         assert coartic("draw", "ascending", "--out", tmp_path / name)[0] == 0
         assert (tmp_path / name).stat().st_size > 5000
+        assert b"Date" not in (tmp_path / name).read_bytes()
     own = tmp_path / "own.svg"
     assert coartic("draw", tmp_path / "mine.toml", "--out", own)[0] == 0
     before = own.read_bytes()
@@ -163,7 +164,7 @@ def test_animate(coartic, tmp_path):
     assert coartic(*SMALL, "--out", out)[0] == 0
     run_id = load(out).runs.run_id[0]
     film = tmp_path / "film.gif"
-    assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
+    assert coartic("animate", run_id, "--in", out, "--out", film, "--speed", 900, "--width", 200)[0] == 0
     assert film.read_bytes().startswith(b"GIF89a")
 
 

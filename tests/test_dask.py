@@ -57,7 +57,8 @@ SCHEDULER = """
 import sys, time
 from distributed import LocalCluster
 if __name__ == "__main__":
-    with LocalCluster(n_workers=1, dashboard_address=None, silence_logs=50) as cluster:
+    options = {"processes": False, "protocol": "tcp://", "dashboard_address": None}
+    with LocalCluster(n_workers=1, silence_logs=50, **options) as cluster:
         print(cluster.scheduler_address, flush=True)
         time.sleep(60)
 """

@@ -169,7 +169,7 @@ def test_it_stands_on_its_own():
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(
     seed=st.integers(0, 2**32),
     hand=st.sampled_from(HANDS),
@@ -204,7 +204,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 
 
-@pytest.mark.parametrize("kernel", ["Haswell", "Zen", "Prescott"])
+@pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
 def test_a_folder_is_sound_under_other_kernels_of_blas(whole, kernel):
     """As in another lab, whose processor has them."""
     command = [sys.executable, checker.__file__, whole]
