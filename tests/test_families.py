@@ -32,7 +32,7 @@ from coartic.tasks.families import (
 )
 from coartic.tasks.task import Address, address_of
 from tests.support.commands import call
-from tests.support.suites import ROOT, suite_of
+from tests.support.suites import ROOT
 
 # What the shipped families draw, by the hash of the task's file. A family is never changed: what
 # makes these fail makes results under these names incomparable, and needs a new version.
@@ -365,15 +365,6 @@ def test_a_small_suite(tmp_path):
     assert study.tasks == {name: instance(name) for name in names}
     again = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
     assert (again.progress.present, again.progress.done) == (10, 0)
-
-
-def test_a_goal_of_an_instance_moves(tmp_path):
-    block = 'tasks = ["two-armed/v1/i003"]\nmethods = ["dual-process/EC4"]\n'
-    cells = suite_of(tmp_path, block + "move = { goal = 2, by = [[0, 0.5]] }")
-    (task,) = (cell.task for cell in cells)
-    assert task.name == "two-armed/v1/i003.goal2_0_0.5"
-    assert task.family is task.split is None
-    assert task.goals[1] == pytest.approx(np.add(instance("two-armed/v1/i003").goals[1], (0, 0.5)))
 
 
 def test_an_instance_beside_a_suites_tasks():

@@ -207,14 +207,6 @@ def test_variants_of_a_task_are_told_apart():
     assert draw_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
 
 
-def test_ranking_is_the_mean_gap_of_the_runs(study, figures):
-    runs = study.runs
-    for row in figures["ranking"].data.query("task == 'two-armed-1'").itertuples():
-        rewards = runs[(runs.task == row.task) & (runs.method == row.method)].reward.astype(float)
-        top = study.optima[row.task, "free"].reward
-        assert row.gap == pytest.approx(((top - rewards) / -top).mean())
-
-
 def test_a_folder_that_cannot_be_written_into_gets_a_sentence(figures, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(CoarticError, match="cannot write to"):

@@ -84,11 +84,6 @@ def test_rewards_by_trial(results):
         assert (own[: run.best_trial] < run.reward).all()
 
 
-def test_sequences_table(results):
-    assert [len(results.sequences(name)) for name in results.tasks] == [1, 1, 16, 16]
-    assert list(results.sequences("two-armed-1").hands[:2]) == ["LRLR", "RRLR"]
-
-
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)

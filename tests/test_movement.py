@@ -144,17 +144,6 @@ def test_equals_the_loop_for_any_movement(
         assert_same(fast, reference.move(*arguments, stop_on_arrival=stop_on_arrival))
 
 
-@given(step=st.sampled_from([0.003, 0.01, 0.07]), tolerance=st.sampled_from([0.001, 0.01, 0.1]))
-@settings(max_examples=20)
-def test_equals_the_loop_under_other_constants(step, tolerance):
-    model = MotionModel(step=step, arrival_tolerance=tolerance)
-    rng = np.random.default_rng(7)
-    for _ in range(8):
-        q, target, goal = random_movement(rng, ROBOT, "left")
-        arguments = (ROBOT, q, target, "left", goal, 0.1)
-        assert_same(move(*arguments, model=model), reference.move(*arguments, model=model))
-
-
 def test_grazing_a_goal():
     """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
@@ -279,17 +268,6 @@ def test_inputs_are_left_alone_and_checked():
         move(ROBOT, q, target, "right", (1.0, 1.0), np.nan)
     with pytest.raises(ValueError, match="model.step is 0.0"):
         move(ROBOT, q, target, "right", (1.0, 1.0), 0.1, model=MotionModel(step=0.0))
-
-
-def test_a_path_of_one_segment_is_a_movement_without_early_arrival():
-    rng = np.random.default_rng(18)
-    for _ in range(300):
-        q, target, goal = random_movement(rng, ROBOT, "right")
-        path = follow(ROBOT, q, target[None], "right", goal, 0.1)
-        line = move(ROBOT, q, target, "right", goal, 0.1, stop_on_arrival=False)
-        if not on_a_rim(ROBOT, q, target, "right", goal, 0.1):
-            assert (path.ticks, path.hit) == (line.ticks, line.hit)
-            np.testing.assert_allclose(path.q, line.q, atol=1e-12)
 
 
 def test_a_path_costs_its_length_however_finely_it_is_cut():

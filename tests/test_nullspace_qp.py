@@ -20,7 +20,6 @@ from coartic.baselines.cascade import (
     CascadeError,
     damped_projection,
 )
-from coartic.baselines.corrective_alone import EverySequence
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
 from coartic.baselines.nullspace_qp import (
@@ -139,15 +138,6 @@ def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(solver, enum
     assert decided > 5
 
 
-def test_what_is_preferred_is_left_alone_where_the_task_allows_it():
-    """An inequality: inside the disc the hand goes wherever the joints would have it."""
-    rows = NORMALS @ ROBOT.jacobian(np.linspace(-1, 1, ROBOT.dof), "right")
-    preferred = np.linspace(-0.01, 0.01, ROBOT.dof)
-    assert (rows @ preferred).min() > -0.1
-    found = cascade_for(FACES, ROBOT.dof, "daqp").solve(rows, np.full(FACES, -0.1), preferred)
-    np.testing.assert_allclose(found, preferred, atol=1e-12)
-
-
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_a_modelling_language_gives_the_same(solver):
     """cvxpy is told the two levels as they are defined; limits are active in half of them."""
@@ -158,18 +148,6 @@ def test_a_modelling_language_gives_the_same(solver):
         found = cascade.solve(*problem)
         close = 0.0 if solver == "daqp" else 1e-7 if number < 5 else 1e-4
         np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=close)
-
-
-def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
-    task, found = tiny_task(), []
-    for modelling in ("none", "cvxpy"):
-        method = NextGoal(NextGoal.Parameters(hands="RR", period=10, modelling=modelling))
-        session = Session(task, 0, method.told, trusted=True)
-        result = method.solve(session)
-        found.append(
-            ([(m.hand, *m.target) for m in result.solution], session.meter.solver_iterations)
-        )
-    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
@@ -435,21 +413,3 @@ def test_the_hand_comes_nearer_all_the_time(name):
         hands = ROBOT.forward_kinematics(movement.waypoints, movement.hand)
         distances = np.hypot(*(hands - task.goal_array[movement.goal - 1]).T)
         assert (np.diff(distances) < 0.02 * distances[:-1]).all()
-
-
-def test_looking_farther_ahead_pays():
-    """Development instances: the controller against itself and the corrective process."""
-    totals = []
-    names = [f"{family}/v1/d00{k}" for family in ("one-armed", "aligned") for k in range(2)]
-    for method, parameters in (
-        (EverySequence, {}),
-        (NullspaceQP, {"period": 10}),
-        (NextGoal, {"period": 10, "horizon": 1}),
-        (NextGoal, {"period": 10}),
-    ):
-        executions = [solve(method, load_task(name), **parameters)[1] for name in names]
-        assert not any(execution.reason for execution in executions)
-        totals.append(sum(execution.reward for execution in executions))
-    alone, none, one, two = totals
-    assert none < one < two
-    assert two > 0.9 * alone

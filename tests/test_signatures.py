@@ -35,7 +35,6 @@ from coartic.analysis.signatures.paths import (
 )
 from coartic.analysis.signatures.register import signatures
 from coartic.analysis.signatures.subtasks import (
-    excess,
     isolated_agreement,
     isolated_reaches,
     sacrifices,
@@ -268,14 +267,6 @@ def test_other_hands_are_no_sacrifice():
     assert rows.loc["first subtask against the same hands"].value == 0
     assert rows.loc["total against the same hands"].value == 0
     assert rows.loc["first subtask sacrificed"].value == 0
-
-
-def test_the_learner_sacrifices_the_first_subtask():
-    """Shah, Barto & Fagg (2013), EC1."""
-    run = learn(load_task("ascending"), "EC1", seed=0, trials=4000)
-    learned, initial = execute(run.task, run.solution), corrective_trial(run.task, "RRR")
-    assert sacrifices(change_from(learned, initial))
-    assert excess(trajectory(run.task, run.solution))[0] > 0
 
 
 def test_choice_in_isolation():
@@ -518,19 +509,6 @@ def test_a_curve_is_no_slope():
     assert slope_norm(curve, places, rng()).p > 0.1
 
 
-def test_norm_of_slopes():
-    places = np.repeat([0.0, 1.0, 2.0, 3.0], 3)
-    q = np.outer(places, [0.3, 0.0, -0.4])
-    norm = slope_norm(q, places, rng())
-    assert norm.value == pytest.approx(0.5)
-    assert norm.p == pytest.approx(2 / 24)  # as it is, and backwards
-    flat = slope_norm(np.ones((12, 3)), places, rng())
-    assert (flat.value, flat.p) == (0.0, 1.0)
-    noise = 0.1 * rng(3).standard_normal((12, 3))
-    slopes = [slope.value for slope in locus_slopes(q + noise, places)]
-    assert slope_norm(q + noise, places, rng()).value == pytest.approx(np.linalg.norm(slopes))
-
-
 # The driver
 
 
@@ -622,22 +600,6 @@ def test_frame_of_a_family():
     assert slopes.value[1, "right", "base_y"] > 0.001
     contexts = frame[frame.signature == "context distance"]
     assert contexts.why_not.str.contains("locus slopes").all()
-
-
-def test_frame_has_the_student_interval_of_its_runs():
-    """The waiting arm bends by 0, 0.1, 0.2 and more: its travel over runs has a known mean."""
-    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
-    bends = (0.0, 0.1, 0.2, 0.5)
-    solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
-    travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
-    frame = signatures(solved_study([(task, "planner", solutions)]))
-    row = frame[(frame.signature == "travel of the other arm") & (frame.goal == 1)]
-    half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
-    mean = np.mean(travelled)
-    assert row[["value", "low", "high"]].squeeze().tolist() == pytest.approx(
-        [mean, mean - half, mean + half], abs=1e-7
-    )
-    assert row.n.item() == 4
 
 
 def test_trajectories_put_like_sequences_together():

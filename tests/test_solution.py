@@ -16,7 +16,6 @@ from coartic import (
     corrective_trial,
     execute,
     hand_sequences,
-    learn_many,
     load_task,
     move,
 )
@@ -27,7 +26,7 @@ from coartic.motion.movement import follow
 from coartic.motion.solution import execute_many, other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, tiny_task
+from tests.support.strategies import tiny_task
 
 
 def one_by_one(task, groups, model):
@@ -141,20 +140,6 @@ def test_side_by_side_as_movement_after_movement(name, seed, model):
         assert execution.ticks == sum(ticks for *_, ticks in made)
         assert execution.reason.endswith(reason)
         assert execution.completed == (not reason)
-
-
-@pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
-def test_best_trials_re_execute_exactly(name, condition):
-    for run in learn_many(load_task(name), condition, seeds=range(4), trials=1500):
-        again = execute(run.task, run.solution)
-        assert again.reward == run.reward
-        assert again.hands == run.hands
-        assert [m.ticks for m in again.movements] == [m.ticks for m in run.solution]
-        assert sum(again.ticks_by_goal()) == -run.reward
-        for q, goal, letter in zip(again.configurations, run.task.goals, run.hands, strict=True):
-            hand = {"L": "left", "R": "right"}[letter]
-            miss = run.task.robot.forward_kinematics(q, hand) - goal
-            assert np.hypot(*miss) <= run.task.radius
 
 
 @pytest.mark.parametrize(

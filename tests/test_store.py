@@ -158,7 +158,10 @@ def perform_until_killed(folder, progress):
     plan.perform(folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="needs a fork, which has imported everything and so begins at once")
+@pytest.mark.skipif(
+    sys.platform != "linux",
+    reason="forks a process that has imported everything, so that it begins at once",
+)
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     fork = multiprocessing.get_context("fork")

@@ -164,17 +164,6 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost, free_times):
     assert total == pytest.approx(plan.cost, rel=0.03)
 
 
-def test_times_that_are_free_cost_no_more():
-    task = load_task("ascending")
-    instance = Instance.of(task, ("right",) * 3, still=True, radius=0.09)
-    start = corrective_trial(task, "RRR").configurations
-    for cost in ("acceleration", "jerk"):
-        problem = trajectory_problem(task.robot, task.hands, 3, cost)
-        fixed = problem.solve(instance, start)
-        free = problem.solve(instance, start, free_times=True)
-        assert free.cost < fixed.cost
-
-
 def test_given_lengths_are_kept():
     task = load_task("ascending")
     instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
