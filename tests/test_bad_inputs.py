@@ -167,9 +167,9 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
         if name == "left":
             text = 'hands = ["left"]' + text.replace("RR", "LL")
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
-    own = {name: wrong[name] for name in ("tasks", "methods", "task_files") if name in wrong}
-    rest = {name: value for name, value in wrong.items() if name not in own}
+    selection = {name: wrong[name] for name in ("tasks", "methods", "task_files") if name in wrong}
+    rest = {name: value for name, value in wrong.items() if name not in selection}
     with pytest.raises(CoarticError) as caught:
-        run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**own)} | rest)
+        run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**selection)} | rest)
     assert words in str(caught.value)
     assert not Path("out").exists()

@@ -143,14 +143,14 @@ def test_draw(coartic, tmp_path):
         assert coartic("draw", "ascending", "--out", tmp_path / name)[0] == 0
         assert (tmp_path / name).stat().st_size > 5000
         assert b"Date" not in (tmp_path / name).read_bytes()
-    own = tmp_path / "own.svg"
-    assert coartic("draw", tmp_path / "mine.toml", "--out", own)[0] == 0
-    before = own.read_bytes()
-    code, _, error = coartic("draw", "ascending", "--out", own)
-    assert (code, own.read_bytes()) == (2, before)
+    drawing = tmp_path / "own.svg"
+    assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
+    before = drawing.read_bytes()
+    code, _, error = coartic("draw", "ascending", "--out", drawing)
+    assert (code, drawing.read_bytes()) == (2, before)
     assert "--replace" in error
-    assert coartic("draw", "ascending", "--out", own, "--replace")[0] == 0
-    assert own.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
+    assert coartic("draw", "ascending", "--out", drawing, "--replace")[0] == 0
+    assert drawing.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -45,12 +45,12 @@ def test_nobody_at_an_address(tmp_path):
 
 
 def test_a_cluster_without_workers(tmp_path):
-    said = []
+    messages = []
     with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
-        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=said.append)
+        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=messages.append)
         with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
             planned(CELLS).perform(tmp_path, executor=executor)
-    assert len(said) == 1
+    assert len(messages) == 1
 
 
 SCHEDULER = """

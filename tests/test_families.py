@@ -242,11 +242,11 @@ def test_restrictions_are_asked_for_as_well():
 def test_both_hands_reach_every_goal(side):
     """With a locked base, a goal at 4.2 is 3.7 from one shoulder and 4.7 from the other."""
     goals = ((side * 1000, 2000), (side * 4200, 100))
-    found = replace(good(), base="locked", goals=goals)
-    assert broken_rule(found) == "reach"
+    candidate = replace(good(), base="locked", goals=goals)
+    assert broken_rule(candidate) == "reach"
     one = {1: "right", -1: "left"}[side]
-    alone = found.family.model_copy(update={"hands": (one,)})
-    assert broken_rule(replace(found, family=alone)) is None
+    alone = candidate.family.model_copy(update={"hands": (one,)})
+    assert broken_rule(replace(candidate, family=alone)) is None
 
 
 def test_rejection_leaves_the_structure_alone():

@@ -334,15 +334,15 @@ def test_one_hand_is_always_the_closest():
 def test_a_subtask_is_credited_with_its_return(discount):
     """After trial 0: r_g + γ r_{g+1} + γ² r_{g+2}, or the overall reward for every goal."""
     task = load_task("ascending")
-    own = [-ticks for ticks in corrective_trial(task, "RRR").ticks_by_goal()]
+    rewards = [-ticks for ticks in corrective_trial(task, "RRR").ticks_by_goal()]
     condition = replace(VARIANTS["EC1-subtask"], discount=discount)
     run = learn(task, condition, seed=0, trials=1)
     assert [run.values[0, 2, 1], *run.values[1:, 1, 1]] == [
-        own[0] + discount * own[1] + discount**2 * own[2],
-        own[1] + discount * own[2],
-        own[2],
+        rewards[0] + discount * rewards[1] + discount**2 * rewards[2],
+        rewards[1] + discount * rewards[2],
+        rewards[2],
     ]
-    assert sum(own) == run.reward == -319
+    assert sum(rewards) == run.reward == -319
     overall = learn(task, "EC1", seed=0, trials=1)
     assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
 

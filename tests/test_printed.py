@@ -141,11 +141,11 @@ def test_a_cell_puts_its_groups_together():
 def test_numbers_of_a_condition_fit_together(name):
     numbers = [e for e in ENTRIES.values() if isinstance(e, Number) and e.task == name]
     for named in of(name, "hand sequences"):
-        own = [e for e in numbers if e.condition == named.condition]
-        counts = {e.hands: e for e in own if e.kind == "count"}
+        of_condition = [e for e in numbers if e.condition == named.condition]
+        counts = {e.hands: e for e in of_condition if e.kind == "count"}
         assert set(counts) <= set(named.found)
         assert not counts or sum(e.number for e in counts.values()) == RUNS
-        means = {e.hands: e for e in own if e.kind == "reward"}
+        means = {e.hands: e for e in of_condition if e.kind == "reward"}
         assert set(means) - {None} <= set(named.found)
         if None in means and counts:
             shares = {hands: count.number / RUNS for hands, count in counts.items()}

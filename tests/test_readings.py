@@ -179,7 +179,7 @@ def test_rows_of_a_trajectory_start_where_the_robot_does(tick):
     model = PAPER._replace(arrival_tick=tick)
     task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
     ahead = [np.array([x, *[0.0] * 9]) for x in (0.06, 0.08)]
-    made = trajectory(
+    path = trajectory(
         task,
         [
             Movement(1, "right", "corrective"),
@@ -189,8 +189,8 @@ def test_rows_of_a_trajectory_start_where_the_robot_does(tick):
         model,
     )
     stands = {0: [0, 1, 2, 3, 4, 5], 1: [0, 1, 2, 3, 3, 4, 5]}[tick]
-    np.testing.assert_allclose(100 * made.configurations[:, 0], stands, atol=1e-12)
-    np.testing.assert_allclose(made.subtask(1)[:, 0], [0.0])
+    np.testing.assert_allclose(100 * path.configurations[:, 0], stands, atol=1e-12)
+    np.testing.assert_allclose(path.subtask(1)[:, 0], [0.0])
 
 
 @pytest.mark.parametrize("first_step", [False, True])

@@ -134,9 +134,9 @@ def test_permutations_by_brute_force():
         math.hypot(*(np.polyfit(x, q[list(order), k], 1)[0] for k in range(2)))
         for order in itertools.permutations(range(4))
     ]
-    found = slope_norm(q, x, rng())
-    assert found.value == pytest.approx(norms[0])
-    assert found.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
+    norm = slope_norm(q, x, rng())
+    assert norm.value == pytest.approx(norms[0])
+    assert norm.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
 
 
 # What the hand feels
@@ -172,50 +172,50 @@ def test_self_motion_of_the_robot_is_motor_equivalent():
     at = task.robot.forward_kinematics(np.array([q, still, moving]), "right")
     assert np.linalg.norm(at[1] - at[0]) < 1e-7
     assert np.linalg.norm(at[2] - at[0]) > 5e-5
-    found = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
-    assert found[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
-    assert found[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
+    parts = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
+    assert parts[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
+    assert parts[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
 
 
 def test_synergy_by_hand():
     """Two runs a coordinate: variances are known exactly."""
     rows = np.diag([1.0, 1.0, 3.0, 3.0])
     q = np.concatenate([rows, -rows])
-    found = synergy(q, JACOBIAN)
+    planted = synergy(q, JACOBIAN)
     within, orthogonal = 2 * (9 + 9) / 7 / 2, 2 * (1 + 1) / 7 / 2
     total = (within + orthogonal) / 2
-    assert found.within == pytest.approx(within)
-    assert found.orthogonal == pytest.approx(orthogonal)
-    assert found.delta == pytest.approx((within - orthogonal) / total)
+    assert planted.within == pytest.approx(within)
+    assert planted.orthogonal == pytest.approx(orthogonal)
+    assert planted.delta == pytest.approx((within - orthogonal) / total)
     n, d = 4, 2  # the printed transform
-    assert found.z.value == pytest.approx(
-        0.5 * math.log((n / d + found.delta) / (n / d - found.delta))
+    assert planted.z.value == pytest.approx(
+        0.5 * math.log((n / d + planted.delta) / (n / d - planted.delta))
     )
-    assert found.neutral == 0.0
-    assert found.z.low < found.z.value < found.z.high
+    assert planted.neutral == 0.0
+    assert planted.z.low < planted.z.value < planted.z.high
 
 
 @given(st.integers(3, 8), st.integers(3, 30), st.integers(0, 10**6))
 def test_delta_stays_in_its_range_and_z_is_its_transform(joints, runs, seed):
     draw = rng(seed)
     jacobian, q = draw.standard_normal((2, joints)), draw.standard_normal((runs, joints))
-    found = synergy(q, jacobian)
-    assert -joints / 2 <= found.delta <= joints / (joints - 2)
-    ratio = (joints / 2 + found.delta) / (joints / (joints - 2) - found.delta)
-    assert found.z.value == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
+    drawn = synergy(q, jacobian)
+    assert -joints / 2 <= drawn.delta <= joints / (joints - 2)
+    ratio = (joints / 2 + drawn.delta) / (joints / (joints - 2) - drawn.delta)
+    assert drawn.z.value == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
     turned = synergy(q @ np.linalg.qr(draw.standard_normal((joints, joints)))[0], jacobian)
     assert turned.within * (joints - 2) + turned.orthogonal * 2 == pytest.approx(
-        found.within * (joints - 2) + found.orthogonal * 2  # the total does not turn
+        drawn.within * (joints - 2) + drawn.orthogonal * 2  # the total does not turn
     )
 
 
 def test_jackknife_is_the_loop_over_runs():
     q = rng(6).standard_normal((9, 4)) * [1, 1, 2, 3]
-    found = synergy(q, JACOBIAN)
+    every = synergy(q, JACOBIAN)
     without = [synergy(np.delete(q, k, axis=0), JACOBIAN).z.value for k in range(9)]
-    pseudo = 9 * found.z.value - 8 * np.array(without)
+    pseudo = 9 * every.z.value - 8 * np.array(without)
     half = 2.3060041 * pseudo.std(ddof=1) / 3  # Student's t, 8 degrees of freedom
-    z, low, high, _ = found.z
+    z, low, high, _ = every.z
     assert (low, high) == pytest.approx((z - half, z + half))
 
 
@@ -300,10 +300,10 @@ def test_readiness_and_travel():
         task.robot.forward_kinematics(execution.configurations[0], "left") - [7.5, 0.1]
         for execution in (path.execution, initial)
     ]
-    found = readiness(path, initial)
-    assert found[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
-    assert found[0] < 0  # bent away
-    assert math.isnan(found[1])
+    gains = readiness(path, initial)
+    assert gains[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
+    assert gains[0] < 0  # bent away
+    assert math.isnan(gains[1])
     same = trajectory(task, planned(posture(1.0), posture(4.0), hands="RL"))
     assert readiness(same, initial)[0] == 0.0
     assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
@@ -337,10 +337,10 @@ def test_preshaping_by_the_arm_alone():
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, planned(swung, end, hands="RL"))
     path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
-    whole = readiness(path, initial)
-    assert 0.2 < whole[0] < 0.8
-    np.testing.assert_array_equal(readiness_from_base(path, initial), whole)
-    np.testing.assert_array_equal(preshaping(path, initial), whole)
+    gains = readiness(path, initial)
+    assert 0.2 < gains[0] < 0.8
+    np.testing.assert_array_equal(readiness_from_base(path, initial), gains)
+    np.testing.assert_array_equal(preshaping(path, initial), gains)
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -376,8 +376,8 @@ def test_waiting_arms_keep_still_under_condition_3_only():
     for condition, moves in (("EC3", False), ("EC4", True)):
         run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
         path = trajectory(run.task, run.solution)
-        own = preshaping(path, corrective_trial(run.task, "RRRR"))
-        assert (np.nan_to_num(own) != 0).any() == moves
+        moved = preshaping(path, corrective_trial(run.task, "RRRR"))
+        assert (np.nan_to_num(moved) != 0).any() == moves
 
 
 # Form
@@ -449,8 +449,8 @@ def test_spectral_arc_length_of_a_gaussian_speed():
 def test_smoothness_leaves_out_what_does_not_move():
     task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
     path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
-    own = path.hand_path("right")[:91]
-    assert smoothness(path) == (pytest.approx(spectral_arc_length(own)), math.inf)
+    way = path.hand_path("right")[:91]
+    assert smoothness(path) == (pytest.approx(spectral_arc_length(way)), math.inf)
 
 
 # Locus

@@ -43,7 +43,7 @@ def shortest_reach(task):
         return task.radius**2 - ((task.robot.forward_kinematics(q(x), "right") - goal) ** 2).sum()
 
     rng = np.random.default_rng(0)
-    found = [
+    solutions = [
         minimize(
             lambda x: ((x - task.q0[free]) ** 2).sum(),
             task.q0[free] + rng.normal(0, 1.0, len(free)),
@@ -52,7 +52,7 @@ def shortest_reach(task):
         )
         for _ in range(10)
     ]
-    return math.ceil(min(math.sqrt(f.fun) for f in found if f.success) / 0.01) + 1
+    return math.ceil(min(math.sqrt(f.fun) for f in solutions if f.success) / 0.01) + 1
 
 
 def test_one_goal_is_reached_on_the_shortest_line():
