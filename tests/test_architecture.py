@@ -41,10 +41,15 @@ def package_of(name):
 
 
 @cache
+def tree_of(path):
+    return ast.parse(path.read_bytes())
+
+
+@cache
 def imported(path):
     """Full names of everything a module imports, at any depth of its code."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -83,7 +88,7 @@ def test_no_imports_go_round_in_circles():
     imports = {}
     for module, path in modules.items():
         names = set()
-        for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in statements(tree_of(path)):
             if isinstance(node, ast.Import):
                 names |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):

@@ -62,7 +62,7 @@ def rows_in_sight(page, table):
     return [row for row in page.locator(f"#{table} tbody tr").all() if row.is_visible()]
 
 
-def test_search_and_filter_change_the_rows_in_sight(opened):
+def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     page = opened()
     before = rows_in_sight(page, "table-claims")
     page.fill("#claims-search", "first movement")
@@ -77,10 +77,7 @@ def test_search_and_filter_change_the_rows_in_sight(opened):
     assert {row.locator("td").nth(1).inner_text() for row in chosen} == {"undecided"}
     page.select_option("#claims-verdict", "")
     assert len(rows_in_sight(page, "table-claims")) == len(before)
-
-
-def test_tables_are_sorted_by_their_headers(opened):
-    page = opened()
+    # Tables are sorted by their headers.
     head = page.locator("#table-methods thead button", has_text="reward").first
     column = page.locator("#table-methods thead th").all_inner_texts()
     place = next(k for k, text in enumerate(column) if text.startswith("reward"))
@@ -92,10 +89,7 @@ def test_tables_are_sorted_by_their_headers(opened):
     for ordered in (sorted(values()), sorted(values(), reverse=True)):
         head.click()
         assert values() == ordered
-
-
-def test_a_link_to_a_claim_unfolds_it(opened, address):
-    page = opened()
+    # A link to a claim unfolds it.
     claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
     page.goto(f"{address}#{claim}")
     assert page.locator(f"#{claim} dl").is_visible()
@@ -105,7 +99,7 @@ def tick(page):
     return int(page.locator(".player input[type=range]").input_value())
 
 
-def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
+def test_the_player_plays_by_keyboard_and_shows_the_robot_where_the_run_ended(opened, traced):
     page = opened(reduced_motion="reduce")
     play = page.locator(".player .play")
     slider = page.locator(".player input[type=range]")
@@ -128,12 +122,7 @@ def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
     page.keyboard.press("Tab")  # the slider
     page.keyboard.press("End")
     assert "all goals hit" in page.locator(".player .facts").first.inner_text()
-
-
-def test_the_player_shows_the_robot_where_the_run_ended(opened, traced):
-    """The hand that is drawn is the robot module's, by the stored configuration."""
-    page = opened(reduced_motion="reduce")
-    page.locator(".player input[type=range]").press("End")
+    # The hand that is drawn is the robot module's, by the stored configuration.
     arms = page.locator(".player .arm.right").all()
     goals = page.locator(".player .goal").all()
     task = load_task("ascending")

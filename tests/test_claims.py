@@ -65,6 +65,12 @@ def judge_planted(monkeypatch, *pairs):
 test.__test__ = False
 
 
+@pytest.fixture(autouse=True)
+def _few_starts(monkeypatch):
+    """Of searches for the shortest way: two find it here."""
+    monkeypatch.setattr(single, "STARTS", 2)
+
+
 @pytest.mark.parametrize(
     ("claim", "verdict"),
     [
@@ -397,12 +403,11 @@ def test_the_shortest_reach():
     assert 0.9 * least < lengths[1] < least
 
 
-def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
+def test_the_corrective_process_is_near_the_shortest_way(monkeypatch):
     """With the goals of the first release goal 2 of two-armed task 2 is 13 % off.
 
     The sum over its subtasks would hide that.
     """
-    monkeypatch.setattr(single, "STARTS", 2)
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     shipped = planted_study(seven([9, 10, 11]))
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2

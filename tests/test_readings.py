@@ -96,22 +96,19 @@ def test_the_learner_is_the_slow_one_under_every_reading(text):
     model, fields = model_under(chosen), condition_under(chosen)
     if len(chosen) > 1:
         model = model._replace(arrival_tolerance=0.04)  # now and then a correction misses
-    task, differs = load_task("two-armed-1"), False
-    for name in ("EC2", "EC3"):
-        plain = CONDITIONS[name]
-        condition = replace(plain, **fields)
-        fast = learn(task, condition, seed=42, trials=5, model=model)
-        slow = reference.learn(task, condition, seed=42, trials=5, model=model)
-        np.testing.assert_array_equal(fast.completed, slow.completed)
-        np.testing.assert_array_equal(fast.rewards[fast.completed], slow.rewards[slow.completed])
-        default = learn(task, plain, seed=42, trials=5)
-        differs |= (
-            fast.rewards.tolist() != default.rewards.tolist() or fast.reward != default.reward
-        )
+    task, plain = load_task("two-armed-1"), CONDITIONS["EC2" if text in SELDOM_OF_EC3 else "EC3"]
+    condition = replace(plain, **fields)
+    fast = learn(task, condition, seed=42, trials=5, model=model)
+    slow = reference.learn(task, condition, seed=42, trials=5, model=model)
+    np.testing.assert_array_equal(fast.completed, slow.completed)
+    np.testing.assert_array_equal(fast.rewards[fast.completed], slow.rewards[slow.completed])
+    default = learn(task, plain, seed=42, trials=5)
+    differs = fast.rewards.tolist() != default.rewards.tolist() or fast.reward != default.reward
     assert differs or text in SELDOM
 
 
-# Readings that make no difference in a few trials.
+# Readings that make no difference in a few trials: of condition 3, and of any.
+SELDOM_OF_EC3 = {"whole-last-step=true", "equal-distance=computed"}
 SELDOM = {"corrective-arrival=true", "first-step=true"}
 
 

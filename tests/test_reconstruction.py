@@ -247,6 +247,7 @@ def test_a_reconstruction_is_found_and_scored(
 ) -> None:
     monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
     monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
+    monkeypatch.setattr(scoring, "RESAMPLES", 20)
     effort = {
         "members": 4,
         "runs": 2,
@@ -297,7 +298,10 @@ def test_printed_results_stand_beside_fresh_runs() -> None:
         scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
-def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
+def test_what_stands_is_replaced_by_what_is_clearly_nearer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scoring, "RESAMPLES", 60)
     rng = np.random.default_rng(1)
     mean = scoring.Figure("EC3", "mean", -500.0, 20, sd=4.0)
 
