@@ -51,7 +51,6 @@ task, family, suite, method = (partial(changed, text) for text in (GOOD, FAMILY,
 
 TASKS = [
     (task("[5.0, 2.0]", "[nan, 2.0]"), "goals[1][0] is nan; it should be a finite number"),
-    (task("base = [0.0,", "base = [inf,"), "start.base[0] is inf"),
     (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []; it should have at least 1 item"),
     ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
     ("goal = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
@@ -59,35 +58,26 @@ TASKS = [
     (task('"RR"', '"RX"'), "initial_hands"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
     (GOOD.partition("[start]")[0], "start"),
-    (task('"mine"', '"my task"'), "name"),
     ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be greater than or equal to 2"),
     (family("[2, 3]", "[3, 2]"), "goals is [3, 2]; it should go from less to more"),
-    (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be less than or equal to 8"),
     ("apart = 0.1" + FAMILY, "apart lets goals overlap"),
     ("radius = 0.01" + FAMILY, "radius is not larger than the accuracy"),
     ("reach = 4.0001" + FAMILY, "reach is 4.0001; it should have at most three decimals"),
     ("within = 1.5" + FAMILY, "within is 1.5; it should be above 0, at most 1"),
     ("clear = true" + FAMILY, "clear is True; it should be a number up to 1000"),
-    (family('["free"]', '["flying"]'), "base[0] is 'flying'"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
 SUITES = [
     (suite("process/", "proces/"), "did you mean 'dual-process/EC1'"),
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
-    (
-        SUITE + "grid = {noise_sd = [-1.0]}",
-        "noise_sd is -1.0; it should be greater than or equal to 0",
-    ),
     (SUITE + "grid = {noise_sd = []}", "cells[0].grid"),
-    (suite('["dual-process/EC1"]', "[]"), "cells[0].methods"),
     (SUITE + "run = 3", "cells[0].run is an unknown key; did you mean 'runs'?"),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
-    (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it should be less than or equal to 10000"),
 ]
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
@@ -149,7 +139,6 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"task_files": Path("a.toml")}, "task_files is a list: write task_files=['a.toml']"),
         ({"tasks": [3]}, "tasks is [3]; it must be a list of names or paths"),
         ({"runs": "3"}, "runs is '3'; it must be from 1 to "),
-        ({"trials": 2.5}, "trials is 2.5; it must be from 1 to "),
         ({"runs": True}, "runs is True; it must be from 1 to "),
         ({"seed": -1}, "seed is -1; it must be from 0 to "),
         ({"readings": ["tie=right"]}, "did you mean 'ties'?"),

@@ -86,19 +86,6 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     np.testing.assert_array_equal(fast.q, slow)
 
 
-@pytest.mark.parametrize("hand", HANDS)
-def test_finds_the_goal_and_moves_nothing_else(hand):
-    rng = np.random.default_rng(10)
-    other = ROBOT.joints("left" if hand == "right" else "right")
-    for _ in range(50):
-        q, goal = rng.uniform(-2, 2, 10), rng.uniform(-6, 6, 2)
-        correction = correct(ROBOT, q, hand, goal)
-        assert correction.converged
-        miss = np.hypot(*(ROBOT.forward_kinematics(correction.q, hand) - goal))
-        assert miss <= PAPER.correction_tolerance + 1e-12
-        np.testing.assert_array_equal(correction.q[other], q[other])
-
-
 def test_stationary_point_ends_the_descent():
     """A straight arm on a locked base, the goal in line with it: the gradient vanishes."""
     correction = correct(ROBOT, np.zeros(10), "right", (2.5, 0.1), locked_base=("x", "y"))

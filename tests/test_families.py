@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import coartic.tasks.families
-from coartic import TaskError, builtin_tasks, corrective_trial, load_task, parse_task
+from coartic import TaskError, builtin_tasks, corrective_trial, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.run import Selection, plan_suite, run_suite
 from coartic.inputs import MOST_CELLS
@@ -164,14 +164,6 @@ def test_every_instance_is_valid(address):
         assert broken_rule(candidate_of(address, attempt)) == rule
 
 
-@given(addresses)
-def test_its_file_is_the_task(address):
-    import tomllib
-
-    task, _ = drawn(address)
-    assert parse_task(tomllib.loads(task_text(task)), "text") == task
-
-
 @pytest.mark.parametrize("name", builtin_tasks())
 def test_any_task_can_be_written(name, tmp_path):
     path = tmp_path / "copy.toml"
@@ -287,13 +279,6 @@ def test_splits_share_no_instance():
     streams = [family.key(each) for family in families().values() for each in ("d", "i", "2027-")]
     assert len(set(streams)) == 15
     assert load_task("ascending").family is load_task("ascending").split is None
-
-
-@pytest.mark.parametrize("name", ["two-armed/v1/i1000", "long/v1/2027-000", "a-b/v12/d999999"])
-def test_addresses(name):
-    address = address_of(name)
-    assert str(address) == name
-    assert address.family == name.rpartition("/")[0]
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from coartic.analysis.figures.tasks import draw_tasks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
 from coartic.analysis.signatures.register import signatures
+from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
@@ -169,16 +170,12 @@ def test_stars_of_contexts_are_adjusted_over_the_figure(study):
     values = parts.set_index("signature").value
     assert (data.equivalent == values["motor-equivalent part"]).all()
     assert (data.other == values["non-motor-equivalent part"]).all()
-    # Smallest of six times six, the next times five, and so on, never falling.
-    together = [p for pair in zip(*raw.values(), strict=True) for p in pair]
-    adjusted, floor = {}, 0.0
-    for place, at in enumerate(np.argsort(together)):
-        floor = max(floor, min(1.0, (6 - place) * together[at]))
-        adjusted[int(at)] = floor
-    assert data.holm_equivalent.tolist() == pytest.approx([adjusted[0], adjusted[2], adjusted[4]])
-    assert data.holm_other.tolist() == pytest.approx([adjusted[1], adjusted[3], adjusted[5]])
+    adjusted = np.reshape(
+        holm([p for pair in zip(*raw.values(), strict=True) for p in pair]), (3, 2)
+    )
+    np.testing.assert_allclose(data[["holm_equivalent", "holm_other"]], adjusted)
     shown = [text.get_text() for text in plot.figure.axes[0].texts if text.get_text()]
-    assert shown == [stars(adjusted[at]) for at in (0, 2, 4)]
+    assert shown == list(map(stars, adjusted[:, 0]))
     assert shown != [stars(p) for p in raw["motor-equivalent part"]]
 
 

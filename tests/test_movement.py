@@ -93,11 +93,6 @@ def random_movements(rng, robot, hand, count):
     return q, target, goals
 
 
-def random_movement(rng, robot, hand):
-    (q,), (target,), (goal,) = random_movements(rng, robot, hand, 1)
-    return q, target, tuple(goal)
-
-
 @pytest.mark.parametrize(("robot", "count"), [(ROBOT, 2_000), (UNEVEN, 1_000)])
 @pytest.mark.parametrize("hand", HANDS)
 def test_equals_every_step_many_times(robot, count, hand):
@@ -175,17 +170,6 @@ def test_ticks_of_a_plain_translation():
     ahead = move(ROBOT, q, target, "right", (4.995, 0.1), 0.1)
     assert (ahead.ticks, ahead.hit) == (41, True)
     assert ahead.q[0] == pytest.approx(0.40)
-
-
-def test_skips_most_steps():
-    rng = np.random.default_rng(9)
-    evaluations = ticks = 0
-    for _ in range(100):
-        q, target, _ = random_movement(rng, ROBOT, "right")
-        result = move(ROBOT, q, target, "right", (30.0, 0.0), 0.1)
-        evaluations += result.evaluations
-        ticks += result.ticks
-    assert evaluations < ticks / 4
 
 
 @entry

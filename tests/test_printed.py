@@ -17,6 +17,7 @@ from coartic.analysis.published import (
     published_exhaustive,
     published_initial,
 )
+from coartic.learner import learning
 from coartic.learner.conditions import CONDITIONS
 from coartic.tasks.catalogue import builtin_tasks
 from coartic.tasks.readings import readings
@@ -34,7 +35,7 @@ def test_constants_are_those_of_the_code():
         condition.epsilon for condition in CONDITIONS.values()
     }
     assert {constant("noise-sd")} == {condition.noise_sd for condition in CONDITIONS.values()}
-    assert (RUNS, TRIALS) == (20, 10_000)
+    assert (RUNS, TRIALS) == (20, learning.TRIALS) == (20, 10_000)
     robot = Robot()
     assert robot.dof == constant("degrees-of-freedom")
     assert robot.left_links == (constant("link-length"),) * int(constant("joints-per-arm"))

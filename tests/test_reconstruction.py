@@ -25,7 +25,6 @@ from coartic.analysis.reconstruction.search import Search, search_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
-NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
 
 
 def runs(rewards: np.ndarray, *hands: tuple[str, int]) -> pd.DataFrame:

@@ -107,20 +107,6 @@ def test_the_other_arm_can_be_kept_still(method):
         q = reached
 
 
-def test_search_improves_on_where_it_begins():
-    """Ascending: -319 by the corrective process alone, about -303 learned."""
-    task = load_task("ascending")
-    rewards = {}
-    for method in METHODS:
-        session, _ = solve(method, task, trials=2000)
-        assert session.rewards[0] == -319
-        rewards[method.name] = max(session.rewards)
-    assert rewards["random-search/pure"] > -319
-    assert rewards["random-search/climbing"] > rewards["random-search/pure"]
-    assert rewards["cma-es/bandit"] > rewards["random-search/climbing"]
-    assert rewards["cma-es/every"] == rewards["cma-es/bandit"]  # one sequence, nothing to choose
-
-
 def test_every_sequence_begins_with_its_corrective_trial():
     task = load_task("two-armed-2")
     alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
