@@ -348,8 +348,6 @@ def test_a_small_suite(tmp_path):
     study = load(tmp_path / "out")
     assert set(study.runs.task) == set(names)
     assert study.tasks == {name: instance(name) for name in names}
-    again = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
-    assert (again.progress.present, again.progress.done) == (10, 0)
 
 
 def test_an_instance_beside_a_suites_tasks():
