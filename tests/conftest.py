@@ -60,14 +60,25 @@ def traced(tmp_path_factory):
     return run_and_write(tmp_path_factory.mktemp("traced"), traced_cells(), runs=4, trials=150)
 
 
-LONGEST = ("tests/test_conformance.py", "tests/test_pool.py")
-"""Modules that begin, so that no worker is left with one of them alone at the end."""
+@pytest.fixture(scope="session")
+def report(traced, tmp_path_factory):
+    """The folder of a report on those results, as a user gets it."""
+    from coartic.analysis.report.build import write_report
+
+    folder = tmp_path_factory.mktemp("traced-report") / "report"
+    write_report(traced, folder, for_paper=False)
+    return folder
+
+
+FIRST = ("test_conformance", "test_pool", "test_browser", "test_report")
+"""Modules that begin: those that take longest, so that no worker is left with one of them alone at
+the end; then those that read one report, so that one worker makes it."""
 
 
 def pytest_collection_modifyitems(items):
-    """The modules that take longest, then the others."""
-    rank = {name: number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(LONGEST)))
+    """These modules, then the others."""
+    rank = {f"tests/{name}.py": number for number, name in enumerate(FIRST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(FIRST)))
 
 
 @pytest.hookimpl(optionalhook=True)

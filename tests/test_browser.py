@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
 from coartic import load_task
-from coartic.analysis.report.build import write_report
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
@@ -21,11 +19,9 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def report(traced, tmp_path_factory):
-    """A report as a user gets it."""
-    folder = tmp_path_factory.mktemp("report")
-    write_report(traced, folder, for_paper=False)
-    return folder / "report.html"
+def address(report):
+    """Of the page."""
+    return (report / "report.html").as_uri()
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +33,7 @@ def browser():
 
 
 @pytest.fixture
-def opened(browser, report):
+def opened(browser, address):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
     problems, contexts = [], []
 
@@ -53,7 +49,7 @@ def opened(browser, report):
                 None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
             ),
         )
-        page.goto(Path(report).as_uri())
+        page.goto(address)
         return page
 
     yield open_page
@@ -66,7 +62,7 @@ def rows_in_sight(page, table):
     return [row for row in page.locator(f"#{table} tbody tr").all() if row.is_visible()]
 
 
-def test_search_and_filter_change_the_rows_in_sight(opened):
+def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     page = opened()
     before = rows_in_sight(page, "table-claims")
     page.fill("#claims-search", "first movement")
@@ -81,10 +77,7 @@ def test_search_and_filter_change_the_rows_in_sight(opened):
     assert {row.locator("td").nth(1).inner_text() for row in chosen} == {"undecided"}
     page.select_option("#claims-verdict", "")
     assert len(rows_in_sight(page, "table-claims")) == len(before)
-
-
-def test_tables_are_sorted_by_their_headers(opened):
-    page = opened()
+    # Tables are sorted by their headers.
     head = page.locator("#table-methods thead button", has_text="reward").first
     column = page.locator("#table-methods thead th").all_inner_texts()
     place = next(k for k, text in enumerate(column) if text.startswith("reward"))
@@ -96,12 +89,9 @@ def test_tables_are_sorted_by_their_headers(opened):
     for ordered in (sorted(values()), sorted(values(), reverse=True)):
         head.click()
         assert values() == ordered
-
-
-def test_a_link_to_a_claim_unfolds_it(opened, report):
-    page = opened()
+    # A link to a claim unfolds it.
     claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
-    page.goto(f"{Path(report).as_uri()}#{claim}")
+    page.goto(f"{address}#{claim}")
     assert page.locator(f"#{claim} dl").is_visible()
 
 
@@ -109,7 +99,7 @@ def tick(page):
     return int(page.locator(".player input[type=range]").input_value())
 
 
-def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
+def test_the_player_plays_by_keyboard_and_shows_the_robot_where_the_run_ended(opened, traced):
     page = opened(reduced_motion="reduce")
     play = page.locator(".player .play")
     slider = page.locator(".player input[type=range]")
@@ -132,12 +122,7 @@ def test_the_player_plays_pauses_and_steps_by_keyboard(opened):
     page.keyboard.press("Tab")  # the slider
     page.keyboard.press("End")
     assert "all goals hit" in page.locator(".player .facts").first.inner_text()
-
-
-def test_the_player_shows_the_robot_where_the_run_ended(opened, traced):
-    """The hand that is drawn is the robot module's, by the stored configuration."""
-    page = opened(reduced_motion="reduce")
-    page.locator(".player input[type=range]").press("End")
+    # The hand that is drawn is the robot module's, by the stored configuration.
     arms = page.locator(".player .arm.right").all()
     goals = page.locator(".player .goal").all()
     task = load_task("ascending")
@@ -165,11 +150,12 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
     page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
     page.locator(".player select").first.select_option("own")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    found = Axe().run(page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]})
-    assert found.violations_count == 0, found.generate_report()
+    rules = {"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]}
+    accessibility = Axe().run(page, options=rules)
+    assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
-def test_printing_shows_every_picture_once(opened, report):
+def test_printing_shows_every_picture_once(opened):
     page = opened(color_scheme="dark")
     page.emulate_media(media="print")
     figures = page.locator("figure").all()
@@ -185,10 +171,10 @@ def test_printing_shows_every_picture_once(opened, report):
     assert 3 <= printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") <= 40
 
 
-def test_without_scripts_all_is_there(browser, report):
+def test_without_scripts_all_is_there(browser, address):
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
-    page.goto(Path(report).as_uri())
+    page.goto(address)
     assert page.locator(".without").is_visible()
     assert page.locator("#table-claims tbody tr").count() > 10
     assert not page.locator("#claims-search").is_visible()

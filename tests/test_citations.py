@@ -98,12 +98,12 @@ def test_each_work_once_with_the_methods_that_rest_on_it():
 
 
 def test_methods_of_others_cite_themselves():
-    own = MethodSource(
+    bold = MethodSource(
         "cma-es/bold", "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", False
     )
     silent = MethodSource("lab/silent", "Silent", "", False)
     ours = MethodSource("dual-process/EC9", "Of another version", "Ours (2030).", True)
-    text = bibliography([own, silent, ours])
+    text = bibliography([bold, silent, ours])
     assert keys_in(text) == ["coartic", PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
     assert (
         r"  note = {A. B. C\_d (2020), me@here, 5 \% of "
@@ -118,9 +118,9 @@ def test_methods_of_others_cite_themselves():
 
 
 def test_command(tmp_path, monkeypatch, capsys):
-    known = registry([BROKEN])
+    methods = registry([BROKEN])
     cells = [
-        Cell(load_task("ascending"), known[name])
+        Cell(load_task("ascending"), methods[name])
         for name in ("corrective-alone/given", "test/good")
     ]
     run_and_write(tmp_path / "results", cells, runs=1)

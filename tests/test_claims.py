@@ -65,6 +65,12 @@ def judge_planted(monkeypatch, *pairs):
 test.__test__ = False
 
 
+@pytest.fixture(autouse=True)
+def _few_starts(monkeypatch):
+    """Of searches for the shortest way: two find it here."""
+    monkeypatch.setattr(single, "STARTS", 2)
+
+
 @pytest.mark.parametrize(
     ("claim", "verdict"),
     [
@@ -135,8 +141,8 @@ def test_opposites_are_corrected_over_the_claims_too(monkeypatch):
     claims = [planted(False, 0.96), planted(False, 0.975), planted(False, 0.999)]
     entries = judge_planted(monkeypatch, *claims)
     assert [entry.verdict for entry in entries] == ["undecided", "undecided", "not supported"]
-    found = [opposite_p(entry.claim, entry.finding) for entry in entries]
-    assert found == pytest.approx([0.0401, 0.0251, 0.0011])
+    opposite = [opposite_p(entry.claim, entry.finding) for entry in entries]
+    assert opposite == pytest.approx([0.0401, 0.0251, 0.0011])
     expected = [0.0502, 0.0502, 0.0033]
     assert [entry.adjusted_opposite_p for entry in entries] == pytest.approx(expected)
 
@@ -161,15 +167,15 @@ SEQUENCES = {
 
 def planted_study(rows, sequences=SEQUENCES, tasks=()):
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    own = {task.name: task for task in tasks}
-    known = {
-        name: own[name] if name in own else load_task(name) for name in runs.task.unique()
-    } | own
+    given = {task.name: task for task in tasks}
+    by_name = {
+        name: given[name] if name in given else load_task(name) for name in runs.task.unique()
+    } | given
     tables = {
         name: pd.DataFrame(sequences.get(name, {}).items(), columns=["hands", "reward"])
-        for name in known
+        for name in by_name
     }
-    return MadeUp(study_of(runs, list(known.values())), _sequences=tables)
+    return MadeUp(study_of(runs, list(by_name.values())), _sequences=tables)
 
 
 def verdict_of(claim, study):
@@ -379,11 +385,11 @@ def test_the_shortest_reach():
     """Goal 1 of the ascending task lies 1.5 in line with the extended arm: 1.4 to its disc."""
     task = load_task("ascending")
     alone = corrective_trial(task, "RRR").configurations
-    found = [
+    lengths = [
         shortest_reach(task, q, "right", goal, alone[goal - 1])
         for goal, q in ((1, task.q0), (2, alone[0]))
     ]
-    assert found[0] == pytest.approx(1.4)
+    assert lengths[0] == pytest.approx(1.4)
     # No posture that hits goal 2 is nearer: sampled about the corrective process's.
     ways = np.random.default_rng(1).normal(0, 0.05, (20_000, task.robot.dof))
     ways[:, task.robot.joints("left")] = 0.0
@@ -394,15 +400,14 @@ def test_the_shortest_reach():
     )
     assert hit.sum() > 1000
     least = np.linalg.norm(q[hit] - alone[0], axis=1).min()
-    assert 0.9 * least < found[1] < least
+    assert 0.9 * least < lengths[1] < least
 
 
-def test_the_corrective_process_is_near_the_shortest_way(tmp_path, monkeypatch):
+def test_the_corrective_process_is_near_the_shortest_way(monkeypatch):
     """With the goals of the first release goal 2 of two-armed task 2 is 13 % off.
 
     The sum over its subtasks would hide that.
     """
-    monkeypatch.setattr(single, "STARTS", 2)
     claims = [f"corrective-near-shortest-{which}-armed" for which in ("one", "two")]
     shipped = planted_study(seven([9, 10, 11]))
     assert [verdict_of(claim, shipped).verdict for claim in claims] == ["supported"] * 2
@@ -646,9 +651,9 @@ def test_the_register_on_runs(study):
 
 def test_what_else_was_run_changes_no_verdict_on_the_papers_cells(study):
     """The same runs alone, and with other methods beside them, one of them tested against."""
-    own = study.runs[study.runs.method.str.startswith("dual-process/")]
+    learned = study.runs[study.runs.method.str.startswith("dual-process/")]
     cells = [cell for cell in study.plan.cells if cell.method.startswith("dual-process/")]
-    alone = replace(study, runs=own, plan=replace(study.plan, cells=tuple(cells)))
+    alone = replace(study, runs=learned, plan=replace(study.plan, cells=tuple(cells)))
     changed_ones = []
     for one, other in zip(judge.judged(alone), judge.judged(study), strict=True):
         if one.claim.beside:

@@ -128,13 +128,8 @@ def test_reproduce(coartic, tmp_path):
     assert "is not a run id" in error
 
 
-def test_list_fits_a_screen(coartic, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    code, text, _ = coartic("list")
-    assert code == 0
-    lines = text.splitlines()
-    assert len(lines) <= 30
-    assert max(map(len, lines)) <= 80
+def test_list(coartic):
+    assert coartic("list")[0] == 0
     for name in ("two-armed-1", "comparison", "long", "dual-process/EC4", "EC4"):
         assert coartic("list", name)[0] == 0
     code, _, error = coartic("list", "two-armed1")
@@ -147,14 +142,15 @@ def test_draw(coartic, tmp_path):
     for name in ("one.png", "one.svg", "one.pdf"):
         assert coartic("draw", "ascending", "--out", tmp_path / name)[0] == 0
         assert (tmp_path / name).stat().st_size > 5000
-    own = tmp_path / "own.svg"
-    assert coartic("draw", tmp_path / "mine.toml", "--out", own)[0] == 0
-    before = own.read_bytes()
-    code, _, error = coartic("draw", "ascending", "--out", own)
-    assert (code, own.read_bytes()) == (2, before)
+        assert b"Date" not in (tmp_path / name).read_bytes()
+    drawing = tmp_path / "own.svg"
+    assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
+    before = drawing.read_bytes()
+    code, _, error = coartic("draw", "ascending", "--out", drawing)
+    assert (code, drawing.read_bytes()) == (2, before)
     assert "--replace" in error
-    assert coartic("draw", "ascending", "--out", own, "--replace")[0] == 0
-    assert own.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
+    assert coartic("draw", "ascending", "--out", drawing, "--replace")[0] == 0
+    assert drawing.read_bytes() == (tmp_path / "one.svg").read_bytes() != before
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -163,7 +159,8 @@ def test_animate(coartic, tmp_path):
     assert coartic(*SMALL, "--out", out)[0] == 0
     run_id = load(out).runs.run_id[0]
     film = tmp_path / "film.gif"
-    assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
+    small = ("--speed", 900, "--width", 200)
+    assert coartic("animate", run_id, "--in", out, "--out", film, *small)[0] == 0
     assert film.read_bytes().startswith(b"GIF89a")
 
 

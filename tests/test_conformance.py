@@ -60,7 +60,7 @@ TASKS = {
 
 
 @pytest.fixture(scope="module")
-def known():
+def methods():
     return registry([BROKEN])
 
 
@@ -91,9 +91,9 @@ def few_trials(monkeypatch):
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])
-def test_methods_that_keep_every_law(known, name):
+def test_methods_that_keep_every_law(methods, name):
     tasks = next((few for kind, few in TASKS.items() if name.startswith(kind)), None)
-    laws = check_method(known[name], tasks=tasks)
+    laws = check_method(methods[name], tasks=tasks)
     assert [law.name for law in laws] == LAWS
     assert [law for law in laws if not law.passed] == []
     assert all(law.finding for law in laws)
@@ -102,16 +102,16 @@ def test_methods_that_keep_every_law(known, name):
         assert "gives infeasible: " in failure or "does not apply" in failure
     # And nobody beats the optimum.
     (rewards,) = (law.finding for law in laws if law.name == "solution")
-    found = re.findall(r"([a-z0-9-]+) (-\d+)", rewards)
-    assert found
-    assert all(int(reward) <= OPTIMUM.get(task, -1) for task, reward in found)
+    printed = re.findall(r"([a-z0-9-]+) (-\d+)", rewards)
+    assert printed
+    assert all(int(reward) <= OPTIMUM.get(task, -1) for task, reward in printed)
 
 
-def test_what_a_session_shows_cannot_be_written(known):
-    laws = check_method(known["test/forger"], laws=("solution", "information"))
+def test_what_a_session_shows_cannot_be_written(methods):
+    laws = check_method(methods["test/forger"], laws=("solution", "information"))
     assert [law.passed for law in laws] == [True, True]
     task = load_task("ascending").model_dump(mode="json")
-    (outcome,) = perform(job_of(known["test/forger"], task, {}, (0,))).outcomes
+    (outcome,) = perform(job_of(methods["test/forger"], task, {}, (0,))).outcomes
     assert outcome.meter["trials"] == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
@@ -136,17 +136,17 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "law", "finding"), CASES)
-def test_each_law_can_be_broken(known, name, law, finding):
+def test_each_law_can_be_broken(methods, name, law, finding):
     alone = law not in ("solution", "information", "determinism")  # those have consequences
-    laws = check_method(known[name], laws=None if alone else (law,), tasks=FEW_TASKS)
-    (broken,) = (found for found in laws if not found.passed)
+    laws = check_method(methods[name], laws=None if alone else (law,), tasks=FEW_TASKS)
+    (broken,) = (law_of_name for law_of_name in laws if not law_of_name.passed)
     assert broken.name == law
     assert finding in broken.finding
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)
-def test_shipped_tasks_keep_every_law(known, path):
-    assert [law for law in check_task_file(path, known) if not law.passed] == []
+def test_shipped_tasks_keep_every_law(methods, path):
+    assert [law for law in check_task_file(path, methods) if not law.passed] == []
 
 
 @pytest.mark.parametrize(
@@ -169,9 +169,9 @@ def test_shipped_tasks_keep_every_law(known, path):
         ),
     ],
 )
-def test_laws_of_a_task_file(known, text, law, finding, tmp_path):
+def test_laws_of_a_task_file(methods, text, law, finding, tmp_path):
     path = tmp_path / "own.toml"
     path.write_text(text, encoding="utf-8")
-    laws = {found.name: found for found in check_task_file(path, known)}
+    laws = {each.name: each for each in check_task_file(path, methods)}
     assert finding in laws[law].finding
     assert laws[law].passed == (law == "methods")

@@ -1,8 +1,5 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
-import subprocess
-import sys
-
 import pytest
 
 from coartic import CoarticError
@@ -45,36 +42,25 @@ def test_nobody_at_an_address(tmp_path):
 
 
 def test_a_cluster_without_workers(tmp_path):
-    said = []
+    messages = []
     with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
-        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=said.append)
+        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=messages.append)
         with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
             planned(CELLS).perform(tmp_path, executor=executor)
-    assert len(said) == 1
-
-
-SCHEDULER = """
-import sys, time
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(n_workers=1, dashboard_address=None, silence_logs=50) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        time.sleep(60)
-"""
+    assert len(messages) == 1
 
 
 def test_a_scheduler_that_is_lost(tmp_path):
     """What was finished before is kept."""
-    (tmp_path / "scheduler.py").write_text(SCHEDULER)
-    with subprocess.Popen(
-        [sys.executable, tmp_path / "scheduler.py"], stdout=subprocess.PIPE, text=True
-    ) as process:
-        executor = Dask(process.stdout.readline().strip())
+    with distributed.LocalCluster(
+        n_workers=1, processes=False, protocol="tcp://", **QUIET
+    ) as cluster:
 
         def watch(progress, what):
             if progress.done == 2:
-                process.kill()
+                cluster.close()
 
+        executor = Dask(cluster.scheduler_address)
         with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):
             planned(CELLS).perform(tmp_path / "out", executor=executor, watch=watch)
     again = run_and_write(tmp_path / "out", CELLS)

@@ -36,14 +36,14 @@ def test_a_batch_is_so_many_single_trials(name):
     targets[::7, 1] = np.nan
     batch, single = (Session(task, 0, TOLD, model=model) for _ in range(2))
     trials = batch.trials(hands, targets)
-    made = [single.trial(movements_of(*pair)) for pair in zip(hands, targets, strict=True)]
-    assert batch.rewards == single.rewards == [execution.reward for execution in made]
+    executions = [single.trial(movements_of(*pair)) for pair in zip(hands, targets, strict=True)]
+    assert batch.rewards == single.rewards == [execution.reward for execution in executions]
     assert 0 < batch.rewards.count(None) < 40
     rewards = [-np.inf if reward is None else reward for reward in single.rewards]
     assert trials.rewards.tolist() == rewards
-    assert trials.ticks.tolist() == [execution.ticks for execution in made]
-    assert trials.corrections.tolist() == [execution.corrections for execution in made]
-    for reached, execution in zip(trials.reached, made, strict=True):
+    assert trials.ticks.tolist() == [execution.ticks for execution in executions]
+    assert trials.corrections.tolist() == [execution.corrections for execution in executions]
+    for reached, execution in zip(trials.reached, executions, strict=True):
         hits = len(execution.configurations)
         np.testing.assert_array_equal(reached[:hits], execution.configurations)
         assert np.isnan(reached[hits:]).all()
@@ -69,11 +69,11 @@ def test_hands_as_text_and_as_numbers():
 def test_a_budget_that_ends_within_a_batch():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 10)
-    whole = Session(task, 0, TOLD).trials(hands, targets)
+    unlimited = Session(task, 0, TOLD).trials(hands, targets)
     session = Session(task, 0, TOLD, trial_budget=7)
     assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
     rest = session.trials(hands[4:], targets[4:])
-    np.testing.assert_array_equal(rest.rewards, whole.rewards[4:7])
+    np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
     assert (session.meter.trials, session.trials_left, len(session.rewards)) == (7, 0, 7)
     assert len(session.trials([], targets[:0]).ticks) == 0
     with pytest.raises(BudgetError, match="all 7 trials"):

@@ -13,9 +13,9 @@ from coartic.analysis.statistics.equivalence import difference, equivalence, sha
 
 def test_interval_against_an_exact_value_is_students():
     ours = np.random.default_rng(14).normal(-484, 4, 12)
-    found = difference(ours, -484, None, 20)
+    interval = difference(ours, -484, None, 20)
     expected = stats.ttest_1samp(ours, -484).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low + 484, expected.high + 484))
+    assert (interval.low, interval.high) == pytest.approx((expected.low + 484, expected.high + 484))
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ def test_interval_against_an_exact_value_is_students():
 )
 def test_verdicts(shift, spread, verdict):
     ours = -500 + shift + spread * np.linspace(-1, 1, 20)
-    found = difference(ours, -500, 1.0, 20)
-    assert (found.verdict, found.margin) == (verdict, 5.0)
+    interval = difference(ours, -500, 1.0, 20)
+    assert (interval.verdict, interval.margin) == (verdict, 5.0)
 
 
 def test_edge_cases_of_the_difference():
@@ -37,14 +37,14 @@ def test_edge_cases_of_the_difference():
 def test_p_is_of_two_one_sided_tests():
     rng = np.random.default_rng(15)
     ours, theirs = rng.normal(-503, 5, 20), rng.normal(-502, 3, 15)
-    found = equivalence(ours, theirs, 4.0)
+    ours_and_theirs = equivalence(ours, theirs, 4.0)
     above = stats.ttest_ind(ours + 4, theirs, equal_var=False, alternative="greater").pvalue
     below = stats.ttest_ind(ours - 4, theirs, equal_var=False, alternative="less").pvalue
-    assert found.p == pytest.approx(max(above, below))
-    assert found.n == (20, 15)
+    assert ours_and_theirs.p == pytest.approx(max(above, below))
+    assert ours_and_theirs.n == (20, 15)
     printed = difference(ours, theirs.mean(), theirs.std(ddof=1), 15)
     expected = stats.ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
-    for one in (found, printed):
+    for one in (ours_and_theirs, printed):
         assert (one.low, one.high) == pytest.approx((expected.low, expected.high))
 
 
@@ -54,11 +54,11 @@ def test_p_is_of_two_one_sided_tests():
     st.floats(0.1, 10),
 )
 def test_interval_and_p_say_the_same(a, b, margin):
-    found = equivalence(a, b, margin)
-    if found.note:
+    interval = equivalence(a, b, margin)
+    if interval.note:
         return
-    touching = any(abs(abs(end) - margin) < 1e-6 for end in (found.low, found.high))
-    assert touching or (found.verdict == "equivalent") == (found.p <= 0.025)
+    touching = any(abs(abs(end) - margin) < 1e-6 for end in (interval.low, interval.high))
+    assert touching or (interval.verdict == "equivalent") == (interval.p <= 0.025)
 
 
 def test_degenerate_samples():
@@ -82,11 +82,11 @@ def test_degenerate_samples():
     ],
 )
 def test_difference_of_shares(first, second, low, high):
-    found = shares(first, second, 0.25)
-    assert found.estimate == pytest.approx(first[0] / first[1] - second[0] / second[1])
-    assert (found.low, found.high) == pytest.approx((low, high), abs=6e-5)
+    interval = shares(first, second, 0.25)
+    assert interval.estimate == pytest.approx(first[0] / first[1] - second[0] / second[1])
+    assert (interval.low, interval.high) == pytest.approx((low, high), abs=6e-5)
     turned = shares(second, first, 0.25)
-    assert (-turned.high, -turned.low) == pytest.approx((found.low, found.high))
+    assert (-turned.high, -turned.low) == pytest.approx((interval.low, interval.high))
 
 
 def test_shares_agree_where_newcombes_interval_is_within_the_margin():

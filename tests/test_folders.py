@@ -23,9 +23,9 @@ def first(tmp_path_factory):
 def shifted(study, by):
     """The same runs with other rewards of the learner."""
     runs = study.runs.copy()
-    own = runs.method == LEARNED
-    runs.loc[own, "reward"] += np.array(by)
-    runs.loc[own, "result"] += "-other"
+    of_learner = runs.method == LEARNED
+    runs.loc[of_learner, "reward"] += np.array(by)
+    runs.loc[of_learner, "result"] += "-other"
     return replace(study, runs=runs)
 
 

@@ -70,16 +70,16 @@ def test_the_checkers_find_nothing(name, options, monkeypatch):
 
 def test_what_the_learner_sees_and_what_can_be_seen():
     task = load_task("two-armed-1")
-    plain, whole = (gymnasium.make(TWO, observe=what) for what in ("learner", "posture"))
+    plain, full = (gymnasium.make(TWO, observe=what) for what in ("learner", "posture"))
     seen, _ = plain.reset(seed=3)
     assert seen.tolist() == [1, 0, 0, 0, 0, 0]
-    whole.reset()
+    full.reset()
     left = np.full(plain.action_space.shape, -0.1)
     seen, _, _, _, info = plain.step(left)
     assert seen.tolist() == [0, 1, 0, 0, 1, 0]
     assert (info["hands"], info["corrections"]) == ("L", 1)
-    seen = whole.step(left)[0]
-    q = whole.unwrapped.arms.q[0]
+    seen = full.step(left)[0]
+    q = full.unwrapped.arms.q[0]
     np.testing.assert_allclose(seen[6:], [*q, *task.goal_array.ravel()], rtol=1e-6)
     assert plain.step(-left)[0].tolist() == [0, 0, 1, 0, 0, 1]
     assert plain.action_space.shape == (1 + 9,)  # the base is locked in y
@@ -103,19 +103,19 @@ def test_trials_that_fail_and_actions_that_are_none():
 )
 def test_the_vector_is_as_many_single_ones(options):
     """Episodes that fail end earlier, so that robots are at different goals."""
-    own, sync = (
+    vector, sync = (
         gymnasium.make_vec(TWO, num_envs=7, vectorization_mode=mode, **options)
         for mode in ("vector_entry_point", "sync")
     )
-    assert isinstance(own, coartic.gym.TaskVectorEnv)
-    assert own.metadata["autoreset_mode"] == sync.metadata["autoreset_mode"]
-    assert own.action_space == sync.action_space
-    assert own.observation_space == sync.observation_space
-    own.action_space.seed(0)
-    results = [(own.reset(seed=1), sync.reset(seed=1))]
+    assert isinstance(vector, coartic.gym.TaskVectorEnv)
+    assert vector.metadata["autoreset_mode"] == sync.metadata["autoreset_mode"]
+    assert vector.action_space == sync.action_space
+    assert vector.observation_space == sync.observation_space
+    vector.action_space.seed(0)
+    results = [(vector.reset(seed=1), sync.reset(seed=1))]
     for _ in range(17):
-        actions = own.action_space.sample()
-        results.append((own.step(actions), sync.step(actions)))
+        actions = vector.action_space.sample()
+        results.append((vector.step(actions), sync.step(actions)))
     for (*ours, our_info), (*theirs, their_info) in results:
         for one, other in zip(ours, theirs, strict=True):
             np.testing.assert_array_equal(one, other)
@@ -145,8 +145,8 @@ def test_the_agent_of_the_page_trains(capsys):
     pytest.importorskip("stable_baselines3")
     page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
     (text,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
-    made = {}
-    exec(text.replace("60_000", "2048"), made)
-    assert -560 < made["total"] < -480  # the corrective process alone: -532
-    assert made["info"]["is_success"]
-    assert all(-FAILED < episode["r"] < -480 for episode in made["agent"].ep_info_buffer)
+    names = {}
+    exec(text.replace("60_000", "2048"), names)
+    assert -560 < names["total"] < -480  # the corrective process alone: -532
+    assert names["info"]["is_success"]
+    assert all(-FAILED < episode["r"] < -480 for episode in names["agent"].ep_info_buffer)

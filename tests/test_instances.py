@@ -20,8 +20,8 @@ def test_the_interval_speaks_about_other_tasks():
     rng = np.random.default_rng(1)
     covered = 0
     for _ in range(150):
-        found = other_tasks({f: simulated(rng, 8, 10) for f in "ab"}, seed=0)
-        covered += found.low <= 0.3 <= found.high
+        interval = other_tasks({f: simulated(rng, 8, 10) for f in "ab"}, seed=0)
+        covered += interval.low <= 0.3 <= interval.high
     # A percentile interval of 2 x 8 instances; 0.95 ± 3 standard errors, and short by a little.
     assert 0.895 <= covered / 150 <= 0.985
 
@@ -37,9 +37,9 @@ def test_runs_do_not_stand_for_tasks():
 def test_width_of_the_interval():
     """The root of the variance of instances over their number, twice 1.96 times."""
     centres = np.linspace(-1, 1, 40)
-    found = other_tasks({"a": [(np.full(3, c),) for c in centres]}, seed=0)
-    assert found.estimate == pytest.approx(0)
-    assert found.high - found.low == pytest.approx(
+    plain = other_tasks({"a": [(np.full(3, c),) for c in centres]}, seed=0)
+    assert plain.estimate == pytest.approx(0)
+    assert plain.high - plain.low == pytest.approx(
         2 * 1.96 * centres.std(ddof=1) / math.sqrt(40), rel=0.08
     )
     # Runs add their own: variance 1 of each of 4.
@@ -52,9 +52,9 @@ def test_width_of_the_interval():
 def test_families_count_alike_whatever_their_number_of_instances():
     many = [(np.array([1.0]),)] * 30
     few = [(np.array([0.0, 0.0]),)] * 3
-    found = other_tasks({"many": many, "few": few}, seed=0)
-    assert (found.estimate, found.low, found.high, found.note) == (0.5, 0.5, 0.5, NO_SPREAD)
-    assert found.n == (30, 3)
+    both = other_tasks({"many": many, "few": few}, seed=0)
+    assert (both.estimate, both.low, both.high, both.note) == (0.5, 0.5, 0.5, NO_SPREAD)
+    assert both.n == (30, 3)
     none = other_tasks({"many": many, "few": few[:2]}, seed=0)
     assert math.isnan(none.low)
     assert "fewer than 3 instances" in none.note
@@ -67,22 +67,22 @@ def test_a_pair_is_the_difference_on_the_same_instance():
     rng = np.random.default_rng(3)
     hard = rng.normal(0, 5, 20)
     pairs = [(rng.normal(h + 0.5, 0.1, 10), rng.normal(h, 0.1, 10)) for h in hard]
-    found = other_tasks({"a": pairs}, seed=4)
-    assert found.low < 0.5 < found.high
-    assert found.high - found.low < 0.1
-    assert found == other_tasks({"a": pairs}, seed=4)
+    difference = other_tasks({"a": pairs}, seed=4)
+    assert difference.low < 0.5 < difference.high
+    assert difference.high - difference.low < 0.1
+    assert difference == other_tasks({"a": pairs}, seed=4)
     swapped = other_tasks({"a": [(b, a) for a, b in pairs]}, seed=4)
-    assert swapped.estimate == pytest.approx(-found.estimate)
+    assert swapped.estimate == pytest.approx(-difference.estimate)
 
 
 def test_the_interval_ends_at_what_runs_can_make():
     """Gaps are never below 0: two instances at 0 and one far away."""
     gaps = [(np.zeros(3),), (np.zeros(3),), (np.array([0.3, 0.3, 0.4]),)]
-    found = other_tasks({"a": gaps})
-    assert found.low == 0
-    assert found.high <= 0.4
-    turned = other_tasks({"a": [(np.zeros(3), *own) for own in gaps]})
-    assert (turned.low, turned.high) == pytest.approx((-found.high, -found.low), abs=0.02)
+    gap = other_tasks({"a": gaps})
+    assert gap.low == 0
+    assert gap.high <= 0.4
+    turned = other_tasks({"a": [(np.zeros(3), *runs) for runs in gaps]})
+    assert (turned.low, turned.high) == pytest.approx((-gap.high, -gap.low), abs=0.02)
 
 
 def test_given_tasks_are_strata():
@@ -90,8 +90,8 @@ def test_given_tasks_are_strata():
     assert gap_share([-300, -303], -300).tolist() == [0, 0.01]
     rng = np.random.default_rng(31)
     runs = rng.normal(0, 1, (4, 20))
-    found = task_mean({task: 100 * i + runs[i] for i, task in enumerate("abcd")})
-    assert found.estimate == pytest.approx(150 + runs.mean())
-    error = math.sqrt(sum(own.var() / 20 for own in runs)) / 4
-    assert found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.1)
+    mean = task_mean({task: 100 * i + runs[i] for i, task in enumerate("abcd")})
+    assert mean.estimate == pytest.approx(150 + runs.mean())
+    error = math.sqrt(sum(of_task.var() / 20 for of_task in runs)) / 4
+    assert mean.high - mean.low == pytest.approx(2 * 1.96 * error, rel=0.1)
     assert task_mean({"a": [1.0] * 4, "b": [5.0] * 40}).estimate == 3.0  # each counts the same

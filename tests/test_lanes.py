@@ -94,7 +94,7 @@ def test_lanes_do_not_mix(count, far):
 
     xs, ys = placed(range(count))
     for number, arm in enumerate(arms):
-        (x,), (y,) = (found.T for found in placed([number]))
+        (x,), (y,) = (coordinates.T for coordinates in placed([number]))
         npt.assert_array_equal(xs[:, number], x)
         npt.assert_array_equal(ys[:, number], y)
         hand = "left" if arm.first == robot.arm("left").first else "right"
@@ -161,14 +161,14 @@ ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
 
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
-    found = []
+    tables = []
     for number, executor in enumerate((Watched(), Nobody())):
         options = {"runs": LANES + 2, "trials": 3, "executor": executor}
-        found.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
-    assert (found[0].status == "ok").all()
-    assert found[0].result.tolist() == found[1].result.tolist()
+        tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
+    assert (tables[0].status == "ok").all()
+    assert tables[0].result.tolist() == tables[1].result.tolist()
     assert executor.sizes == [LANES, 2, 1] + [1] * (LANES + 2)
-    assert [set(runs.together) for runs in found] == [{1, 2, LANES}, {1}]
+    assert [set(runs.together) for runs in tables] == [{1, 2, LANES}, {1}]
 
 
 @pytest.mark.parametrize(

@@ -27,14 +27,14 @@ from tests.support.suites import KNOWN
 @pytest.mark.parametrize("task", with_members())
 def test_an_ensemble_has_200_members_that_meet_every_constraint(task):
     ensemble = members(task)
-    own = {name: t for name, t in ensemble.items() if name.startswith(f"{task}-m")}
-    assert len({t.goals for t in own.values()}) == len(own) >= 200
+    drawn = {name: t for name, t in ensemble.items() if name.startswith(f"{task}-m")}
+    assert len({t.goals for t in drawn.values()}) == len(drawn) >= 200
     assert ensemble[f"{task}-m001"].goals == load_task(task).goals
     for name, t in ensemble.items():
         assert load_task(name) is t
         assert task_of(name) == task
         assert "goals" in t.reconstructed
-    goals = np.array([t.goal_array for t in own.values()])
+    goals = np.array([t.goal_array for t in drawn.values()])
     assert search_for(task).meets_all(goals).all()
 
 
@@ -43,9 +43,10 @@ def test_distances_of_members_are_those_of_their_figures(task):
     text = (MEMBERS_FOLDER / f"{task}.csv").read_text(encoding="utf-8")
     rows = list(csv.DictReader(text.splitlines()))
     assert len(rows) == len(members(task))
+    labels = [test.label for test in printed_tests(task) if test.counted]
     for each in rows:
-        own = [each[f"{test.label}, distance"] for test in printed_tests(task) if test.counted]
-        squares = [25.0 if value == "" else min(abs(float(value)), 5.0) ** 2 for value in own]
+        distances = [each[f"{label}, distance"] for label in labels]
+        squares = [25.0 if value == "" else min(abs(float(value)), 5.0) ** 2 for value in distances]
         assert float(each["distance"]) == pytest.approx(np.sqrt(np.mean(squares)), abs=0.01)
 
 
@@ -88,10 +89,10 @@ def test_claims_are_judged_for_each_member():
     study = study_with([*names, *more], (20.0, 20.0, 20.0, -20.0, 20.0, 20.0, 20.0))
     claims = [claim for claim in PAPERS if claim.id == "ec4-beats-ec3"]
     table = judged_specifications([study], claims=claims)
-    own = table[table.claim == "ec4-beats-ec3"].set_index("member")
-    assert set(own.index) == {"", *names[2:], "two-armed-1-m001"}
-    assert own.effect["two-armed-1-m002"] > 0 > own.effect["two-armed-1-m003"]
-    assert own.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
+    judged = table[table.claim == "ec4-beats-ec3"].set_index("member")
+    assert set(judged.index) == {"", *names[2:], "two-armed-1-m001"}
+    assert judged.effect["two-armed-1-m002"] > 0 > judged.effect["two-armed-1-m003"]
+    assert judged.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
     twice = judged_specifications([study, study], claims=claims, jobs=2)
     pd.testing.assert_frame_equal(twice, table)
     counts = shares(table).set_index(["claim", "kind"]).loc["ec4-beats-ec3"]

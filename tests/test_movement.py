@@ -93,14 +93,9 @@ def random_movements(rng, robot, hand, count):
     return q, target, goals
 
 
-def random_movement(rng, robot, hand):
-    (q,), (target,), (goal,) = random_movements(rng, robot, hand, 1)
-    return q, target, tuple(goal)
-
-
-@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 5_000), (UNEVEN, 2_000)])
+@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 2_000), (UNEVEN, 1_000)])
 @pytest.mark.parametrize("hand", HANDS)
-def test_equals_every_step_many_thousand_times(robot, count, hand):
+def test_equals_every_step_many_times(robot, count, hand):
     rng = np.random.default_rng(15)
     drawn = random_movements(rng, robot, hand, count)
     models = [MotionModel(step=step) for step in (0.01, 0.003, 0.1)]
@@ -144,17 +139,6 @@ def test_equals_the_loop_for_any_movement(
         assert_same(fast, reference.move(*arguments, stop_on_arrival=stop_on_arrival))
 
 
-@given(step=st.sampled_from([0.003, 0.01, 0.07]), tolerance=st.sampled_from([0.001, 0.01, 0.1]))
-@settings(max_examples=20)
-def test_equals_the_loop_under_other_constants(step, tolerance):
-    model = MotionModel(step=step, arrival_tolerance=tolerance)
-    rng = np.random.default_rng(7)
-    for _ in range(8):
-        q, target, goal = random_movement(rng, ROBOT, "left")
-        arguments = (ROBOT, q, target, "left", goal, 0.1)
-        assert_same(move(*arguments, model=model), reference.move(*arguments, model=model))
-
-
 def test_grazing_a_goal():
     """Goals whose rim the hand's path only just touches, or only just misses."""
     rng = np.random.default_rng(8)
@@ -186,17 +170,6 @@ def test_ticks_of_a_plain_translation():
     ahead = move(ROBOT, q, target, "right", (4.995, 0.1), 0.1)
     assert (ahead.ticks, ahead.hit) == (41, True)
     assert ahead.q[0] == pytest.approx(0.40)
-
-
-def test_skips_most_steps():
-    rng = np.random.default_rng(9)
-    evaluations = ticks = 0
-    for _ in range(100):
-        q, target, _ = random_movement(rng, ROBOT, "right")
-        result = move(ROBOT, q, target, "right", (30.0, 0.0), 0.1)
-        evaluations += result.evaluations
-        ticks += result.ticks
-    assert evaluations < ticks / 4
 
 
 @entry
@@ -279,17 +252,6 @@ def test_inputs_are_left_alone_and_checked():
         move(ROBOT, q, target, "right", (1.0, 1.0), np.nan)
     with pytest.raises(ValueError, match="model.step is 0.0"):
         move(ROBOT, q, target, "right", (1.0, 1.0), 0.1, model=MotionModel(step=0.0))
-
-
-def test_a_path_of_one_segment_is_a_movement_without_early_arrival():
-    rng = np.random.default_rng(18)
-    for _ in range(300):
-        q, target, goal = random_movement(rng, ROBOT, "right")
-        path = follow(ROBOT, q, target[None], "right", goal, 0.1)
-        line = move(ROBOT, q, target, "right", goal, 0.1, stop_on_arrival=False)
-        if not on_a_rim(ROBOT, q, target, "right", goal, 0.1):
-            assert (path.ticks, path.hit) == (line.ticks, line.hit)
-            np.testing.assert_allclose(path.q, line.q, atol=1e-12)
 
 
 def test_a_path_costs_its_length_however_finely_it_is_cut():

@@ -20,7 +20,6 @@ from coartic.baselines.cascade import (
     CascadeError,
     damped_projection,
 )
-from coartic.baselines.corrective_alone import EverySequence
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
 from coartic.baselines.nullspace_qp import (
@@ -70,11 +69,11 @@ def exact(rows, least, preferred):
             itertools.combinations(range(len(rows)), size) for size in range(3)
         ):
             some = rows[list(active)]
-            found = preferred + np.linalg.pinv(some) @ (least[list(active)] - some @ preferred)
-            if (rows @ found < least - 1e-9).any():
+            point = preferred + np.linalg.pinv(some) @ (least[list(active)] - some @ preferred)
+            if (rows @ point < least - 1e-9).any():
                 continue
-            if best is None or np.linalg.norm(found - preferred) < np.linalg.norm(best - preferred):
-                best = found
+            if best is None or np.linalg.norm(point - preferred) < np.linalg.norm(best - preferred):
+                best = point
         return best
 
     slack = np.full((len(rows), 1), DAMPING)  # in units of 1 / λ
@@ -95,28 +94,28 @@ def test_closed_form_is_the_damped_pseudoinverse_and_a_projection(
 ):
     """Level 1 by least squares with the damping as rows, level 2 in a basis of the nullspace."""
     row = np.array([np.cos(angle), np.sin(angle)]) @ ROBOT.jacobian(q, "left")
-    found = damped_projection(row, least, preferred, damping)
+    projected = damped_projection(row, least, preferred, damping)
     rows = np.vstack([row, damping * np.eye(ROBOT.dof)])
     first = np.linalg.lstsq(rows, np.array([max(least, 0.0), *NOTHING]), rcond=None)[0]
     wanted = row @ first if least > 0 else least
     if row @ preferred >= wanted:
-        np.testing.assert_array_equal(found, preferred)
+        np.testing.assert_array_equal(projected, preferred)
         return
     basis = null_space(row[None])
     if least > 0:
-        np.testing.assert_allclose(found, first + basis @ (basis.T @ preferred), atol=1e-8)
-    assert row @ found == pytest.approx(wanted, abs=1e-8)
-    np.testing.assert_allclose(basis.T @ (found - preferred), 0, atol=1e-8)
+        np.testing.assert_allclose(projected, first + basis @ (basis.T @ preferred), atol=1e-8)
+    assert row @ projected == pytest.approx(wanted, abs=1e-8)
+    np.testing.assert_allclose(basis.T @ (projected - preferred), 0, atol=1e-8)
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_one_row_without_active_limits_is_the_closed_form(solver):
     cascade = cascade_for(1, ROBOT.dof, solver)
     for rows, least, preferred in problems(10, 1):
-        found = damped_projection(rows[0], least[0], preferred)
-        assert np.abs(found).max() < LIMIT
+        projected = damped_projection(rows[0], least[0], preferred)
+        assert np.abs(projected).max() < LIMIT
         np.testing.assert_allclose(
-            cascade.solve(rows[:1], least[:1], preferred), found, atol=1e-7 + SLACK
+            cascade.solve(rows[:1], least[:1], preferred), projected, atol=1e-7 + SLACK
         )
 
 
@@ -139,15 +138,6 @@ def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(solver, enum
     assert decided > 5
 
 
-def test_what_is_preferred_is_left_alone_where_the_task_allows_it():
-    """An inequality: inside the disc the hand goes wherever the joints would have it."""
-    rows = NORMALS @ ROBOT.jacobian(np.linspace(-1, 1, ROBOT.dof), "right")
-    preferred = np.linspace(-0.01, 0.01, ROBOT.dof)
-    assert (rows @ preferred).min() > -0.1
-    found = cascade_for(FACES, ROBOT.dof, "daqp").solve(rows, np.full(FACES, -0.1), preferred)
-    np.testing.assert_allclose(found, preferred, atol=1e-12)
-
-
 @pytest.mark.parametrize("solver", SETTINGS)
 def test_a_modelling_language_gives_the_same(solver):
     """cvxpy is told the two levels as they are defined; limits are active in half of them."""
@@ -155,21 +145,9 @@ def test_a_modelling_language_gives_the_same(solver):
     assert all(level.is_dcp(dpp=True) for level in modelled.levels)
     cascade = cascade_for(FACES, ROBOT.dof, solver)
     for number, problem in enumerate((*problems(5, 3), *problems(5, 4, far=4.0, preferred=1.0))):
-        found = cascade.solve(*problem)
+        solved = cascade.solve(*problem)
         close = 0.0 if solver == "daqp" else 1e-7 if number < 5 else 1e-4
-        np.testing.assert_allclose(found, modelled.solve(*problem), rtol=0, atol=close)
-
-
-def test_the_method_through_cvxpy_is_the_same_to_the_last_bit():
-    task, found = tiny_task(), []
-    for modelling in ("none", "cvxpy"):
-        method = NextGoal(NextGoal.Parameters(hands="RR", period=10, modelling=modelling))
-        session = Session(task, 0, method.told, trusted=True)
-        result = method.solve(session)
-        found.append(
-            ([(m.hand, *m.target) for m in result.solution], session.meter.solver_iterations)
-        )
-    assert found[0] == found[1]
+        np.testing.assert_allclose(solved, modelled.solve(*problem), rtol=0, atol=close)
 
 
 @pytest.mark.parametrize("solver", SETTINGS)
@@ -183,8 +161,8 @@ def test_singular_jacobians_leave_the_changes_bounded(solver):
         rows = np.array(direction)[None] @ jacobian
         wanted = damped_projection(rows[0], 1.0, preferred) if rows.any() else preferred
         assert np.linalg.norm(wanted) < 1
-        found = cascade.solve(rows, np.ones(1), preferred)
-        np.testing.assert_allclose(found, wanted, atol=1e-7 + SLACK)
+        solved = cascade.solve(rows, np.ones(1), preferred)
+        np.testing.assert_allclose(solved, wanted, atol=1e-7 + SLACK)
 
 
 def test_with_active_limits_both_levels_are_optimal():
@@ -193,7 +171,7 @@ def test_with_active_limits_both_levels_are_optimal():
     limits = [(-LIMIT, LIMIT)] * ROBOT.dof
     active = missed = 0
     for rows, least, preferred in problems(12, 2, far=10.0, preferred=2.0):
-        found = cascade.solve(rows, least, preferred)
+        solved = cascade.solve(rows, least, preferred)
         level_1 = minimize(
             lambda y: y[0] ** 2 + DAMPING**2 * (y[1:] ** 2).sum(),
             [max(least.max(), 0.0), *NOTHING],
@@ -204,8 +182,8 @@ def test_with_active_limits_both_levels_are_optimal():
             options={"ftol": 1e-15, "maxiter": 1000},
         )
         short = level_1.x[0]
-        assert max(0, (least - rows @ found).max()) <= short + 1e-5
-        assert np.abs(found).max() <= LIMIT + 1e-9
+        assert max(0, (least - rows @ solved).max()) <= short + 1e-5
+        assert np.abs(solved).max() <= LIMIT + 1e-9
         level_2 = minimize(
             lambda x, z=preferred: ((x - z) ** 2).sum(),
             level_1.x[1:],
@@ -215,8 +193,8 @@ def test_with_active_limits_both_levels_are_optimal():
             constraints=LinearConstraint(rows, least - short - SLACK),
             options={"ftol": 1e-14, "maxiter": 1000},
         )
-        assert ((found - preferred) ** 2).sum() == pytest.approx(level_2.fun, rel=1e-3)
-        active += np.abs(found).max() > LIMIT - 1e-6
+        assert ((solved - preferred) ** 2).sum() == pytest.approx(level_2.fun, rel=1e-3)
+        active += np.abs(solved).max() > LIMIT - 1e-6
         missed += short > 0.1
     assert active > 5
     assert missed > 0
@@ -386,7 +364,7 @@ def test_postures_make_the_way_through_all_discs_shortest(name):
         return np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
 
     start = np.concatenate(postures)
-    found = minimize(
+    shortest = minimize(
         length,
         start,
         method="SLSQP",
@@ -403,7 +381,7 @@ def test_postures_make_the_way_through_all_discs_shortest(name):
     )
     for goal, posture in zip(goals, postures, strict=True):
         assert miss(posture, task, "right", goal) <= task.radius
-    assert length(start) < found.fun + 0.03  # three steps
+    assert length(start) < shortest.fun + 0.03  # three steps
 
 
 @pytest.mark.parametrize("locked", [(), ("y",)])
@@ -435,21 +413,3 @@ def test_the_hand_comes_nearer_all_the_time(name):
         hands = ROBOT.forward_kinematics(movement.waypoints, movement.hand)
         distances = np.hypot(*(hands - task.goal_array[movement.goal - 1]).T)
         assert (np.diff(distances) < 0.02 * distances[:-1]).all()
-
-
-def test_looking_farther_ahead_pays():
-    """Development instances: the controller against itself and the corrective process."""
-    totals = []
-    names = [f"{family}/v1/d00{k}" for family in ("one-armed", "aligned") for k in range(2)]
-    for method, parameters in (
-        (EverySequence, {}),
-        (NullspaceQP, {"period": 10}),
-        (NextGoal, {"period": 10, "horizon": 1}),
-        (NextGoal, {"period": 10}),
-    ):
-        executions = [solve(method, load_task(name), **parameters)[1] for name in names]
-        assert not any(execution.reason for execution in executions)
-        totals.append(sum(execution.reward for execution in executions))
-    alone, none, one, two = totals
-    assert none < one < two
-    assert two > 0.9 * alone

@@ -113,12 +113,12 @@ def test_renewing_with_what_is_there_changes_nothing(tmp_path, monkeypatch):
     for module in (optima, renew_optima):
         monkeypatch.setattr(module, "DATA", copy)
     before = copy.read_bytes()
-    known = entries()
-    assert renew_optima.renew(known[:3]) == len(known) - 3
+    shipped = entries()
+    assert renew_optima.renew(shipped[:3]) == len(shipped) - 3
     assert copy.read_bytes() == before
-    better = known[0].model_copy(update={"reward": -1})
+    better = shipped[0].model_copy(update={"reward": -1})
     renew_optima.renew([better])
-    assert entries() == [better, *known[1:]]
+    assert entries() == [better, *shipped[1:]]
 
 
 def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_family():
@@ -131,9 +131,9 @@ def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_fami
     runs = runs.assign(status="ok", hands="RRR", parameters="{}")
     runs = runs.astype({"proven_bound": "Int64"})
     tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i001")}
-    known = optima.known_optima(runs, tasks, PAPER)
+    best = optima.known_optima(runs, tasks, PAPER)
     free = {
-        name: (o.reward, o.bound, o.searched) for (name, arm), o in known.items() if arm == "free"
+        name: (o.reward, o.bound, o.searched) for (name, arm), o in best.items() if arm == "free"
     }
     assert free == {"ascending": (-290, -292, -290), "one-armed/v1/i001": (-290, -250, -300)}
     assert not optima.known_optima(runs, tasks, PAPER._replace(step=0.02)).get(

@@ -64,8 +64,8 @@ def works(environment, place):
     do(coartic, "run", "quick", *small, *methods, "--out", "results", cwd=place)
     do(coartic, "report", "results", cwd=place)
     assert (place / "results" / "report" / "report.html").stat().st_size > 100_000
-    found = do(environment / "bin" / "python", "-m", "coartic", "--version", cwd=place)
-    assert found.startswith("coartic ")
+    version = do(environment / "bin" / "python", "-m", "coartic", "--version", cwd=place)
+    assert version.startswith("coartic ")
 
 
 def test_wheel(libraries, tmp_path):
@@ -75,16 +75,17 @@ def test_wheel(libraries, tmp_path):
 def test_source_distribution(built, libraries, tmp_path):
     """Installed by its own build, beside the libraries that are there already."""
     sdist, _ = built
-    own, place = tmp_path / "environment", tmp_path / "place"
+    environment, place = tmp_path / "environment", tmp_path / "place"
     place.mkdir()
-    do(sys.executable, "-m", "venv", own, cwd=tmp_path)
-    (site,) = (own / "lib").glob("python*/site-packages")
+    do(sys.executable, "-m", "venv", environment, cwd=tmp_path)
+    (site,) = (environment / "lib").glob("python*/site-packages")
     (others,) = (libraries / "lib").glob("python*/site-packages")
-    do(own / "bin" / "python", "-m", "pip", "install", "-q", "--no-deps", sdist, cwd=tmp_path)
+    python = environment / "bin" / "python"
+    do(python, "-m", "pip", "install", "-q", "--no-deps", sdist, cwd=tmp_path)
     (site / "libraries.pth").write_text(f"{others}\n")  # after its own
     where = "import coartic; print(coartic.__file__)"
-    assert str(own) in do(own / "bin" / "python", "-c", where, cwd=place)
-    works(own, place)
+    assert str(environment) in do(python, "-c", where, cwd=place)
+    works(environment, place)
 
 
 def test_what_is_in_them(built):

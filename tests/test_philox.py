@@ -47,5 +47,5 @@ def test_places_of_a_counter_have_draws_of_their_own():
 
     keys = [key_of(name) for name in ("a", "b")]
     places = [(number, attempt, part) for number in range(9) for attempt in (0, 1) for part in "xy"]
-    found = {first(key, n, a, "xy".index(p)) for key in keys for n, a, p in places}
-    assert len(found) == 2 * len(places)
+    beginnings = {first(key, n, a, "xy".index(p)) for key in keys for n, a, p in places}
+    assert len(beginnings) == 2 * len(places)

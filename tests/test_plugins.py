@@ -114,7 +114,7 @@ def test_what_counts_as_the_code_of_a_method(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch):
-    said = []
+    summaries = []
     for place, path, text in (
         ("here", "mine.py", TEXT),
         ("here", "mine.py", TEXT),
@@ -125,11 +125,11 @@ def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch
         (tmp_path / place).mkdir(exist_ok=True)
         monkeypatch.chdir(tmp_path / place)
         Path(path).write_text(text, encoding="utf-8")
-        said.append(coartic(
+        summaries.append(coartic(
             "run", "paper", "--methods", "nearest-hand", "--method-file", path,
             "--tasks", "ascending", "--out", tmp_path / "out",
         )[1].partition(" in ")[0])  # fmt: skip
-    assert said == ["1 run", *["1 run (1 reused)"] * 3, "1 run"]
+    assert summaries == ["1 run", *["1 run (1 reused)"] * 3, "1 run"]
 
 
 def test_what_a_validator_makes_of_a_parameter_is_what_counts(tmp_path):

@@ -93,8 +93,8 @@ def entries(folder, bodies):
     text = "".join(f"    def {name}(self, session):\n        {body}\n" for name, body in bodies)
     head, mark, tail = METHODS.partition("class Again")
     (folder / "mine.py").write_text(head + text + mark + tail, encoding="utf-8")
-    known = registry([folder / "mine.py"])
-    return known["test/does"], known["test/again"]
+    methods = registry([folder / "mine.py"])
+    return methods["test/does"], methods["test/again"]
 
 
 @pytest.fixture(scope="module")
@@ -159,29 +159,6 @@ def test_methods_of_others_cut_no_file_short(tmp_path):
     assert kept.read_text() == "results"
 
 
-def script(tmp_path, body):
-    """A process that runs such a method, from a script without a guard."""
-    entries(tmp_path, [("honest", body)])
-    (tmp_path / "script.py").write_text("""
-from coartic.benchmarks.run import Selection, run_suite
-print("begun", flush=True)
-select = Selection(tasks=["ascending"], methods=["test/does"], method_files=["mine.py"])
-print(run_suite("paper", "out", select=select, watch=lambda *_: print("watched", flush=True)))
-""")
-    command = [sys.executable, "script.py"]
-    return subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, start_new_session=True
-    )
-
-
-def test_a_script_needs_no_guard(tmp_path):
-    with script(tmp_path, "return Result(corrected(session))") as process:
-        said = process.stdout.read().splitlines()
-    assert said[:-1] == ["begun", "watched", "watched"]
-    assert said[-1].startswith("1 run in")
-    assert load(tmp_path / "out").runs.reward.tolist() == [HONEST]
-
-
 def test_workers_that_cannot_begin_get_a_sentence():
     entry, task = KNOWN["dual-process/EC1"], load_task("ascending").model_dump(mode="json")
     job = job_of(entry, task | {"goals": []}, entry.complete({}), (0,))
@@ -189,23 +166,60 @@ def test_workers_that_cannot_begin_get_a_sentence():
         list(Local(1).perform([job] * 10))
 
 
+SCRIPT = """
+from coartic.benchmarks.run import Selection, run_suite
+print("begun", flush=True)
+for method in ("test/does", "test/again"):
+    select = Selection(tasks=["ascending"], methods=[method], method_files=["mine.py"])
+    watch = lambda *_: print("watched", flush=True)
+    print(run_suite("paper", method, select=select, watch=watch), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory):
+    """A process that runs two methods from a script without a guard; the second one hangs."""
+    folder = tmp_path_factory.mktemp("script")
+    body = "time.sleep(60 * (self.name == 'test/again')); return Result(corrected(session))"
+    entries(folder, [("honest", body)])
+    (folder / "script.py").write_text(SCRIPT)
+    command = [sys.executable, "script.py"]
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        yield folder, process
+        process.kill()
+
+
+def test_a_script_needs_no_guard(script):
+    folder, process = script
+    lines = [process.stdout.readline() for _ in range(4)]
+    assert lines[:3] == ["begun\n", "watched\n", "watched\n"]
+    assert lines[3].startswith("1 run in")
+    assert load(folder / "test" / "does").runs.reward.tolist() == [HONEST]
+
+
 def session_of(leader):
     """Processes that a process has started, and itself."""
-    found = []
+    processes = []
     for place in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             state, _, _, session, *_ = place.read_text().rpartition(") ")[2].split()
-            found += [place] if int(session) == leader and state != "Z" else []
-    return found
+            processes += [place] if int(session) == leader and state != "Z" else []
+    return processes
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="what is left elsewhere ends with its run")
-def test_workers_end_with_their_parent(tmp_path):
-    with script(tmp_path, "time.sleep(60)") as process:
-        while len(session_of(process.pid)) < 4:  # the server, its tracker and a worker
-            time.sleep(0.05)
-            assert process.poll() is None
-        process.kill()
+@pytest.mark.skipif(
+    sys.platform != "linux",
+    reason="workers die with their parent by Linux's PDEATHSIG, which /proc shows; elsewhere a "
+    "worker ends when its run does",
+)
+def test_workers_end_with_their_parent(script):
+    _, process = script
+    while len(session_of(process.pid)) < 4:  # the server, its tracker and a worker
+        time.sleep(0.05)
+        assert process.poll() is None
+    process.kill()
     deadline = time.monotonic() + 5
     while session_of(process.pid) and time.monotonic() < deadline:
         time.sleep(0.05)

@@ -52,7 +52,7 @@ def shortest(task, hands, starts=5):
         ]
 
     rng = np.random.default_rng(7)
-    found = []
+    lengths = []
     for _ in range(starts):
         start = [(task.q0 + rng.normal(0, 0.6, len(task.q0)))[mask] for mask in free]
         result = minimize(
@@ -63,8 +63,8 @@ def shortest(task, hands, starts=5):
             options={"maxiter": 300, "ftol": 1e-9},
         )
         if result.success and min(room(result.x)) > -1e-6:
-            found.append(result.fun)
-    return min(found)
+            lengths.append(result.fun)
+    return min(lengths)
 
 
 def bent(**changes):

@@ -17,6 +17,7 @@ from coartic.analysis.published import (
     published_exhaustive,
     published_initial,
 )
+from coartic.learner import learning
 from coartic.learner.conditions import CONDITIONS
 from coartic.tasks.catalogue import builtin_tasks
 from coartic.tasks.readings import readings
@@ -34,7 +35,7 @@ def test_constants_are_those_of_the_code():
         condition.epsilon for condition in CONDITIONS.values()
     }
     assert {constant("noise-sd")} == {condition.noise_sd for condition in CONDITIONS.values()}
-    assert (RUNS, TRIALS) == (20, 10_000)
+    assert (RUNS, TRIALS) == (20, learning.TRIALS) == (20, 10_000)
     robot = Robot()
     assert robot.dof == constant("degrees-of-freedom")
     assert robot.left_links == (constant("link-length"),) * int(constant("joints-per-arm"))
@@ -141,11 +142,11 @@ def test_a_cell_puts_its_groups_together():
 def test_numbers_of_a_condition_fit_together(name):
     numbers = [e for e in ENTRIES.values() if isinstance(e, Number) and e.task == name]
     for named in of(name, "hand sequences"):
-        own = [e for e in numbers if e.condition == named.condition]
-        counts = {e.hands: e for e in own if e.kind == "count"}
+        of_condition = [e for e in numbers if e.condition == named.condition]
+        counts = {e.hands: e for e in of_condition if e.kind == "count"}
         assert set(counts) <= set(named.found)
         assert not counts or sum(e.number for e in counts.values()) == RUNS
-        means = {e.hands: e for e in own if e.kind == "reward"}
+        means = {e.hands: e for e in of_condition if e.kind == "reward"}
         assert set(means) - {None} <= set(named.found)
         if None in means and counts:
             shares = {hands: count.number / RUNS for hands, count in counts.items()}

@@ -52,19 +52,19 @@ def one_by_one(robot, arm, stops, *, corrects, looks, locked, model, by=(move, c
         result = moved(robot, q, end, hand, goal, RADIUS, stop_on_arrival=stops, model=model)
         q, hit, evaluations = result.q, result.hit, result.evaluations
         ticks = 0 if none else result.ticks
-    found, corrections, iterations = np.full(robot.dof, np.nan), 0, 0
+    posture, corrections, iterations = np.full(robot.dof, np.nan), 0, 0
     if corrects and not hit:
         answer = corrected(robot, q, hand, goal, locked_base=locked, model=model)
         iterations, evaluations = answer.iterations, evaluations + answer.iterations + 1
         if answer.converged:
-            found, corrections = answer.q, 1
+            posture, corrections = answer.q, 1
             result = moved(
-                robot, q, found, hand, goal, RADIUS,
+                robot, q, posture, hand, goal, RADIUS,
                 stop_on_arrival=model.corrective_arrival, model=model,
             )  # fmt: skip
             q, hit, ticks = result.q, result.hit, ticks + result.ticks
             evaluations += result.evaluations
-    return q, hit, ticks, found, corrections, iterations, evaluations
+    return q, hit, ticks, posture, corrections, iterations, evaluations
 
 
 @settings(max_examples=60)
@@ -81,14 +81,14 @@ def test_equal_to_movements_one_by_one(robot, seed, count, corrects, looks, lock
     rng = np.random.default_rng(seed)
     q, hands, goals, targets = arms(rng, robot, count)
     stops = rng.random(count) < 0.5
-    made = reach(
+    together = reach(
         robot, q, hands, goals, targets,
         stops=stops, corrects=corrects, looks=looks, locked_base=locked, model=model,
     )  # fmt: skip
     options = {"corrects": corrects, "looks": looks, "locked": locked, "model": model}
     for n, arm in enumerate(zip(q, hands, goals, targets, strict=True)):
         expected = one_by_one(robot, arm, stops[n], **options)
-        for name, field, value in zip(Reached._fields, made, expected, strict=True):
+        for name, field, value in zip(Reached._fields, together, expected, strict=True):
             np.testing.assert_array_equal(field[n], value, err_msg=name)
 
 
@@ -97,15 +97,15 @@ def test_the_judge_agrees():
     rng, robot, model = np.random.default_rng(5), Robot(), MODELS[1]
     q, hands, goals, targets = arms(rng, robot, LANES + 30)
     goals[: LANES + 5] = goals[0]
-    made = reach(robot, q, hands, goals, targets, model=model)
+    together = reach(robot, q, hands, goals, targets, model=model)
     options = {"corrects": True, "looks": True, "locked": (), "model": model}
     for n, arm in enumerate(zip(q, hands, goals, targets, strict=True)):
         judged = one_by_one(robot, arm, True, **options, by=(reference.move, reference.correct))
         for name, value in zip(Reached._fields[:-1], judged, strict=False):
-            given = getattr(made, name)[n]
+            given = getattr(together, name)[n]
             np.testing.assert_allclose(given, value, rtol=0, atol=1e-9, err_msg=name)
-    assert 10 < made.hit.sum() < len(q)
-    assert 10 < made.corrections.sum() < len(q)
+    assert 10 < together.hit.sum() < len(q)
+    assert 10 < together.corrections.sum() < len(q)
 
 
 @pytest.mark.parametrize("chosen", [slice(None, None, -1), slice(3, 60, 7), slice(5, 6)])

@@ -25,7 +25,6 @@ from coartic.analysis.reconstruction.search import Search, search_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
 TASK = load_task("two-armed-1")
-NEAR_PRINTED = np.array([[2.35, 3.24], [3.40, 3.24], [2.38, 2.96], [7.23, 3.24]])
 
 
 def runs(rewards: np.ndarray, *hands: tuple[str, int]) -> pd.DataFrame:
@@ -199,7 +198,7 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.Monk
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
     monkeypatch.setattr(readings, "DRAWS", 500)
     rng = np.random.default_rng(0)
-    own = runs(rng.normal(-300.0, 3.0, 1000))
+    of_reading = runs(rng.normal(-300.0, 3.0, 1000))
 
     def p(rewards: np.ndarray) -> float:
         mean, sd = round(float(rewards.mean())), round(float(rewards.std(ddof=1)), 1)
@@ -207,7 +206,7 @@ def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.Monk
             scoring.Figure("EC1", "mean", mean, 20, sd=sd),
             scoring.Figure("EC1", "sd", sd, 20, digits=1),
         ]
-        return readings.together(readings.likelihoods(figures, own)).p
+        return readings.together(readings.likelihoods(figures, of_reading)).p
 
     same = [p(rng.normal(-300.0, 3.0, 20)) for _ in range(24)]
     assert stats.kstest(same, "uniform").pvalue > 0.01
@@ -247,6 +246,7 @@ def test_a_reconstruction_is_found_and_scored(
 ) -> None:
     monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
     monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
+    monkeypatch.setattr(scoring, "RESAMPLES", 20)
     effort = {
         "members": 4,
         "runs": 2,
@@ -260,8 +260,8 @@ def test_a_reconstruction_is_found_and_scored(
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
     assert ours.sum() in (4, 5)
     assert list(members.member[~ours]) == list(search.layout.known)
-    known = members.set_index("member").loc["F2", ["x3", "y3"]]
-    assert known.tolist() == [2.38, 2.96]
+    printed = members.set_index("member").loc["F2", ["x3", "y3"]]
+    assert printed.tolist() == [2.38, 2.96]
     for _, row in members[ours].iterrows():
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
@@ -289,15 +289,18 @@ def test_printed_results_stand_beside_fresh_runs() -> None:
     assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
     row = table.loc["ascending", "EC1 mean"]
     seeds = range(800_000_000, 800_000_004)
-    own = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
-    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(own))
+    rewards = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
+    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(rewards))
     assert row.verdict == "different"
     assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
     with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
         scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
-def test_what_stands_is_replaced_by_what_is_clearly_nearer() -> None:
+def test_what_stands_is_replaced_by_what_is_clearly_nearer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(scoring, "RESAMPLES", 60)
     rng = np.random.default_rng(1)
     mean = scoring.Figure("EC3", "mean", -500.0, 20, sd=4.0)
 

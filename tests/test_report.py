@@ -3,6 +3,7 @@
 import html.parser
 import random
 import re
+import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.report import numbers, render
-from coartic.analysis.report.build import page, report_files, summary, write_report
+from coartic.analysis.report.build import page, report_files
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import runs_of, tables_of
 from coartic.analysis.tables import TABLES
@@ -20,17 +21,17 @@ from tests.support.suites import KNOWN, run_and_write
 
 
 @pytest.fixture(scope="module")
-def made(traced):
+def tables_by_name(traced):
     return {name: table(traced) for name, table in TABLES.items()}
 
 
-def test_every_row_names_runs_of_the_folder(traced, made):
-    known = set(traced.runs.run_id)
-    for name, table in made.items():
+def test_every_row_names_runs_of_the_folder(traced, tables_by_name):
+    runs_of_the_folder = set(traced.runs.run_id)
+    for name, table in tables_by_name.items():
         assert table.index.is_unique, name
         for row, run_ids in table.run_ids.items():
-            assert set(run_ids.split()) <= known, (name, row)
-    assert sum(len(table) > 0 for table in made.values()) >= 8
+            assert set(run_ids.split()) <= runs_of_the_folder, (name, row)
+    assert sum(len(table) > 0 for table in tables_by_name.values()) >= 8
 
 
 def recomputed(study, name, row, values):
@@ -56,12 +57,12 @@ def recomputed(study, name, row, values):
     return {}
 
 
-def test_ten_random_numbers_are_made_again_from_the_runs(traced, made):
+def test_ten_random_numbers_are_made_again_from_the_runs(traced, tables_by_name):
     chosen = random.Random(5)
     checked = 0
     names = ["methods", "published", "hands", "learning", "tasks"]
     while checked < 10:
-        table = made[names[checked % len(names)]]
+        table = tables_by_name[names[checked % len(names)]]
         table = table[table.run_ids.str.len() > 0]
         row = chosen.choice(list(table.index))
         values = table.loc[row]
@@ -71,18 +72,18 @@ def test_ten_random_numbers_are_made_again_from_the_runs(traced, made):
         checked += 1
 
 
-def test_trace_goes_from_a_row_to_its_runs(traced, tmp_path, monkeypatch, capsys):
-    write_report(traced, tmp_path / "report", for_paper=False)
-    tables = tables_of(tmp_path)
-    assert set(tables) == {name for name, table in TABLES.items() if len(table(traced))}
+def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, monkeypatch, capsys):
+    results = report.parent
+    tables = tables_of(results)
+    assert set(tables) == {name for name, table in tables_by_name.items() if len(table)}
     names, _ = runs_of(tables["methods"], None)
     _, runs = runs_of(tables["methods"], names[0])
-    method = TABLES["methods"](traced).method[names[0]]
+    method = tables_by_name["methods"].method[names[0]]
     assert set(traced.runs.set_index("run_id").method[runs]) == {method}
-    code, text, _ = call(monkeypatch, capsys, "trace", "methods", names[0], "--in", tmp_path)
+    code, text, _ = call(monkeypatch, capsys, "trace", "methods", names[0], "--in", results)
     assert code == 0
     assert all(f"coartic reproduce {run} --in " in text for run in runs)
-    code, _, error = call(monkeypatch, capsys, "trace", "methods", "nothing", "--in", tmp_path)
+    code, _, error = call(monkeypatch, capsys, "trace", "methods", "nothing", "--in", results)
     assert code == 2
     assert "no row 'nothing'" in error
 
@@ -113,38 +114,46 @@ def test_text_from_files_is_escaped():
     seen.feed(render.html_table(frame, "name", HOSTILE))
     assert "script" not in seen.elements
     assert HOSTILE in seen.text
-    made = render.latex_table(frame, "name", HOSTILE)
-    assert "\\input{x}" not in made
-    assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in made
-    assert r"\textbackslash{}input\{x\}" in made
+    latex = render.latex_table(frame, "name", HOSTILE)
+    assert "\\input{x}" not in latex
+    assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in latex
+    assert r"\textbackslash{}input\{x\}" in latex
 
 
-def test_a_page_stands_alone(traced):
-    text = page(traced)
+def test_a_page_stands_alone(report):
+    """Every id is there once, every reference has its id, and ink is the page's."""
+    text = (report / "report.html").read_text(encoding="utf-8")
     assert not re.search(
         r'(src|href)="(?!#|data:,|https://doi\.org|tables/|figures/|numbers)', text
     )
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
-    assert set(re.findall(r'href="#([^"]+)"', text)) <= set(ids)
+    references = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)
+    assert {a or b for a, b in references} <= set(ids)
+    figures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    assert len(figures) > 3
+    for figure in figures:
+        svg = ElementTree.fromstring(figure)
+        assert svg.get("viewBox")
+        assert svg.get("aria-label")
+        assert "#000000" not in figure
     assert len(re.findall(r"<section\b", text)) <= 12
     assert len(text) < 1_500_000
 
 
-def test_macros_are_few_and_each_names_its_runs(traced):
-    lines = numbers.numbers_tex(traced).splitlines()
+def test_macros_are_few_and_each_names_its_runs(report, tables_by_name):
+    lines = (report / "numbers.tex").read_text(encoding="utf-8").splitlines()
     macros = [line for line in lines if line.startswith("\\newcommand")]
     assert 5 < len(macros) <= numbers.MOST
     for line in macros:
-        found = re.fullmatch(r"\\newcommand\{\\coartic[A-Za-z]+\}\{-?[\d.]+\} % (.*)", line)
-        assert found, line
-        table, row = re.search(r"table ([\w-]+)(?:, row '(.*)')?$", found[1]).groups()
-        frame = TABLES[table](traced)
-        assert row is None or row in frame.index
+        macro = re.fullmatch(r"\\newcommand\{\\coartic[A-Za-z]+\}\{-?[\d.]+\} % (.*)", line)
+        assert macro, line
+        table, row = re.search(r"table ([\w-]+)(?:, row '(.*)')?$", macro[1]).groups()
+        assert row is None or row in tables_by_name[table].index
 
 
-def test_summary_is_the_first_screen(traced):
-    text = summary(traced)
+def test_summary_is_the_first_screen(traced, report):
+    text = (report / "summary.md").read_text(encoding="utf-8")
     for answer in answers(traced):
         assert answer["text"] in text
     assert len(text.split()) <= 250
@@ -161,9 +170,9 @@ def test_few_runs_say_so(tmp_path):
         load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]
     )
     without = run_and_write(tmp_path / "without", cells=alone, runs=1)
-    for study in (few, without):
-        files = report_files(study)
-        assert {"report.html", "summary.md", "numbers.tex"} <= set(files)
-        text = files["report.html"].decode()
+    files = report_files(without)
+    assert {"report.html", "summary.md", "numbers.tex", "tables/methods.tex"} <= set(files)
+    assert any(name.endswith(".pdf") for name in files)
+    for text in (page(few), files["report.html"].decode()):
         assert load_task("ascending").label in text
         assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))

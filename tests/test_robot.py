@@ -3,9 +3,6 @@
 import casadi
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from coartic.motion.compiled import entry, joint_chain, joint_lever
 from coartic.robot import HANDS, Robot
@@ -68,20 +65,6 @@ def test_leading_axes_are_vectorised(robot, hand):
         np.testing.assert_array_equal(jacobians[index], robot.jacobian(q[index], hand))
 
 
-@pytest.mark.parametrize("hand", HANDS)
-@given(q=configurations(UNEVEN))
-def test_jacobian_against_finite_differences(hand, q):
-    step = 1e-6
-    numeric = np.empty((2, UNEVEN.dof))
-    for joint in range(UNEVEN.dof):
-        delta = np.zeros(UNEVEN.dof)
-        delta[joint] = step
-        ahead = UNEVEN.forward_kinematics(q + delta, hand)
-        behind = UNEVEN.forward_kinematics(q - delta, hand)
-        numeric[:, joint] = (ahead - behind) / (2 * step)
-    np.testing.assert_allclose(UNEVEN.jacobian(q, hand), numeric, atol=1e-8)
-
-
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("hand", HANDS)
 def test_three_worlds_agree(robot, hand):
@@ -116,28 +99,6 @@ def test_three_worlds_agree(robot, hand):
         compiled(q, arm, xs, ys, columns)
         np.testing.assert_allclose([xs[-1], ys[-1]], expected, atol=1e-12, rtol=0)
         np.testing.assert_allclose(columns, jacobian, atol=1e-12, rtol=0)
-
-
-@given(q=configurations(PAPER_ROBOT), shift=arrays(np.float64, 2, elements=st.floats(-5, 5)))
-def test_moving_the_base_moves_both_hands_alike(q, shift):
-    moved = q.copy()
-    moved[:2] += shift
-    for hand in HANDS:
-        travel = PAPER_ROBOT.forward_kinematics(moved, hand) - PAPER_ROBOT.forward_kinematics(
-            q, hand
-        )
-        np.testing.assert_allclose(travel, shift, atol=1e-13)
-
-
-@pytest.mark.parametrize("hand", HANDS)
-@given(q=configurations(PAPER_ROBOT), angle=st.floats(-7, 7))
-def test_turning_the_first_joint_turns_the_arm(hand, q, angle):
-    turned = q.copy()
-    turned[PAPER_ROBOT.arm(hand).first] += angle
-    before = PAPER_ROBOT.joint_positions(q, hand)
-    after = PAPER_ROBOT.joint_positions(turned, hand)
-    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    np.testing.assert_allclose(after - after[0], (before - before[0]) @ rotation.T, atol=1e-12)
 
 
 def test_base_outline():

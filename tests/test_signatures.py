@@ -35,7 +35,6 @@ from coartic.analysis.signatures.paths import (
 )
 from coartic.analysis.signatures.register import signatures
 from coartic.analysis.signatures.subtasks import (
-    excess,
     isolated_agreement,
     isolated_reaches,
     sacrifices,
@@ -135,9 +134,9 @@ def test_permutations_by_brute_force():
         math.hypot(*(np.polyfit(x, q[list(order), k], 1)[0] for k in range(2)))
         for order in itertools.permutations(range(4))
     ]
-    found = slope_norm(q, x, rng())
-    assert found.value == pytest.approx(norms[0])
-    assert found.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
+    norm = slope_norm(q, x, rng())
+    assert norm.value == pytest.approx(norms[0])
+    assert norm.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
 
 
 # What the hand feels
@@ -173,50 +172,50 @@ def test_self_motion_of_the_robot_is_motor_equivalent():
     at = task.robot.forward_kinematics(np.array([q, still, moving]), "right")
     assert np.linalg.norm(at[1] - at[0]) < 1e-7
     assert np.linalg.norm(at[2] - at[0]) > 5e-5
-    found = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
-    assert found[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
-    assert found[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
+    parts = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
+    assert parts[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
+    assert parts[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
 
 
 def test_synergy_by_hand():
     """Two runs a coordinate: variances are known exactly."""
     rows = np.diag([1.0, 1.0, 3.0, 3.0])
     q = np.concatenate([rows, -rows])
-    found = synergy(q, JACOBIAN)
+    planted = synergy(q, JACOBIAN)
     within, orthogonal = 2 * (9 + 9) / 7 / 2, 2 * (1 + 1) / 7 / 2
     total = (within + orthogonal) / 2
-    assert found.within == pytest.approx(within)
-    assert found.orthogonal == pytest.approx(orthogonal)
-    assert found.delta == pytest.approx((within - orthogonal) / total)
+    assert planted.within == pytest.approx(within)
+    assert planted.orthogonal == pytest.approx(orthogonal)
+    assert planted.delta == pytest.approx((within - orthogonal) / total)
     n, d = 4, 2  # the printed transform
-    assert found.z.value == pytest.approx(
-        0.5 * math.log((n / d + found.delta) / (n / d - found.delta))
+    assert planted.z.value == pytest.approx(
+        0.5 * math.log((n / d + planted.delta) / (n / d - planted.delta))
     )
-    assert found.neutral == 0.0
-    assert found.z.low < found.z.value < found.z.high
+    assert planted.neutral == 0.0
+    assert planted.z.low < planted.z.value < planted.z.high
 
 
 @given(st.integers(3, 8), st.integers(3, 30), st.integers(0, 10**6))
 def test_delta_stays_in_its_range_and_z_is_its_transform(joints, runs, seed):
     draw = rng(seed)
     jacobian, q = draw.standard_normal((2, joints)), draw.standard_normal((runs, joints))
-    found = synergy(q, jacobian)
-    assert -joints / 2 <= found.delta <= joints / (joints - 2)
-    ratio = (joints / 2 + found.delta) / (joints / (joints - 2) - found.delta)
-    assert found.z.value == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
+    drawn = synergy(q, jacobian)
+    assert -joints / 2 <= drawn.delta <= joints / (joints - 2)
+    ratio = (joints / 2 + drawn.delta) / (joints / (joints - 2) - drawn.delta)
+    assert drawn.z.value == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
     turned = synergy(q @ np.linalg.qr(draw.standard_normal((joints, joints)))[0], jacobian)
     assert turned.within * (joints - 2) + turned.orthogonal * 2 == pytest.approx(
-        found.within * (joints - 2) + found.orthogonal * 2  # the total does not turn
+        drawn.within * (joints - 2) + drawn.orthogonal * 2  # the total does not turn
     )
 
 
 def test_jackknife_is_the_loop_over_runs():
     q = rng(6).standard_normal((9, 4)) * [1, 1, 2, 3]
-    found = synergy(q, JACOBIAN)
+    every = synergy(q, JACOBIAN)
     without = [synergy(np.delete(q, k, axis=0), JACOBIAN).z.value for k in range(9)]
-    pseudo = 9 * found.z.value - 8 * np.array(without)
+    pseudo = 9 * every.z.value - 8 * np.array(without)
     half = 2.3060041 * pseudo.std(ddof=1) / 3  # Student's t, 8 degrees of freedom
-    z, low, high, _ = found.z
+    z, low, high, _ = every.z
     assert (low, high) == pytest.approx((z - half, z + half))
 
 
@@ -270,14 +269,6 @@ def test_other_hands_are_no_sacrifice():
     assert rows.loc["first subtask sacrificed"].value == 0
 
 
-def test_the_learner_sacrifices_the_first_subtask():
-    """Shah, Barto & Fagg (2013), EC1."""
-    run = learn(load_task("ascending"), "EC1", seed=0, trials=4000)
-    learned, initial = execute(run.task, run.solution), corrective_trial(run.task, "RRR")
-    assert sacrifices(change_from(learned, initial))
-    assert excess(trajectory(run.task, run.solution))[0] > 0
-
-
 def test_choice_in_isolation():
     """Each hand beside its goal: the near one is the isolated choice."""
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
@@ -309,10 +300,10 @@ def test_readiness_and_travel():
         task.robot.forward_kinematics(execution.configurations[0], "left") - [7.5, 0.1]
         for execution in (path.execution, initial)
     ]
-    found = readiness(path, initial)
-    assert found[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
-    assert found[0] < 0  # bent away
-    assert math.isnan(found[1])
+    gains = readiness(path, initial)
+    assert gains[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
+    assert gains[0] < 0  # bent away
+    assert math.isnan(gains[1])
     same = trajectory(task, planned(posture(1.0), posture(4.0), hands="RL"))
     assert readiness(same, initial)[0] == 0.0
     assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
@@ -346,10 +337,10 @@ def test_preshaping_by_the_arm_alone():
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, planned(swung, end, hands="RL"))
     path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
-    whole = readiness(path, initial)
-    assert 0.2 < whole[0] < 0.8
-    np.testing.assert_array_equal(readiness_from_base(path, initial), whole)
-    np.testing.assert_array_equal(preshaping(path, initial), whole)
+    gains = readiness(path, initial)
+    assert 0.2 < gains[0] < 0.8
+    np.testing.assert_array_equal(readiness_from_base(path, initial), gains)
+    np.testing.assert_array_equal(preshaping(path, initial), gains)
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -385,8 +376,8 @@ def test_waiting_arms_keep_still_under_condition_3_only():
     for condition, moves in (("EC3", False), ("EC4", True)):
         run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
         path = trajectory(run.task, run.solution)
-        own = preshaping(path, corrective_trial(run.task, "RRRR"))
-        assert (np.nan_to_num(own) != 0).any() == moves
+        moved = preshaping(path, corrective_trial(run.task, "RRRR"))
+        assert (np.nan_to_num(moved) != 0).any() == moves
 
 
 # Form
@@ -458,8 +449,8 @@ def test_spectral_arc_length_of_a_gaussian_speed():
 def test_smoothness_leaves_out_what_does_not_move():
     task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
     path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
-    own = path.hand_path("right")[:91]
-    assert smoothness(path) == (pytest.approx(spectral_arc_length(own)), math.inf)
+    way = path.hand_path("right")[:91]
+    assert smoothness(path) == (pytest.approx(spectral_arc_length(way)), math.inf)
 
 
 # Locus
@@ -516,19 +507,6 @@ def test_a_curve_is_no_slope():
     assert stats.linregress(places, curve[:, 0]).pvalue < 1e-6
     assert locus_slopes(curve, places)[0].p > 0.1
     assert slope_norm(curve, places, rng()).p > 0.1
-
-
-def test_norm_of_slopes():
-    places = np.repeat([0.0, 1.0, 2.0, 3.0], 3)
-    q = np.outer(places, [0.3, 0.0, -0.4])
-    norm = slope_norm(q, places, rng())
-    assert norm.value == pytest.approx(0.5)
-    assert norm.p == pytest.approx(2 / 24)  # as it is, and backwards
-    flat = slope_norm(np.ones((12, 3)), places, rng())
-    assert (flat.value, flat.p) == (0.0, 1.0)
-    noise = 0.1 * rng(3).standard_normal((12, 3))
-    slopes = [slope.value for slope in locus_slopes(q + noise, places)]
-    assert slope_norm(q + noise, places, rng()).value == pytest.approx(np.linalg.norm(slopes))
 
 
 # The driver
@@ -622,22 +600,6 @@ def test_frame_of_a_family():
     assert slopes.value[1, "right", "base_y"] > 0.001
     contexts = frame[frame.signature == "context distance"]
     assert contexts.why_not.str.contains("locus slopes").all()
-
-
-def test_frame_has_the_student_interval_of_its_runs():
-    """The waiting arm bends by 0, 0.1, 0.2 and more: its travel over runs has a known mean."""
-    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
-    bends = (0.0, 0.1, 0.2, 0.5)
-    solutions = [planned(posture(1.0, left_4=b), posture(4.0), hands="RL") for b in bends]
-    travelled = [execute(task, solution).configurations[0, 5] for solution in solutions]
-    frame = signatures(solved_study([(task, "planner", solutions)]))
-    row = frame[(frame.signature == "travel of the other arm") & (frame.goal == 1)]
-    half = 3.1824463 * np.std(travelled, ddof=1) / 2  # Student's t, 3 degrees of freedom
-    mean = np.mean(travelled)
-    assert row[["value", "low", "high"]].squeeze().tolist() == pytest.approx(
-        [mean, mean - half, mean + half], abs=1e-7
-    )
-    assert row.n.item() == 4
 
 
 def test_trajectories_put_like_sequences_together():

@@ -26,8 +26,8 @@ def study(rewards):
     """Runs of methods by task: ``{(task, method): rewards}``."""
     rows = [
         row(method, reward, task=task, run=k, seed=100 + k)
-        for (task, method), own in rewards.items()
-        for k, reward in enumerate(own)
+        for (task, method), of_method in rewards.items()
+        for k, reward in enumerate(of_method)
     ]
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     names = list(dict.fromkeys(runs.task))
@@ -61,8 +61,8 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
 
 
 def test_the_learners_conditions_stand_together():
-    found = standings(study(LEARNER | CMA))
-    over = found[found.task == ALL_TASKS]
+    table = standings(study(LEARNER | CMA))
+    over = table[table.task == ALL_TASKS]
     assert over.method.tolist() == ["cma-es/bandit", "dual-process (EC1, EC4)"]
     by_task = [(301.5 - 292) / 292, (481.5 - 465) / 465]
     assert over.gap.iloc[1] == pytest.approx(np.mean(by_task))
@@ -72,7 +72,7 @@ def test_the_learners_conditions_stand_together():
 
 
 def test_a_rank_counts_algorithms():
-    every = {(task, "cma-es/every"): own for (task, _), own in CMA.items()}
+    every = {(task, "cma-es/every"): rewards for (task, _), rewards in CMA.items()}
     seen = study(LEARNER | CMA | every)
     rows = leaders(seen, BY_TRIAL)
     assert rows.algorithm.tolist() == ["CMA-ES", "learner"]
@@ -97,31 +97,32 @@ def test_crossings_by_brute_force():
     rng = np.random.default_rng(5)
     spends = [rng.lognormal(3, 1, (runs, 20)).round() for runs in (6, 9)]
     spends[1][rng.random(spends[1].shape) < 0.3] = math.inf
-    found = Targets(spends)
+    reached = Targets(spends)
 
     def share(budget):
-        return np.mean([(own <= budget).mean() for own in spends])
+        return np.mean([(part <= budget).mean() for part in spends])
 
-    budgets = np.unique(np.concatenate([own.ravel() for own in spends]))
+    budgets = np.unique(np.concatenate([part.ravel() for part in spends]))
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
-        crossing = found.crossing(level)
+        crossing = reached.crossing(level)
         assert crossing.budget == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
-    steps, shares = found.curve()
+    steps, shares = reached.curve()
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
-    assert found.share() == pytest.approx(share(1e300))
+    assert reached.share() == pytest.approx(share(1e300))
     assert math.isnan(Targets([spends[0][:2]]).crossing(0.5).low)  # too few runs
 
 
 def resampled_ends(spends, level):
     """Percentiles of crossings, resample by resample, of runs drawn as often as they are there."""
     rng = np.random.default_rng(SEED)
-    counts = [rng.multinomial(len(own), [1 / len(own)] * len(own), size=1_999) for own in spends]
-    budgets = np.append(np.unique(np.concatenate([own.ravel() for own in spends])), math.inf)
-    within = [(own[..., None] <= budgets).mean(axis=1) for own in spends]
+    numbers = [len(part) for part in spends]
+    counts = [rng.multinomial(runs, [1 / runs] * runs, size=1_999) for runs in numbers]
+    budgets = np.append(np.unique(np.concatenate([part.ravel() for part in spends])), math.inf)
+    within = [(part[..., None] <= budgets).mean(axis=1) for part in spends]
     shares = sum(
         count @ part / len(part) for count, part in zip(counts, within, strict=True)
     ) / len(spends)
@@ -135,9 +136,9 @@ def test_targets_are_evenly_spaced_rewards():
     half = -319 + (319 - 292) / 2
     seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
     vars(seen)["rewards"] = lambda: iter(())
-    found = targets(seen)["ascending", "posture-based/two-goals", "trials"]
-    assert found.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
-    assert found.crossing(0.25).budget == 10  # trials of the made-up row
+    reached = targets(seen)["ascending", "posture-based/two-goals", "trials"]
+    assert reached.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
+    assert reached.crossing(0.25).budget == 10  # trials of the made-up row
     paid = price(seen).loc["posture-based/two-goals"]
     assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
-    assert paid.reached == found.share()
+    assert paid.reached == reached.share()

@@ -23,13 +23,13 @@ rewards = st.lists(st.integers(-20, 20).map(float), min_size=3, max_size=8)
 
 def test_bootstrap_test_on_the_mouse_data():
     """Welch's t is 1.06: p is 0.15 by Student's t, and by the book's algorithm near it."""
-    found = hypotheses.bootstrap_test(TREATMENT, CONTROL, seed=1)
-    assert found.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
-    assert 0.13 < found.p < 0.18
+    greater = hypotheses.bootstrap_test(TREATMENT, CONTROL, seed=1)
+    assert greater.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
+    assert 0.13 < greater.p < 0.18
     less = hypotheses.bootstrap_test(TREATMENT, CONTROL, "less", seed=1)
-    assert less.p + found.p == pytest.approx(1, abs=0.01)
-    assert "two-sample" in found.method
-    assert found.seed == 1
+    assert less.p + greater.p == pytest.approx(1, abs=0.01)
+    assert "two-sample" in greater.method
+    assert greater.seed == 1
 
 
 @pytest.mark.parametrize(
@@ -58,17 +58,17 @@ def test_bootstrap_test_against_all_resamples(a, b, alternative):
         null, observed = np.abs(null), abs(observed)
     sign = -1 if alternative == "less" else 1
     expected = np.mean(sign * np.array(null) >= sign * observed - 1e-9)
-    found = hypotheses.bootstrap_test(a, other, alternative, seed=3)
-    assert found.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
+    test = hypotheses.bootstrap_test(a, other, alternative, seed=3)
+    assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
 
 
 @given(st.lists(st.integers(-9, 9).map(float), min_size=2, max_size=9))
 def test_sign_flips_are_exact_for_few_pairs(differences):
     signs = np.array(list(itertools.product([1, -1], repeat=len(differences))))
     expected = np.mean(signs @ np.array(differences) >= sum(differences))
-    found = hypotheses.sign_flip_test(differences, "greater")
-    assert found.p == pytest.approx(expected)
-    assert found.seed is None
+    test = hypotheses.sign_flip_test(differences, "greater")
+    assert test.p == pytest.approx(expected)
+    assert test.seed is None
 
 
 def test_sign_flips_of_many_pairs_are_drawn():
@@ -87,16 +87,16 @@ def test_bca_interval_against_all_resamples():
     a = (spread**3).sum() / (6 * (spread**2).sum() ** 1.5)
     z = z0 + stats.norm.ppf([0.025, 0.975])
     low, high = np.quantile(every, stats.norm.cdf(z0 + z / (1 - a * z)))
-    found = statistics.mean(values, seed=7, resamples=20_000)
-    assert (found.low, found.high) == pytest.approx((low, high), abs=0.25)
+    interval = statistics.mean(values, seed=7, resamples=20_000)
+    assert (interval.low, interval.high) == pytest.approx((low, high), abs=0.25)
 
 
 def test_intervals_of_many_normal_values_are_the_usual_ones():
     rng = np.random.default_rng(8)
     a, b = rng.normal(0, 1, 400), rng.normal(0.5, 2, 300)
-    found = statistics.difference_of_means(a, b, seed=9)
+    between = statistics.difference_of_means(a, b, seed=9)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.03)
+    assert (between.low, between.high) == pytest.approx((expected.low, expected.high), abs=0.03)
     alone = statistics.mean(a, seed=9)
     half = 1.96 * a.std() / 20
     assert (alone.low, alone.high) == pytest.approx((a.mean() - half, a.mean() + half), abs=0.01)
@@ -106,9 +106,9 @@ def test_intervals_of_very_many_values_are_the_usual_ones():
     """Beyond LARGE, where there is no BCa."""
     rng = np.random.default_rng(5)
     a, b = rng.normal(0, 1, 4_000), rng.normal(0.1, 2, 700)
-    found = statistics.difference_of_means(a, b)
+    between = statistics.difference_of_means(a, b)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.015)
+    assert (between.low, between.high) == pytest.approx((expected.low, expected.high), abs=0.015)
     better = statistics.probability_of_improvement(a, b)
     assert better.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / a.size / b.size)
     assert better.low < better.estimate < better.high < better.low + 0.06
@@ -117,18 +117,18 @@ def test_intervals_of_very_many_values_are_the_usual_ones():
 def test_a_difference_to_a_known_number_is_of_one_sample():
     rng = np.random.default_rng(10)
     a = rng.normal(0, 1, 12)
-    known = statistics.difference_of_means(a, -7, seed=1)
+    to_number = statistics.difference_of_means(a, -7, seed=1)
     alone = statistics.mean(a + 7, seed=1)
-    assert (known.low, known.high, known.n) == (alone.low, alone.high, (12,))
+    assert (to_number.low, to_number.high, to_number.n) == (alone.low, alone.high, (12,))
 
 
 def test_degenerate_samples():
-    found = statistics.mean([4.0, 5.0])
-    assert math.isnan(found.low)
-    assert "fewer than 3" in found.note
-    found = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
-    assert found.low == found.high == found.estimate
-    assert found.note == "the interval is a point: no spread"
+    interval = statistics.mean([4.0, 5.0])
+    assert math.isnan(interval.low)
+    assert "fewer than 3" in interval.note
+    interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
+    assert interval.low == interval.high == interval.estimate
+    assert interval.note == "the interval is a point: no spread"
     apart = statistics.probability_of_improvement([4.0, 5.0], [1.0] * 9)
     assert apart.estimate == 1.0
     assert math.isnan(apart.low)
@@ -152,22 +152,22 @@ def test_samples_are_vectors_of_finite_numbers(values):
 @settings(max_examples=30)
 @given(rewards, rewards)
 def test_probability_of_improvement_is_mann_whitneys(a, b):
-    found = statistics.probability_of_improvement(a, b, seed=0, resamples=99)
-    assert found.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
+    better = statistics.probability_of_improvement(a, b, seed=0, resamples=99)
+    assert better.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
 
 
 def test_interval_of_samples_that_do_not_overlap():
     """Newcombe's method 5 by Hanley & McNeil's variance, with one n for both samples."""
     n, z = 20, stats.norm.ppf(0.975)
-    found = statistics.probability_of_improvement(np.arange(n) + 100, np.arange(n), seed=0)
-    assert found.estimate == found.high == 1.0
-    low = found.low
+    apart = statistics.probability_of_improvement(np.arange(n) + 100, np.arange(n), seed=0)
+    assert apart.estimate == apart.high == 1.0
+    low = apart.low
     q1, q2 = low / (2 - low), 2 * low**2 / (1 + low)
     variance = (low * (1 - low) + (n - 1) * (q1 - low**2 + q2 - low**2)) / n**2
     assert (1 - low) / math.sqrt(variance) == pytest.approx(z)
-    known = statistics.probability_of_improvement(np.arange(n), -1, seed=0)
+    to_number = statistics.probability_of_improvement(np.arange(n), -1, seed=0)
     wilson = stats.binomtest(n, n).proportion_ci(method="wilson")
-    assert (known.low, known.high) == pytest.approx((wilson.low, wilson.high))
+    assert (to_number.low, to_number.high) == pytest.approx((wilson.low, wilson.high))
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=6))
@@ -227,9 +227,9 @@ def test_rounding_is_no_spread():
 
 def test_share_test():
     """20 of 20 where three quarters are expected: 0.75 to the 20th."""
-    found = hypotheses.share_test(20, 20, 0.75, "greater")
-    assert found.estimate == pytest.approx(0.25)
-    assert found.p == pytest.approx(0.75**20)
+    test = hypotheses.share_test(20, 20, 0.75, "greater")
+    assert test.estimate == pytest.approx(0.25)
+    assert test.p == pytest.approx(0.75**20)
     assert hypotheses.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
     assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5
 
@@ -247,9 +247,9 @@ def test_fishers_test_of_two_rows(monkeypatch):
         seen[tuple(counts[k] for k in range(3))] += 1
         total += 1
     expected = sum(n for n in seen.values() if n <= seen[tuple(first)]) / total
-    found = hypotheses.independence_test(first, second, seed=0)
-    assert found.p == pytest.approx(expected)
-    assert found.estimate == pytest.approx(0.8)
+    exact = hypotheses.independence_test(first, second, seed=0)
+    assert exact.p == pytest.approx(expected)
+    assert exact.estimate == pytest.approx(0.8)
     monkeypatch.setattr(hypotheses, "MOST_TABLES", 1)
     drawn = hypotheses.independence_test(first, second, seed=0)
     assert drawn.p == pytest.approx(expected, abs=0.02)

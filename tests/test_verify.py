@@ -50,36 +50,42 @@ def run_of(task, number, parts, **changes):
     row = {name: "" if "NOT NULL" in kind else None for name, kind in RESULTS.items()}
     row |= {"run": number, "seed": 0, "suite_seed": 0, "run_id": f"{task.name}-{number}"}
     done = {part: execute(task, movements) for part, movements in parts.items()}
-    for part, own in done.items():
-        row |= dict(zip(checker.COLUMNS[part], (own.reward, own.hands), strict=False))
-    if own := done.get("solution"):
-        travel = other_arm_travel(task, hands_of(own.hands), own.configurations)
-        row |= {"solution_corrections": own.corrections, "other_arm_travel": travel}
+    for part, execution in done.items():
+        row |= dict(zip(checker.COLUMNS[part], (execution.reward, execution.hands), strict=False))
+    if solution := done.get("solution"):
+        travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
+        row |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
     row |= {"status": "ok", "details": "{}"} | changes
     del row["setting"], row["environment"]
-    row["result"] = result_of(row, {part: own.movements for part, own in done.items()}, [])
-    return Run(row, NOWHERE, {part: own.movements for part, own in done.items()})
+    movements = {part: execution.movements for part, execution in done.items()}
+    row["result"] = result_of(row, movements, [])
+    return Run(row, NOWHERE, movements)
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def true_folder(tmp_path_factory):
     """A folder in which all is true: learners, corrections, paths, two searches, one failed."""
-    folder = tmp_path_factory.mktemp("whole") / "results"
+    folder = tmp_path_factory.mktemp("true") / "results"
     two_armed, straight = load_task("two-armed-1"), load_task("ascending")
     tiny = tiny_task(goals=[[5.0, 1.0], [5.0, 0.98]])  # the second one is hit on the way
     learners = [learn(two_armed, "EC3", seed=seed, trials=300) for seed in range(2)]
     best = max(run.reward for run in learners)
     parts = [{part: getattr(run, part) for part in PARTS} for run in learners]
     solved, failed = {"solution": learners[0].solution}, {"status": "timeout", "proven_bound": -999}
+    learned = [run_of(two_armed, number, movements) for number, movements in enumerate(parts)]
     cells = [
-        (two_armed, {}, [run_of(two_armed, number, own) for number, own in enumerate(parts)]),
+        (two_armed, {}, learned),
         (tiny, {}, [run_of(tiny, 2, {"solution": corrected("right", "right")})]),
         (straight, {}, [run_of(straight, 3, {"solution": along_paths(straight)})]),
         (two_armed, {"other_arm": "free"}, [run_of(two_armed, 4, solved, proven_bound=best)]),
-        *((two_armed, own, [run_of(two_armed, run, {}, **failed)]) for run, own in NARROW.items()),
     ]
+    for run, parameters in NARROW.items():
+        cells.append((two_armed, parameters, [run_of(two_armed, run, {}, **failed)]))
     method = DeclaredMethod("", "", (), (), True, {}, "", "code")
-    planned = [PlannedCell(task.name, "method", "", own, own, 7) for task, own, _ in cells]
+    planned = [
+        PlannedCell(task.name, "method", "", parameters, parameters, 7)
+        for task, parameters, _ in cells
+    ]
     tasks = {task.name: task.model_dump(mode="json") for task, _, _ in cells}
     with writing(folder) as store:
         plan = Plan("suite", 0, 7, 300, (), None, None, tasks, {"method": method}, tuple(planned))
@@ -89,73 +95,80 @@ def whole(tmp_path_factory):
     return folder
 
 
-def edited(whole, tmp_path, statement):
+def edited(true_folder, tmp_path, statement):
     """A copy in which somebody made a change by hand."""
-    folder = shutil.copytree(whole, tmp_path / "edited")
+    folder = shutil.copytree(true_folder, tmp_path / "edited")
     with closing(sqlite3.connect(folder / FILE)) as db:
         assert db.execute(statement).rowcount
         db.commit()
     return folder
 
 
-def test_nothing_is_wrong_with_what_was_not_edited(whole):
-    report = checker.verify(whole)
+def test_nothing_is_wrong_with_what_was_not_edited(true_folder):
+    report = checker.verify(true_folder)
     assert report.wrong == []
     assert (report.runs, report.movements > 30) == (7, True)
     assert report.unchecked[-1] == "Runs without a solution: 2."
 
 
-def of(run, part="solution", order=0):
-    own = f"(SELECT id FROM results WHERE run = {run})"
-    return f"""WHERE result_id = {own} AND part = '{part}' AND "order" = {order}"""
+def result(run, change):
+    """An edit of the row of a run."""
+    return run, f"UPDATE results SET {change} WHERE run = {run}"
+
+
+def movement(run, change, part="solution", order=0):
+    """An edit of one of its movements."""
+    changed = f"(SELECT id FROM results WHERE run = {run}) AND part = '{part}'"
+    where = f'WHERE result_id = {changed} AND "order" = {order}'
+    return run, f"UPDATE movements SET {change} {where}"
 
 
 STANDING = "base_x = 0, base_y = 0, right_1 = 0, right_2 = 0, right_3 = 0, right_4 = 0, ticks = 1"
 EDITS = {  # what is said: of which run, and what was edited
-    "reward is ": (0, "UPDATE results SET reward = reward + 1 WHERE run = 0"),
-    "hands is RR, not LL": (2, "UPDATE results SET hands = 'LL' WHERE run = 2"),
-    "solution_corrections is 1": (2, "UPDATE results SET solution_corrections = 2 WHERE run = 2"),
-    "other_arm_travel is": (3, "UPDATE results SET other_arm_travel = 1e-8 WHERE run = 3"),
-    "status is ok": (5, "UPDATE results SET status = 'ok' WHERE run = 5"),
+    "reward is ": result(0, "reward = reward + 1"),
+    "hands is RR, not LL": result(2, "hands = 'LL'"),
+    "solution_corrections is 1": result(2, "solution_corrections = 2"),
+    "other_arm_travel is": result(3, "other_arm_travel = 1e-8"),
+    "status is ok": result(5, "status = 'ok'"),
     "must be str": (2, "DELETE FROM settings WHERE task = 'tiny'"),
-    " ticks, not ": (0, f"UPDATE movements SET right_2 = right_2 + 0.02 {of(0, order=1)}"),
-    "other_arm_travel": (1, f"UPDATE movements SET left_2 = left_2 + 0.02 {of(1, order=1)}"),
-    "moves a locked base": (1, f"UPDATE movements SET base_y = base_y + 0.02 {of(1, 'replay')}"),
-    "no number up to": (2, f"UPDATE movements SET base_x = 9e9 {of(2)}"),
-    "a joint or a trial": (1, f"UPDATE movements SET right_4 = right_4 + 1e-9 {of(1, 'replay')}"),
-    "is no number": (2, f"UPDATE movements SET base_x = NULL {of(2)}"),
-    "goal 1 is not hit": (2, f"UPDATE movements SET {STANDING} {of(2)}"),
-    "the left hand, which": (3, f"UPDATE movements SET hand = 'left' {of(3)}"),
-    "has not one hand": (0, f"UPDATE movements SET goal = 2 {of(0)}"),
+    " ticks, not ": movement(0, "right_2 = right_2 + 0.02", order=1),
+    "other_arm_travel": movement(1, "left_2 = left_2 + 0.02", order=1),
+    "moves a locked base": movement(1, "base_y = base_y + 0.02", part="replay"),
+    "no number up to": movement(2, "base_x = 9e9"),
+    "a joint or a trial": movement(1, "right_4 = right_4 + 1e-9", part="replay"),
+    "is no number": movement(2, "base_x = NULL"),
+    "goal 1 is not hit": movement(2, STANDING),
+    "the left hand, which": movement(3, "hand = 'left'"),
+    "has not one hand": movement(0, "goal = 2"),
     "out of order": (3, "UPDATE movements SET goal = 4 - goal WHERE kind = 'path'"),
-    "which is no count": (1, f"UPDATE movements SET ticks = ticks + 0.5 {of(1)}"),
-    "is made after goal 2": (2, f"UPDATE movements SET ticks = 1 {of(2, order=1)}"),
-    "of no known kind": (2, f"UPDATE movements SET kind = 'magic' {of(2)}"),
-    "movement 1 is missing": (2, f'UPDATE movements SET ticks = 0, "order" = 7 {of(2, order=1)}'),
-    "'other'": (2, f"UPDATE movements SET part = 'other' {of(2)}"),
-    "its last waypoint": (3, f"UPDATE movements SET right_1 = 1 {of(3)}"),
+    "which is no count": movement(1, "ticks = ticks + 0.5"),
+    "is made after goal 2": movement(2, "ticks = 1", order=1),
+    "of no known kind": movement(2, "kind = 'magic'"),
+    "movement 1 is missing": movement(2, 'ticks = 0, "order" = 7', order=1),
+    "'other'": movement(2, "part = 'other'"),
+    "its last waypoint": movement(3, "right_1 = 1"),
     "lacks a waypoint": (3, 'DELETE FROM waypoints WHERE "order" = 1 AND waypoint = 0'),
     "a path, and no other": (3, 'DELETE FROM waypoints WHERE "order" = 1'),
     "of no movement": (3, 'UPDATE waypoints SET "order" = 9 WHERE "order" = 1'),
-    "better than bound": (4, "UPDATE results SET proven_bound = -999 WHERE run = 4"),
+    "better than bound": result(4, "proven_bound = -999"),
 }
 
 
 @pytest.mark.parametrize("words", EDITS)
-def test_an_edit_is_found(whole, tmp_path, words):
+def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
-    wrong = checker.verify(edited(whole, tmp_path, statement)).wrong
+    wrong = checker.verify(edited(true_folder, tmp_path, statement)).wrong
     assert any(f"-{run}" in sentence and words in sentence for sentence in wrong), wrong
 
 
-def test_the_command_says_what_it_found(whole, tmp_path, capsys, monkeypatch):
-    wrong = edited(whole, tmp_path, "UPDATE results SET reward = -1 WHERE run = 0")
-    said = {
-        whole: "Nothing differs.",
-        wrong: "not -1",
-        tmp_path: f"{tmp_path} cannot be read",
-    }
-    for code, (folder, words) in enumerate(said.items()):
+def test_the_command_says_what_it_found(true_folder, tmp_path, capsys, monkeypatch):
+    wrong = edited(true_folder, tmp_path, "UPDATE results SET reward = -1 WHERE run = 0")
+    endings = [
+        (true_folder, "Nothing differs."),
+        (wrong, "not -1"),
+        (tmp_path, f"{tmp_path} cannot be read"),
+    ]
+    for code, (folder, words) in enumerate(endings):
         monkeypatch.setattr(sys, "argv", ["verify.py", str(folder)])
         assert checker.main() == code
         assert words in capsys.readouterr().out
@@ -169,7 +182,7 @@ def test_it_stands_on_its_own():
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(
     seed=st.integers(0, 2**32),
     hand=st.sampled_from(HANDS),
@@ -187,27 +200,27 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     robot, model, on_path = task.robot, PAPER._replace(**readings), kind == "path"
     model = model._replace(step=model.step * max(scale, 1.0))
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
-    own = checker.read_task(task.model_dump_json(), json.dumps(model._asdict()))
+    judge = checker.read_task(task.model_dump_json(), json.dumps(model._asdict()))
     points = checker.path(q, [middle, target], model) if on_path else checker.line(q, target, model)
     through = round(aim[0] * (len(points.T) - 1))
-    x, y = (row[through] for row in checker.hand_at(points, own.arms[hand], on_path))
-    own.goals[0] = goal = [x + 0.061, y - 0.083]
+    x, y = (row[through] for row in checker.hand_at(points, judge.arms[hand], on_path))
+    judge.goals[0] = goal = [x + 0.061, y - 0.083]
     radius = math.sqrt((goal[0] - x) ** 2 + (goal[1] - y) ** 2)
-    own.radius = np.nextafter(radius, radius + aim[1])
+    judge.radius = np.nextafter(radius, radius + aim[1])
     if on_path:
-        due = follow(robot, q, np.array([middle, target]), hand, goal, own.radius, model=model)
+        due = follow(robot, q, np.array([middle, target]), hand, goal, judge.radius, model=model)
     else:
         stops = {"stop_on_arrival": kind == "learned" or model.corrective_arrival}
-        due = move(robot, q, target, hand, goal, own.radius, model=model, **stops)
+        due = move(robot, q, target, hand, goal, judge.radius, model=model, **stops)
     movement = checker.Movement(0, 1, hand, kind, 0, target, [middle, target])
-    stopped, *rest = checker.make(own, q, movement)
+    stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 
 
-@pytest.mark.parametrize("kernel", ["Haswell", "Zen", "Prescott"])
-def test_a_folder_is_sound_under_other_kernels_of_blas(whole, kernel):
+@pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
+def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
     """As in another lab, whose processor has them."""
-    command = [sys.executable, checker.__file__, whole]
+    command = [sys.executable, checker.__file__, true_folder]
     environment = {**os.environ, "OPENBLAS_CORETYPE": kernel}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, "Nothing differs" in done.stdout) == (0, True)

@@ -11,25 +11,25 @@ def apart(what, *arguments):
     """What a function of a module returns, in a fork of this process (a fresh one where there are
     none). Raises ChildProcessError where it fails, after its traceback, or never ends."""
     how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    found, said = how.Pipe(duplex=False)
-    process = how.Process(target=_say, args=(said, what, arguments))
+    received, answers = how.Pipe(duplex=False)
+    process = how.Process(target=_say, args=(answers, what, arguments))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of threads, which a fork does not have
         process.start()
-    said.close()
+    answers.close()
     try:
-        if not found.poll(_LIMIT_S):
+        if not received.poll(_LIMIT_S):
             process.kill()
             raise ChildProcessError(f"it did not answer within {_LIMIT_S:g} s")
-        return found.recv()
+        return received.recv()
     except EOFError:
         raise ChildProcessError("it ended without an answer") from None
     finally:
         process.join()
 
 
-def _say(said, what, arguments):
-    said.send(what(*arguments))
+def _say(answers, what, arguments):
+    answers.send(what(*arguments))
 
 
 def forget(*packages):

@@ -132,8 +132,8 @@ def learn(
                 hand = first_hands[number]
             else:
                 hand = _choose(task, condition, q, goal, state, previous, values, rng)
-            known = (state, hand) in targets
-            if known or (trial > 0 and condition.unknown_target == "explores"):
+            has_target = (state, hand) in targets
+            if has_target or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
                 target = _explore(task, condition, q, hand, goal, stored, rng)
                 biased += condition.bias > 0
@@ -143,17 +143,17 @@ def learn(
             else:
                 hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
             if not hit:
-                if known and not condition.corrects:
+                if has_target and not condition.corrects:
                     break
-                found = correct(
+                correction = correct(
                     task.robot, q, hand, goal, locked_base=task.locked_base,
                     nullspace_gain=condition.nullspace_gain, model=model,
                 )  # fmt: skip
-                iterations += found.iterations
-                if not found.converged:
+                iterations += correction.iterations
+                if not correction.converged:
                     break
                 result = move(
-                    task.robot, q, found.q, hand, goal, task.radius,
+                    task.robot, q, correction.q, hand, goal, task.radius,
                     stop_on_arrival=model.corrective_arrival, model=model,
                 )  # fmt: skip
                 q, total = result.q, total - result.ticks
@@ -172,8 +172,8 @@ def learn(
                 credit: float = total
                 if condition.credit == "subtask":
                     credit = 0.0
-                    for own in reversed(subtasks[number:]):
-                        credit = own + condition.discount * credit
+                    for reward in reversed(subtasks[number:]):
+                        credit = reward + condition.discount * credit
                 value = values.get((state, hand), -math.inf)
                 if credit > value or (credit == value and condition.update == "not-less"):
                     values[state, hand] = credit

@@ -86,7 +86,7 @@ def same_results(a, b):
 
 def traced_cells():
     """Of the paper, beside planners, a search without a corrective process, and a variant."""
-    found = [
+    cells = [
         Cell(load_task(task), KNOWN[method])
         for task, methods in (
             ("ascending", ["dual-process/EC1", "trajectory-optimisation/path-length"]),
@@ -96,4 +96,4 @@ def traced_cells():
         )
         for method in methods
     ]  # fmt: skip
-    return [*found, Cell(found[-1].task, KNOWN["dual-process/EC4"], (("noise_sd", 0.1),))]
+    return [*cells, Cell(cells[-1].task, KNOWN["dual-process/EC4"], (("noise_sd", 0.1),))]
