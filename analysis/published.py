@@ -94,7 +94,7 @@ class Fact(Entry):
         "best of all sequences", "initial hands", "hand sequences", "base", "layout", "goals",
         "posture", "lock", "context", "statement",
     ]  # fmt: skip
-    found: tuple[Hands, ...] = ()
+    sequences: tuple[Hands, ...] = ()
     """Hand sequences: every one that is named; the paper names no other."""
     mixed: bool = False
     """Hand sequences: there are several, and they are not named."""

@@ -16,7 +16,8 @@ from scipy import stats
 
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import MARGINS, QUANTITIES, Claim, Finding, Side, side, sides
-from coartic.analysis.generality.sample import ReferenceReward, sample
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.published import (
     ENTRIES,
     Number,
@@ -107,14 +108,14 @@ def over_instances(data: Data, family: str, first: Side, second: Side) -> Array:
             b = data.values(name, second).mean()
             scale = 1.0
             if first.what in REWARDS:
-                scale = 100 / abs(reference.best)
+                scale = 100 / abs(reference.reward)
             differences.append(scale * float(a - b))
     if len(differences) < FEWEST:
         raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
     return np.array(differences)
 
 
-def judged_instances(data: Data, family: str) -> dict[str, ReferenceReward]:
+def judged_instances(data: Data, family: str) -> dict[str, KnownOptimum]:
     """Instances of a family but for those of development, on which methods were tuned."""
     instances = sample(data.study)
     names = instances.families.get(family, ()) if instances else ()

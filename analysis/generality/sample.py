@@ -9,7 +9,7 @@ from functools import cached_property
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.optima import locks_base
+from coartic.analysis.optima import KnownOptimum, locks_base
 from coartic.analysis.statistics.instances import Runs, Scores, gap_share
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
@@ -17,21 +17,6 @@ from coartic.runs.plan import SEARCH
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
-
-
-@dataclass(frozen=True)
-class ReferenceReward:
-    """What the solutions of an instance are measured by."""
-
-    best: int
-    """Highest reward of any run of the folder, or of the search for the optimum."""
-    bound: int | None
-    """Reward that is proven never to be exceeded; None where nothing is."""
-
-    @property
-    def proven(self) -> bool:
-        """Whether the best known reward is the optimum."""
-        return self.bound == self.best
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +40,11 @@ class Sample:
         return {family: tuple(names) for family, names in names_by_family.items()}
 
     @cached_property
-    def references(self) -> dict[str, ReferenceReward]:
-        """What the solutions of each instance are measured by, where there is any."""
+    def references(self) -> dict[str, KnownOptimum]:
+        """What the solutions of each instance are measured by, where there is any.
+
+        The highest reward of any run of the folder, or of the search for the optimum.
+        """
         runs = self.study.runs
         solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
         highest = solved.groupby("task").reward.max()
@@ -67,7 +55,7 @@ class Sample:
             if optimum is not None:
                 rewards.append(optimum.reward)
             if rewards and max(rewards) < 0:
-                by_name[name] = ReferenceReward(max(rewards), optimum.bound if optimum else None)
+                by_name[name] = KnownOptimum(max(rewards), optimum.bound if optimum else None)
         return by_name
 
     @cached_property
@@ -94,7 +82,7 @@ class Sample:
         cell, reference = self.study.cells.get((name, label)), self.references.get(name)
         if cell is None or reference is None or not len(cell.good):
             return None
-        to = reference.bound if to_bound else reference.best
+        to = reference.bound if to_bound else reference.reward
         return None if to is None else gap_share(cell.rewards, to)
 
     def gaps(
