@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, Task
 from coartic.analysis.figures.style import GREY, INK, PAPER, RC, TIP, styled
 from coartic.analysis.methods import name_of
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, cached
 from coartic.analysis.words import RECONSTRUCTED
 from coartic.files import write_atomically
 from coartic.text import one_line
@@ -69,12 +69,17 @@ def figure(
     """
 
     def as_figure(draw: Callable[[Study], Parts]) -> Callable[[Study], Plot]:
+        @cached
         @styled
         def plot(study: Study) -> Plot:
             drawing, data, alt, tasks = draw(study)
             return Plot(name, title, caption + dagger(tasks), alt, drawing, data)
 
         plot.__doc__ = draw.__doc__
+        if name in FIGURES:
+            raise CoarticError(
+                f"there are two figures {name!r}; the second is in {draw.__module__}"
+            )
         FIGURES[name] = plot
         return plot
 

@@ -55,7 +55,6 @@ def table(
     columns that begin so. ``words`` say how columns are shown that no other table has. Every
     table ends with the ids of the runs behind each row.
     """
-    COLUMNS.update(words)
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
         @cached
@@ -66,6 +65,12 @@ def table(
         name = rows.__name__.replace("_", "-")
         if name in TABLES:
             raise CoarticError(f"there are two tables {name!r}; the second is in {rows.__module__}")
+        for column in words.keys() & COLUMNS.keys():
+            raise CoarticError(
+                f"table {name!r} and an earlier one both say how column {column!r} is shown; "
+                "let one of them say it, or give one of the columns another name"
+            )
+        COLUMNS.update(words)
         TABLES[name] = frame
         return frame
 
