@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, Task
 from coartic.analysis.figures.style import GREY, INK, PAPER, RC, TIP, styled
 from coartic.analysis.methods import name_of
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED
 from coartic.files import write_atomically
 from coartic.text import one_line
@@ -69,7 +69,6 @@ def figure(
     """
 
     def as_figure(draw: Callable[[Study], Parts]) -> Callable[[Study], Plot]:
-        @cached
         @styled
         def plot(study: Study) -> Plot:
             drawing, data, alt, tasks = draw(study)

@@ -82,8 +82,8 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
                 caption = captions.get(name) or name.replace("-", " ").capitalize()
                 files[f"tables/{name}.tex"] = latex_table(frame, name, caption).encode()
     files["numbers.tex"] = numbers_tex(study).encode()
-    for name in FIGURES if for_paper else figures_shown(study):
-        if plot := drawn(study, name):
+    for name in FIGURES if for_paper else plots(study):
+        if plot := plots(study).get(name) or drawn(study, name):
             for ending in (".svg", ".pdf") if for_paper else (".svg",):
                 files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
     return files
@@ -122,16 +122,27 @@ def drawn(study: Study, name: str) -> Plot | None:
 
 
 @cached
+def plots(study: Study) -> dict[str, Plot]:
+    """Figures of the page by id, as far as the runs allow them."""
+    ids = [section["figure"] for section in shown(study).values() if "figure" in section]
+    return {name: plot for name in ids if (plot := drawn(study, name)) is not None}
+
+
+def shown(study: Study) -> dict[str, dict[str, Any]]:
+    """Sections that are not about single tasks where these are many."""
+    alone = one_by_one(study)
+    return {name: row for name, row in SECTIONS.items() if alone or not row.get("single")}
+
+
+@cached
 def sections(study: Study) -> list[dict[str, Any]]:
     """Sections of ``sections.toml`` that the runs allow, as the template wants them.
 
     With their ``finding``; figure or table is None where the runs do not allow it.
     """
     allowed = []
-    for name, section in SECTIONS.items():
-        if section.get("single") and not one_by_one(study):
-            continue
-        plot = drawn(study, section["figure"]) if "figure" in section else None
+    for name, section in shown(study).items():
+        plot = plots(study).get(section.get("figure", ""))
         frame = tables.TABLES[section["table"]](study) if "table" in section else pd.DataFrame()
         if plot is None and not len(frame):
             continue
@@ -172,11 +183,6 @@ def table_for_page(frame: pd.DataFrame, section: dict[str, Any]) -> dict[str, An
     }
 
 
-def figures_shown(study: Study) -> list[str]:
-    """Ids of the figures on the page."""
-    return [section["figure"]["id"] for section in sections(study) if section["figure"]]
-
-
 def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
@@ -208,12 +214,11 @@ def page(study: Study) -> str:
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
     template = environment(escape=False).get_template("summary.md.jinja")
-    shown = figures_shown(study)
     return template.render(
         title=title(study),
         answers=answers(study),
         provenance=facts.provenance(study),
-        figures=[name for name in ("postures", "ranking", "price") if name in shown],
+        figures=[name for name in ("postures", "ranking", "price") if name in plots(study)],
     )
 
 
