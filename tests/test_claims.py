@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
+from coartic.analysis import tables
 from coartic.analysis.claims import judge, single
 from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.ensemble import held_by
@@ -640,7 +641,7 @@ def test_the_register_on_runs(study):
     for name in ("beats-inaccurate-one-armed", "overall-reward"):
         assert entries[name].verdict == "undecided"
         assert "this folder has no runs of" in entries[name].finding.evidence
-    table = judge.claims_table(study)
+    table = tables.claims(study)
     assert table.verdict.tolist() == [entry.verdict for entry in entries.values()]
 
 

@@ -257,8 +257,8 @@ def ordered(data: Data, claim: Claim) -> Finding:
 
 def printed_corrective(task: str) -> float:
     """Printed reward of the corrective process alone, with the initial hands or the best."""
-    initial, exhaustive = published_initial(task), published_exhaustive(task)
-    return initial.reward if initial else exhaustive[1] if exhaustive else math.nan
+    solution = published_initial(task) or published_exhaustive(task)
+    return solution.reward if solution else math.nan
 
 
 def shown_beside(data: Data, claim: Claim) -> Parts:
@@ -315,16 +315,12 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
 
 def as_printed(task: str, of: Side) -> str | None:
     """Mean reward of one side as the paper has it, in words; None where it does not print it."""
-    value, derived = None, False
-    if of.who == "initial":
-        initial = published_initial(task)
-        if initial is not None:
-            value, derived = initial.reward, initial.derived
-    elif of.who == "best":
-        exhaustive = published_exhaustive(task)
-        value = exhaustive[1] if exhaustive else None
-    elif of.what in REWARDS and (cell := published_cell(task, of.who)):
-        summary = cell.sequences.get(of.hands) if of.hands else cell.summary
-        if summary is not None:
-            value, derived = summary.mean, summary.derived
-    return None if value is None else f"{number(value)}{' (derived)' * derived}"
+    alone = {"initial": published_initial, "best": published_exhaustive}
+    cell = published_cell(task, of.who) if of.what in REWARDS else None
+    if of.who in alone and (solution := alone[of.who](task)):
+        value, derived = solution.reward, solution.derived
+    elif cell and (summary := cell.sequences.get(of.hands) if of.hands else cell.summary):
+        value, derived = summary.mean, summary.derived
+    else:
+        return None
+    return f"{number(value)}{' (derived)' * derived}"

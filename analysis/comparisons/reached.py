@@ -20,7 +20,7 @@ from coartic.analysis.comparisons.methods import group_of
 from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps
 from coartic.analysis.methods import in_order, is_search, is_variant
-from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Interval
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Interval, interval
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
@@ -155,12 +155,7 @@ def price(study: Study) -> pd.DataFrame:
             row["reached"] = by_method[over, label, "trials"].share()
             for name, spend, level in PRICES:
                 if (over, label, spend) in by_method:
-                    crossing = by_method[over, label, spend].crossing(level)
-                    row |= {
-                        name: crossing.value,
-                        f"{name}_low": crossing.low,
-                        f"{name}_high": crossing.high,
-                    }
+                    row |= interval(name, by_method[over, label, spend].crossing(level))
             rows[label] = row
     columns = [f"{name}{end}" for name, *_ in PRICES for end in ("", "_low", "_high")]
     frame = pd.DataFrame.from_dict(rows, orient="index")

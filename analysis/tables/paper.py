@@ -7,16 +7,23 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.claims.judge import claims_table
+from coartic.analysis.claims.ensemble import held_in_words
+from coartic.analysis.claims.judge import judged, test_in_words
 from coartic.analysis.comparisons.paper import PaperRow, paper_rows, published_of, sequence_rows
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import RUNS, Summary, published_cell, published_initial
 from coartic.analysis.statistics.equivalence import MARGIN
-from coartic.analysis.statistics.estimates import Interval, mean, standard_deviation, student
+from coartic.analysis.statistics.estimates import (
+    Interval,
+    interval,
+    mean,
+    standard_deviation,
+    student,
+)
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, interval, runs_of, table
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
 from coartic.analysis.trajectories import initial_solution
 from coartic.analysis.words import marked
 
@@ -143,10 +150,22 @@ def our_mean(rewards: Any) -> Row:
 )
 def claims(study: Study) -> Rows:
     """The paper's claims with their verdicts."""
-    for row in claims_table(study).to_dict("records"):
-        dagger = " †" if row["fitted"] else ""
-        words = {"statement": row["statement"] + dagger, "run_ids": row["runs"]}
-        yield row["id"], {str(name): value for name, value in row.items()} | words
+    for entry in judged(study):
+        claim = entry.claim
+        row: Row = {
+            "statement": claim.statement + " †" * claim.fitted,
+            "verdict": entry.verdict,
+            "evidence": entry.finding.evidence,
+            "test": test_in_words(claim),
+            "p_holm": entry.adjusted_p,
+            "opposite_p_holm": entry.adjusted_opposite_p,
+            "ensemble": held_in_words(claim.id) if claim.fitted else "",
+            "place": claim.place,
+            "quote": claim.quote,
+            "section": claim.section,
+            "run_ids": " ".join(entry.run_ids),
+        }
+        yield claim.id, row
 
 
 @cached
@@ -198,11 +217,7 @@ def printed_interval(summary: Summary | None) -> Row:
         mean_of = Interval(math.nan if summary is None else summary.mean)
     else:
         mean_of = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
-    return {
-        "published": mean_of.value,
-        "published_low": mean_of.low,
-        "published_high": mean_of.high,
-    }
+    return interval("published", mean_of)
 
 
 @cached

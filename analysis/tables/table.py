@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from coartic.analysis.cells import CellRuns
-from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study, cached
 from coartic.errors import CoarticError
 
@@ -92,13 +91,6 @@ def frame_of(rows: Iterable[tuple[str, Row]], columns: str) -> pd.DataFrame:
         else:
             names.append(column)
     return frame.reindex(columns=names).rename_axis("row")
-
-
-def interval(name: str, estimate: Inference | None) -> Row:
-    """An estimate with its interval, as three columns; nothing where there is none."""
-    if estimate is None:
-        return {}
-    return {name: estimate.estimate, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
 
 
 def runs_of(*cells: CellRuns) -> Row:
