@@ -40,9 +40,9 @@ POPULATIONS: dict[str, Draw] = {
 SHARE = 0.75
 
 
-def holds(found: Inference | Interval, truth: float) -> bool:
+def holds(interval: Inference | Interval, truth: float) -> bool:
     """Whether an interval holds a value, to rounding; no interval does not."""
-    return found.low - 1e-9 <= truth <= found.high + 1e-9
+    return interval.low - 1e-9 <= truth <= interval.high + 1e-9
 
 
 def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dict[str, bool]:
@@ -89,8 +89,8 @@ def of_postures(rng: np.random.Generator, n: int) -> dict[str, bool]:
 def of_instances(rng: np.random.Generator, n: int) -> dict[str, bool]:
     """The same of the mean over n random tasks, five runs each, whose gaps are skewed."""
     centres = rng.exponential(0.1, n)
-    found = other_tasks({"a": [(centre + rng.exponential(0.02, 5),) for centre in centres]})
-    return {"interval over random tasks": holds(found, 0.12)}
+    mean = other_tasks({"a": [(centre + rng.exponential(0.02, 5),) for centre in centres]})
+    return {"interval over random tasks": holds(mean, 0.12)}
 
 
 def rates() -> Iterator[tuple[str, str, int, float]]:

@@ -16,24 +16,18 @@ CellKey = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class CellIdentity:
-    """One method with parameters on one task."""
+class CellRuns:
+    """One method with parameters on one task, and its runs."""
 
     task: str
     method: str
     variant: str
+    runs: pd.DataFrame
 
     @property
     def label(self) -> str:
         """The method with its variant."""
         return label_of(self.method, self.variant)
-
-
-@dataclass(frozen=True)
-class CellRuns(CellIdentity):
-    """A cell and its runs."""
-
-    runs: pd.DataFrame
 
     @cached_property
     def good(self) -> pd.DataFrame:

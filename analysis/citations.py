@@ -11,10 +11,10 @@ from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
 
-from coartic import __version__
+from coartic import CoarticError, __version__
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.words import slugs
-from coartic.text import one_line
+from coartic.text import did_you_mean, one_line
 
 PAPER = "shah2013"
 STATISTICS = (
@@ -101,6 +101,11 @@ def bibliography(
             others.append(method)
             continue
         for key in (*row.works, *row.solvers):
+            if key not in works:
+                hint = did_you_mean(key, works) or "; add it"
+                raise CoarticError(
+                    f"{method.id} in methods.toml: no {key!r} in references.bib{hint}"
+                )
             reasons.setdefault(key, []).append(method.id)
     for key in behind_analysis() if analysis else ():
         reasons.setdefault(key, []).append("the analysis")

@@ -23,7 +23,6 @@ LEARNER = METHOD_PREFIX
 CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.CONDITIONS)
 """Labels of the learner under the paper's conditions: the first with one arm, the others with
 two, more exploration later."""
-TWO_ARMED = CONDITIONS[1:]
 TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""
 INITIAL = "corrective-alone/given"

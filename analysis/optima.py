@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -67,21 +67,13 @@ class KnownOptimum:
     """The best reward known for one task under one restriction."""
 
     reward: int
-    hands: str
     bound: int | None
     """Reward that no solution exceeds; None where nothing is proven."""
-    searches: Mapping[str, int] = field(default_factory=dict)
-    """Reward that each search found, by method."""
 
     @property
     def proven(self) -> bool:
         """Whether no solution can be better."""
         return self.bound == self.reward
-
-    @property
-    def searched(self) -> int:
-        """The best reward of any search for it."""
-        return max(self.searches.values(), default=self.reward)
 
 
 def known_optima(
@@ -101,22 +93,20 @@ def known_optima(
     searches = solved[solved.method.str.startswith(SEARCH)]
     for name, task in tasks.items():
         for arm in ARMS:
-            own = searches[(searches.task == name) & (asked.other_arm[searches.index] == arm)]
-            candidates = [from_runs(own)] if len(own) else []
+            of_task = searches[(searches.task == name) & (asked.other_arm[searches.index] == arm)]
+            candidates = [from_runs(of_task)] if len(of_task) else []
             entry = shipped.get((essence(task), arm)) if model == PAPER else None
             if entry is not None and entry.reward is not None:
-                candidates.append(
-                    KnownOptimum(entry.reward, entry.hands, entry.bound, entry.searches)
-                )
+                candidates.append(KnownOptimum(entry.reward, entry.bound))
             if candidates:
                 bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
                 best = max(candidates, key=lambda optimum: optimum.reward)
                 optima[name, arm] = replace(best, bound=min(bounds, default=None))
-        own = solved[solved.task == name]
-        if task.family is not None and (name, "free") in optima and len(own):
-            best, known = from_runs(own), optima[name, "free"]
-            if best.reward > known.reward:
-                optima[name, "free"] = replace(known, reward=best.reward, hands=best.hands)
+        of_task = solved[solved.task == name]
+        if task.family is not None and (name, "free") in optima and len(of_task):
+            optimum = optima[name, "free"]
+            reward = max(optimum.reward, from_runs(of_task).reward)
+            optima[name, "free"] = replace(optimum, reward=reward)
     return optima
 
 
@@ -149,12 +139,5 @@ def entries() -> list[ShippedOptimum]:
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:
     """The best of these solved runs, with the lowest bound that they prove."""
-    best = runs.iloc[int(runs.reward.astype(int).argmax())]
     bounds = runs.proven_bound.dropna()
-    searches = runs.groupby("method").reward.max()
-    return KnownOptimum(
-        reward=int(best.reward),
-        hands=str(best.hands),
-        bound=int(bounds.min()) if len(bounds) else None,
-        searches={str(method): int(reward) for method, reward in searches.items()},
-    )
+    return KnownOptimum(int(runs.reward.max()), int(bounds.min()) if len(bounds) else None)

@@ -94,7 +94,7 @@ class Fact(Entry):
         "best of all sequences", "initial hands", "hand sequences", "base", "layout", "goals",
         "posture", "lock", "context", "statement",
     ]  # fmt: skip
-    found: tuple[Hands, ...] = ()
+    sequences: tuple[Hands, ...] = ()
     """Hand sequences: every one that is named; the paper names no other."""
     mixed: bool = False
     """Hand sequences: there are several, and they are not named."""
@@ -200,8 +200,8 @@ class PublishedCell(NamedTuple):
     """By hand sequence, where they are told apart."""
 
 
-class InitialSolution(NamedTuple):
-    """What the paper prints of a task's initial solution."""
+class CorrectiveSolution(NamedTuple):
+    """What the paper prints of a solution by the corrective process alone."""
 
     hands: str
     reward: float
@@ -209,25 +209,23 @@ class InitialSolution(NamedTuple):
     """Whether the reward is computed from other printed numbers."""
 
 
-def published_initial(task: str) -> InitialSolution | None:
-    """Of a task; None where the paper prints nothing of it."""
+def published_initial(task: str) -> CorrectiveSolution | None:
+    """The initial solution of a task; None where the paper prints nothing of it."""
+    return _corrective(task, "initial hands")
+
+
+def published_exhaustive(task: str) -> CorrectiveSolution | None:
+    """The best over all hand sequences."""
+    return _corrective(task, "best of all sequences")
+
+
+def _corrective(task: str, kind: str) -> CorrectiveSolution | None:
     for entry in ENTRIES.values():
-        if entry.kind == "initial hands" and entry.task == task:
+        if (entry.kind, entry.task) == (kind, task):
             reward = _number("reward", task, None, entry.hands)
             assert entry.hands is not None
             assert reward is not None
-            return InitialSolution(entry.hands, reward.number, bool(reward.difference_of))
-    return None
-
-
-def published_exhaustive(task: str) -> tuple[str, float] | None:
-    """Best hands and reward of the corrective process alone over all sequences."""
-    for entry in ENTRIES.values():
-        if entry.kind == "best of all sequences" and entry.task == task:
-            reward = _number("reward", task, None, entry.hands)
-            assert entry.hands is not None
-            assert reward is not None
-            return entry.hands, reward.number
+            return CorrectiveSolution(entry.hands, reward.number, bool(reward.difference_of))
     return None
 
 

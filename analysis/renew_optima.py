@@ -26,17 +26,21 @@ def collect(study: Study) -> list[ShippedOptimum]:
     runs = runs.join(restrictions(runs))
     keys = ("coartic", "commit", "model_code", "python", "date")
     made_by = {key: study.made_with[key] for key in keys}
-    found = []
+    collected = []
     for key, group in runs.groupby(["task", "base", "other_arm"], sort=False):
         name, base, arm = map(str, key)
         good = group[group.status == "ok"]
         facts: dict[str, Any] = {"infeasible": group.reason.iloc[0]}
         if len(good):
-            best = from_runs(good)
-            first = good.iloc[int(good.reward.astype(int).argmax())].run_id
-            rows = study.solutions[study.solutions.run_id == first].drop(columns="run_id")
-            facts = {key: getattr(best, key) for key in ("reward", "hands", "bound")}
-            facts |= {"searches": best.searches, "solution": rows.to_dict("records")}
+            optimum, best = from_runs(good), good.iloc[int(good.reward.astype(int).argmax())]
+            rows = study.solutions[study.solutions.run_id == best.run_id].drop(columns="run_id")
+            facts = {
+                "reward": optimum.reward,
+                "hands": str(best.hands),
+                "bound": optimum.bound,
+                "searches": good.groupby("method").reward.max().astype(int).to_dict(),
+                "solution": rows.to_dict("records"),
+            }
         entry = ShippedOptimum(
             task=name,
             essence=essence(study.tasks[name]),
@@ -46,8 +50,8 @@ def collect(study: Study) -> list[ShippedOptimum]:
             made_by=made_by,
             **facts,
         )
-        found.append(entry)
-    return found
+        collected.append(entry)
+    return collected
 
 
 def renew(new: Iterable[ShippedOptimum]) -> int:

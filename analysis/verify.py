@@ -169,21 +169,21 @@ def execute(task: Any, movements: list[Movement]) -> tuple[int, str, int, float]
     check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
-        own, before = [movement for movement in movements if movement.goal == goal], q
-        _, _, hit = make(task, q, own[0]._replace(kind="planned", target=q))  # where it stands
-        for movement in own:
+        to_goal, before = [movement for movement in movements if movement.goal == goal], q
+        _, _, hit = make(task, q, to_goal[0]._replace(kind="planned", target=q))  # where it stands
+        for movement in to_goal:
             which, is_corrective = f"movement {movement.order}", movement.kind == "corrective"
-            if hit and (is_corrective or movement is not own[0]):
+            if hit and (is_corrective or movement is not to_goal[0]):
                 # Nothing is to be done. A movement of no ticks to where it is names the hand.
-                is_none = len(own) == 1 and not movement.ticks and (movement.target == q).all()
+                is_none = len(to_goal) == 1 and not movement.ticks and (movement.target == q).all()
                 need(is_none, f"{which} is made after goal {goal} is hit")
                 continue
             q, ticks, hit = make(task, q, movement)
             need(ticks == movement.ticks, f"{which} takes {ticks} ticks, not {movement.ticks}")
             reward, corrections = reward - ticks, corrections + is_corrective
         need(hit, f"goal {goal} is not hit")
-        hands += own[0].hand[0].upper()
-        other = task.arms["right" if own[0].hand == "left" else "left"][0]
+        hands += to_goal[0].hand[0].upper()
+        other = task.arms["right" if to_goal[0].hand == "left" else "left"][0]
         travel += math.dist(q[other], before[other])
     return reward, hands, corrections, travel
 
@@ -227,25 +227,26 @@ def check_all(db: sqlite3.Connection) -> Report:
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     runs = movements = unsolved = 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
-    query = "SELECT *, results.id AS own FROM results LEFT JOIN settings ON settings.id = setting"
+    query = """SELECT results.id AS number, * FROM results
+        LEFT JOIN settings ON settings.id = setting LEFT JOIN learning ON result_id = results.id"""
     for row in db.execute(query):
         run, same, bound = row["run_id"], (row["definition"], row["model"]), row["proven_bound"]
         where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
         try:
             task, chosen = read_task(*same), json.loads(row["parameters"])
-            parts = read_parts(db, row["own"], task.columns)
+            parts = read_parts(db, row["number"], task.columns)
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
-            for part, own in parts.items():
-                where, movements = f"Run {run}, {part}", movements + len(own)
-                found = execute(task, own) if own else (None, None, None, None)
-                for name, again in zip(COLUMNS[part], found, strict=False):
-                    is_close = name == "other_arm_travel" and own and abs(row[name] - again) <= 1e-9
-                    need(is_close or row[name] == again, f"{name} is {again}, not {row[name]}")
-                rewards[same] += [(found[0], run)] if own else []
+            for part, moves in parts.items():
+                where, movements = f"Run {run}, {part}", movements + len(moves)
+                outcome = execute(task, moves) if moves else (None, None, None, None)
+                for name, now in zip(COLUMNS[part], outcome, strict=False):
+                    close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
+                    need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
+                rewards[same] += [(outcome[0], run)] if moves else []
             # A search of fewer movements than the task allows proves nothing of the others.
             if chosen.get("base", "task") == "task" and chosen.get("other_arm") != "still":
                 bounds[same] += [(int(bound), run)] if bound is not None else []
-            need(row["result"] == fingerprint(db, row, parts), "a joint or a trial was changed")
+            need(row["result"] == fingerprint(row, parts), "a joint or a trial was changed")
         except Exception as problem:  # whatever keeps a run from being executed
             wrong.append(f"{where}: {problem}.")
     for same, proofs in bounds.items():
@@ -255,15 +256,14 @@ def check_all(db: sqlite3.Connection) -> Report:
     return Report(runs, movements, wrong, [*UNCHECKED, f"Runs without a solution: {unsolved}."])
 
 
-def fingerprint(db: sqlite3.Connection, row: Any, parts: dict[str, list[Movement]]) -> str:
+def fingerprint(row: Any, parts: dict[str, list[Movement]]) -> str:
     """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
-    found = db.execute("SELECT rewards FROM learning WHERE result_id = ?", [row["own"]]).fetchone()
-    rewards = np.frombuffer(zlib.decompress(found[0]) if found else b"", "<i4").tolist()
-    made = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
-    for part, own in parts.items():
-        for _, *facts, q, waypoints in own:
-            made.append([part, *facts, q.tolist(), [point.tolist() for point in waypoints] or None])
-    return hashlib.sha256(json.dumps(made).encode()).hexdigest()[:16]
+    rewards = np.frombuffer(zlib.decompressobj().decompress(row["rewards"] or b""), "<i4").tolist()
+    content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
+    for part, moves in parts.items():
+        for _, *facts, q, waypoints in moves:
+            content.append([part, *facts, q.tolist(), [p.tolist() for p in waypoints] or None])
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[Movement]]:

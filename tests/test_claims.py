@@ -1,5 +1,6 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,12 +10,20 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from coartic import corrective_trial, load_task, trajectory
+from coartic import CoarticError, corrective_trial, load_task, trajectory
+from coartic.analysis import tables
 from coartic.analysis.claims import judge, single
 from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.ensemble import held_by
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
-from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
+from coartic.analysis.claims.register import (
+    CLAIMS,
+    HISTORY,
+    MARGINS,
+    Claim,
+    Finding,
+    claim_of,
+)
 from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
@@ -645,7 +654,7 @@ def test_the_register_on_runs(study):
     for name in ("beats-inaccurate-one-armed", "overall-reward"):
         assert entries[name].verdict == "undecided"
         assert "this folder has no runs of" in entries[name].finding.evidence
-    table = judge.claims_table(study)
+    table = tables.claims(study)
     assert table.verdict.tolist() == [entry.verdict for entry in entries.values()]
 
 
@@ -775,3 +784,21 @@ def test_what_goals_were_admitted_by_has_no_count_over_them():
         for held in held_by(name):
             assert held.members >= 200
             assert 0 <= held.supported <= held.members - held.refuted
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (
+            {"pairs": {"a": ["EC4 >> EC3"]}},
+            "pairs.a[0] is 'EC4 >> EC3'; it should be 'SIDE > SIDE'",
+        ),
+        ({"pairs": {"a": ["EC4 > 0 by foot"]}}, "margins are few, most, "),
+        ({"runs": {"a": ["most EC9 LR"]}}, "it should be 'HOW MANY CONDITION WHAT', such as"),
+    ],
+)
+def test_a_wrong_comparison_says_what_would_be_right(row, words):
+    with pytest.raises(CoarticError, match=re.escape(words)) as caught:
+        claim_of("mine", "Mine", {"statement": "More pays.", "rule": "higher", **row})
+    assert "claim 'mine'" in str(caught.value)
+    assert "?:" not in str(caught.value)

@@ -144,10 +144,10 @@ def test_numbers_of_a_condition_fit_together(name):
     for named in of(name, "hand sequences"):
         of_condition = [e for e in numbers if e.condition == named.condition]
         counts = {e.hands: e for e in of_condition if e.kind == "count"}
-        assert set(counts) <= set(named.found)
+        assert set(counts) <= set(named.sequences)
         assert not counts or sum(e.number for e in counts.values()) == RUNS
         means = {e.hands: e for e in of_condition if e.kind == "reward"}
-        assert set(means) - {None} <= set(named.found)
+        assert set(means) - {None} <= set(named.sequences)
         if None in means and counts:
             shares = {hands: count.number / RUNS for hands, count in counts.items()}
             mean = sum(share * means[hands].number for hands, share in shares.items())

@@ -259,7 +259,7 @@ def test_a_reconstruction_is_found_and_scored(
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
     assert ours.sum() in (4, 5)
-    assert list(members.member[~ours]) == list(search.layout.known)
+    assert list(members.member[~ours]) == list(search.layout.earlier)
     printed = members.set_index("member").loc["F2", ["x3", "y3"]]
     assert printed.tolist() == [2.38, 2.96]
     for _, row in members[ours].iterrows():

@@ -9,12 +9,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import load_task
+from coartic import CoarticError, load_task
+from coartic.analysis.figures.plot import figure
 from coartic.analysis.report import numbers, render
-from coartic.analysis.report.build import page, report_files
+from coartic.analysis.report.build import (
+    SECTIONS,
+    checked,
+    page,
+    report_files,
+)
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import runs_of, tables_of
-from coartic.analysis.tables import TABLES
+from coartic.analysis.tables import TABLES, Column
+from coartic.analysis.tables.table import table as as_table
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
@@ -132,8 +139,8 @@ def test_a_page_stands_alone(report):
     assert {a or b for a, b in references} <= set(ids)
     figures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
     assert len(figures) > 3
-    for figure in figures:
-        svg = ElementTree.fromstring(figure)
+    for drawn in figures:
+        svg = ElementTree.fromstring(drawn)
         assert svg.get("viewBox")
         assert svg.get("aria-label")
         assert "#000000" not in figure
@@ -176,3 +183,31 @@ def test_few_runs_say_so(tmp_path):
     for text in (page(few), files["report.html"].decode()):
         assert load_task("ascending").label in text
         assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ({"figure": "publishd"}, "there is no figure 'publishd'; did you mean 'published'?"),
+        ({"table": "nothing"}, "there is no table 'nothing'; there are contexts, "),
+        ({"capton": "Rewards"}, "capton is an unknown key; did you mean 'caption'?"),
+    ],
+)
+def test_a_wrong_section_is_named(section, words):
+    with pytest.raises(CoarticError, match=f"section 'paper': {re.escape(words)}"):
+        checked({**SECTIONS, "paper": {**SECTIONS["paper"], **section}})
+
+
+def test_a_sentence_without_a_section_and_names_that_are_taken_are_named():
+    without = {name: section for name, section in SECTIONS.items() if name != "hands"}
+    with pytest.raises(CoarticError, match="sections.toml has no section 'hands'"):
+        checked(without)
+    with pytest.raises(CoarticError, match="there are two figures 'ranking'"):
+        figure("ranking", "", "")(lambda study: None)
+
+    def more(study):
+        return iter(())
+
+    with pytest.raises(CoarticError, match="'more' and an earlier one .* column 'reached'"):
+        as_table("reached", reached=Column())(more)
+    assert TABLES.pop("more", None) is None

@@ -33,7 +33,7 @@ from coartic.analysis.signatures.paths import (
     spectral_arc_length,
     turning_angles,
 )
-from coartic.analysis.signatures.register import signatures
+from coartic.analysis.signatures.register import REGISTER, signatures
 from coartic.analysis.signatures.subtasks import (
     isolated_agreement,
     isolated_reaches,
@@ -564,6 +564,7 @@ def test_frame_of_two_contexts():
     assert one("learner", "hand entropy").why_not == "the task has one hand"
     assert one("failed", "total against the same hands").why_not == "no run has a solution"
     assert one("learner", "locus slope").why_not.startswith("fewer than 3 tasks")
+    assert list(frame.signature.unique()) == list(REGISTER)
     # A row has a value, or says why it has none.
     assert (frame.value.notna() | (frame.why_not != "")).all()
     intervals = frame[frame.low.notna()]

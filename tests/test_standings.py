@@ -106,7 +106,7 @@ def test_crossings_by_brute_force():
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
         crossing = reached.crossing(level)
-        assert crossing.budget == least
+        assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
     steps, shares = reached.curve()
@@ -138,7 +138,7 @@ def test_targets_are_evenly_spaced_rewards():
     vars(seen)["rewards"] = lambda: iter(())
     reached = targets(seen)["ascending", "posture-based/two-goals", "trials"]
     assert reached.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
-    assert reached.crossing(0.25).budget == 10  # trials of the made-up row
+    assert reached.crossing(0.25).value == 10  # trials of the made-up row
     paid = price(seen).loc["posture-based/two-goals"]
     assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
     assert paid.reached == reached.share()

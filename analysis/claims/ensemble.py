@@ -9,32 +9,21 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import pandas as pd
 
 DATA = Path(__file__).with_name("ensemble.csv")
 
 
-class Held(NamedTuple):
-    """Verdicts of a claim over the members of an ensemble."""
-
-    task: str
-    """Whose goals are the members'."""
-    supported: int
-    refuted: int
-    members: int
-
-
 @cache
-def _table() -> pd.DataFrame:
-    return pd.read_csv(DATA)
+def held_by(claim: str) -> tuple[Any, ...]:
+    """Of a claim's id, a row a task; none for a claim that does not rest on two-armed tasks.
 
-
-def held_by(claim: str) -> tuple[Held, ...]:
-    """Of a claim's id, by task; none for a claim that does not rest on two-armed tasks."""
-    rows = _table()[_table().claim == claim].itertuples(index=False, name=None)
-    return tuple(Held(str(task), *map(int, counts)) for _, task, *counts in rows)
+    ``task`` whose goals are the members'; how often ``supported``, ``refuted``, of ``members``.
+    """
+    table = pd.read_csv(DATA)
+    return tuple(table[table.claim == claim].itertuples())
 
 
 def held_in_words(claim: str) -> str:

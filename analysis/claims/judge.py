@@ -22,11 +22,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
-import pandas as pd
-
 from coartic.analysis.claims import rules, single
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.ensemble import held_in_words, mostly_refuted
+from coartic.analysis.claims.ensemble import mostly_refuted
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.statistics.hypotheses import holm
@@ -154,31 +152,3 @@ def counts(entries: Iterable[Judged]) -> Mapping[Verdict, int]:
     for entry in entries:
         number_of[entry.verdict] += 1
     return number_of
-
-
-@cached
-def claims_table(study: Study) -> pd.DataFrame:
-    """One row a claim: ``id``, ``section``, ``statement``, ``verdict``, ``fitted``, ``evidence``,
-    ``test``, ``p`` and ``p_holm`` of the claim, ``opposite_p_holm``, ``ensemble`` (in how many
-    admissible reconstructions it holds), ``place``, ``quote``, ``runs``."""
-    return pd.DataFrame(
-        [
-            {
-                "id": entry.claim.id,
-                "section": entry.claim.section,
-                "statement": entry.claim.statement,
-                "verdict": entry.verdict,
-                "fitted": entry.claim.fitted,
-                "evidence": entry.finding.evidence,
-                "test": test_in_words(entry.claim),
-                "p": p_of(entry.claim, entry.finding),
-                "p_holm": entry.adjusted_p,
-                "opposite_p_holm": entry.adjusted_opposite_p,
-                "ensemble": held_in_words(entry.claim.id) if entry.claim.fitted else "",
-                "place": entry.claim.place,
-                "quote": entry.claim.quote,
-                "runs": " ".join(entry.run_ids),
-            }
-            for entry in judged(study)
-        ]
-    )

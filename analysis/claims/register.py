@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.signs import SIGNS
@@ -39,19 +39,43 @@ QUANTITIES = {
 _WHAT = "|".join(QUANTITIES)
 _SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>EC\S*|initial|best|\S+/.+?)(?: (?P<hands>{_HANDS}))?"
 _SHOWN = re.sub(r"\?P<\w+>", "?:", _SIDE)
-Shown = Annotated[str, Field(pattern=rf"^{_SHOWN}$")]
-"""What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
-_MARGIN = "|".join(MARGINS)
 _NUMBER = r"-?\d+(\.\d+)?"
-_PAIR = rf"{_SHOWN} > ({_SHOWN}|{_NUMBER})( by ({_MARGIN}))?"
-Pair = Annotated[str, Field(pattern=rf"^({_PAIR}|{_HANDS} > ({_HANDS}|others))$")]
+_PAIR = rf"{_SHOWN} > ({_SHOWN}|{_NUMBER})( by ({'|'.join(MARGINS)}))?"
+
+
+def written_as(pattern: str, words: str) -> AfterValidator:
+    """A check that a text is written so, which says in words what would be right."""
+
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(words)
+        return text
+
+    return AfterValidator(check)
+
+
+Shown = Annotated[
+    str,
+    written_as(_SHOWN, "should be a SIDE, such as 'EC4', 'EC2 RRLR', 'replay EC1' or 'initial'"),
+]
+"""What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
+Pair = Annotated[
+    str,
+    written_as(
+        rf"{_PAIR}|{_HANDS} > ({_HANDS}|others)",
+        "should be 'SIDE > SIDE' or 'SIDE > NUMBER', with 'by MARGIN' if it has a margin. A side "
+        "is such as 'EC4', 'EC2 RRLR', 'replay EC1' or 'initial'; margins are "
+        f"{', '.join(MARGINS)}",
+    ),
+]
 """Two things that are compared, the first of which is said to be higher, by more than a margin if
 there is one. Or hand sequences of the corrective process alone."""
 Counted = Annotated[
     str,
-    Field(
-        pattern=r"^(most|not most|half|majority|some) EC[1-4] (not )?"
-        rf"({_HANDS}( rightward)?|commonest|best|initial|slower-hand)$"
+    written_as(
+        r"(most|not most|half|majority|some) EC[1-4] (not )?"
+        rf"({_HANDS}( rightward)?|commonest|best|initial|slower-hand)",
+        "should be 'HOW MANY CONDITION WHAT', such as 'most EC3 LRLR' or 'some EC3 not best'",
     ),
 ]
 """How many runs do something."""
@@ -121,8 +145,8 @@ class Claim(BaseModel):
     cells: Mapping[str, Sequence[str]] = {}
     families: Sequence[str] = ()
     compared: Sequence[Pair] = ()
-    place: str
-    quote: str
+    place: str = ""
+    quote: str = ""
     figure: str = ""
 
     @property

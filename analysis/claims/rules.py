@@ -16,7 +16,8 @@ from scipy import stats
 
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import MARGINS, QUANTITIES, Claim, Finding, Side, side, sides
-from coartic.analysis.generality.sample import ReferenceReward, sample
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.published import (
     ENTRIES,
     Number,
@@ -107,14 +108,14 @@ def over_instances(data: Data, family: str, first: Side, second: Side) -> Array:
             b = data.values(name, second).mean()
             scale = 1.0
             if first.what in REWARDS:
-                scale = 100 / abs(reference.best)
+                scale = 100 / abs(reference.reward)
             differences.append(scale * float(a - b))
     if len(differences) < FEWEST:
         raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
     return np.array(differences)
 
 
-def judged_instances(data: Data, family: str) -> dict[str, ReferenceReward]:
+def judged_instances(data: Data, family: str) -> dict[str, KnownOptimum]:
     """Instances of a family but for those of development, on which methods were tuned."""
     instances = sample(data.study)
     names = instances.families.get(family, ()) if instances else ()
@@ -256,8 +257,8 @@ def ordered(data: Data, claim: Claim) -> Finding:
 
 def printed_corrective(task: str) -> float:
     """Printed reward of the corrective process alone, with the initial hands or the best."""
-    initial, exhaustive = published_initial(task), published_exhaustive(task)
-    return initial.reward if initial else exhaustive[1] if exhaustive else math.nan
+    solution = published_initial(task) or published_exhaustive(task)
+    return solution.reward if solution else math.nan
 
 
 def shown_beside(data: Data, claim: Claim) -> Parts:
@@ -314,16 +315,12 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
 
 def as_printed(task: str, of: Side) -> str | None:
     """Mean reward of one side as the paper has it, in words; None where it does not print it."""
-    value, derived = None, False
-    if of.who == "initial":
-        initial = published_initial(task)
-        if initial is not None:
-            value, derived = initial.reward, initial.derived
-    elif of.who == "best":
-        exhaustive = published_exhaustive(task)
-        value = exhaustive[1] if exhaustive else None
-    elif of.what in REWARDS and (cell := published_cell(task, of.who)):
-        summary = cell.sequences.get(of.hands) if of.hands else cell.summary
-        if summary is not None:
-            value, derived = summary.mean, summary.derived
-    return None if value is None else f"{number(value)}{' (derived)' * derived}"
+    alone = {"initial": published_initial, "best": published_exhaustive}
+    cell = published_cell(task, of.who) if of.what in REWARDS else None
+    if of.who in alone and (solution := alone[of.who](task)):
+        value, derived = solution.reward, solution.derived
+    elif cell and (summary := cell.sequences.get(of.hands) if of.hands else cell.summary):
+        value, derived = summary.mean, summary.derived
+    else:
+        return None
+    return f"{number(value)}{' (derived)' * derived}"

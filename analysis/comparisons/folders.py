@@ -13,7 +13,12 @@ import pandas as pd
 from coartic import CoarticError
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.equivalence import MARGIN, equivalence
-from coartic.analysis.statistics.estimates import FEWEST, difference_of_means, paired_by_seed
+from coartic.analysis.statistics.estimates import (
+    FEWEST,
+    difference_of_means,
+    interval,
+    paired_by_seed,
+)
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, load
 from coartic.robot import Array
@@ -106,9 +111,7 @@ def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
     few = min(len(a.good), len(b.good)) < FEWEST
     agreement = equivalence(*samples, MARGIN * abs(a.rewards.mean()))
     return row | {
-        "difference": difference.estimate,
-        "difference_low": difference.low,
-        "difference_high": difference.high,
+        **interval("difference", difference),
         "p": test.p,
         "verdict": "too few runs" if few else agreement.verdict,
     }

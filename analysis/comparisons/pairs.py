@@ -29,6 +29,7 @@ from coartic.analysis.comparisons.methods import method_rows
 from coartic.analysis.methods import LEARNER, is_search
 from coartic.analysis.statistics.estimates import (
     difference_of_means,
+    interval,
     paired_by_seed,
     probability_of_improvement,
 )
@@ -37,12 +38,6 @@ from coartic.analysis.study import Study, cached
 from coartic.learner.conditions import CONDITIONS
 from coartic.robot import Array
 
-COLUMNS = (
-    *("task", "kind", "first", "second", "runs_first", "runs_second"),
-    *("difference", "difference_low", "difference_high", "pairs"),
-    *("better", "better_low", "better_high", "p", "p_holm", "note"),
-)
-"""Of :func:`pairs_table`."""
 Pair = tuple[str, CellRuns, CellRuns]
 """``conditions``, ``variant`` or ``method``, and two cells of a task; the first the learner's."""
 
@@ -67,14 +62,10 @@ def pairs(study: Study) -> Iterator[Pair]:
                 continue
             yield "method", plain[most], cell
             for name in plain:
-                keeps_still = CONDITIONS[name] == replace(without_other_arm, id=name)
-                if name != most and keeps_still and still(study, task, label):
+                does_so_too = CONDITIONS[name] == replace(without_other_arm, id=name)
+                arm = method_rows(study).other_arm[task, label]
+                if name != most and does_so_too and arm == "still":
                     yield "method", plain[name], cell
-
-
-def still(study: Study, task: str, label: str) -> bool:
-    """Whether a method keeps still the arm that is not chosen."""
-    return bool(method_rows(study).other_arm[task, label] == "still")
 
 
 @cached
@@ -97,13 +88,16 @@ def pairs_table(study: Study) -> pd.DataFrame:
                 "second": second.label,
                 "runs_first": len(first.good),
                 "runs_second": len(second.good),
+                "p": math.nan,
+                "p_holm": math.nan,
                 "note": "no run with a solution",
                 **(compared(kind, first, second) if len(first.good) and len(second.good) else {}),
             }
         )
-    frame = pd.DataFrame(rows, columns=list(COLUMNS))
-    for _, of_task in frame[frame.kind != "conditions"].groupby("task", sort=False):
-        frame.loc[of_task.index, "p_holm"] = holm(of_task.p.astype(float).tolist())
+    frame = pd.DataFrame(rows)
+    for _, of_task in frame.groupby("task", sort=False) if rows else ():
+        corrected = of_task[of_task.kind != "conditions"]
+        frame.loc[corrected.index, "p_holm"] = holm(corrected.p.tolist())
     return frame
 
 
@@ -130,14 +124,9 @@ def compared(kind: str, first: CellRuns, second: CellRuns) -> dict[str, Any]:
         inference.note for inference in (difference, test, better) if inference.note
     )
     return {
-        "difference": difference.estimate,
-        "difference_low": difference.low,
-        "difference_high": difference.high,
+        **interval("difference", difference),
         "pairs": shared,
-        "better": better.estimate,
-        "better_low": better.low,
-        "better_high": better.high,
+        **interval("better", better),
         "p": test.p,
-        "p_holm": math.nan,
         "note": "; ".join(notes),
     }

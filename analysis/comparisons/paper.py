@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import LEARNER
@@ -14,35 +15,34 @@ from coartic.robot import Array
 
 @dataclass(frozen=True)
 class PaperRow:
-    """A cell of the paper beside our runs of it."""
+    """A cell of the paper, or its runs that learned one hand sequence, beside our runs."""
 
     cell: CellRuns
-    paper: PublishedCell
+    hands: str
+    """Empty for the whole cell."""
+    published: Summary | None
+    published_runs: int | None
+    """Printed number; of hands 0 only where all others are printed."""
     rewards: Array
     """Learned, of our runs with a solution, shape ``(n,)``."""
-    difference: Equivalence | None
-    """Ours less published; None where either is missing."""
-    comparable: bool
-    """Whether all our runs have as many trials as the paper's."""
+
+    @cached_property
+    def difference(self) -> Equivalence | None:
+        """Ours less published; None where either is missing."""
+        paper = self.published
+        if paper is None or not len(self.rewards):
+            return None
+        return difference(self.rewards, paper.mean, paper.sd, paper.runs)
+
+    @property
+    def comparable(self) -> bool:
+        """Whether all our runs have as many trials as the paper's."""
+        return bool((self.cell.good.trials == TRIALS).all())
 
     @property
     def verdict(self) -> str | None:
         """Of :class:`Equivalence`, for runs that are comparable."""
         return self.difference.verdict if self.difference and self.comparable else None
-
-
-@dataclass(frozen=True)
-class SequenceRow:
-    """Runs of a cell of the paper that learned one hand sequence, beside ours."""
-
-    cell: CellRuns
-    hands: str
-    published: Summary | None
-    published_runs: int | None
-    """Printed number; 0 only where all others are printed."""
-    rewards: Array
-    """Learned, of our runs with these hands, shape ``(n,)``."""
-    difference: Equivalence | None
 
 
 def published_of(cell: CellRuns) -> PublishedCell | None:
@@ -59,14 +59,13 @@ def paper_rows(study: Study) -> list[PaperRow]:
     for cell in study.cells.values():
         paper = published_of(cell)
         if paper is not None:
-            apart = _apart(cell.rewards, paper.summary)
-            comparable = bool((cell.good.trials == TRIALS).all())
-            rows.append(PaperRow(cell, paper, cell.rewards, apart, comparable))
+            runs = paper.summary and paper.summary.runs
+            rows.append(PaperRow(cell, "", paper.summary, runs, cell.rewards))
     return rows
 
 
 @cached
-def sequence_rows(study: Study) -> list[SequenceRow]:
+def sequence_rows(study: Study) -> list[PaperRow]:
     """The same by hand sequence, where the paper or our runs tell several apart.
 
     Those that the paper prints come first, then ours by their number of runs.
@@ -78,17 +77,10 @@ def sequence_rows(study: Study) -> list[SequenceRow]:
             continue
         printed = paper.sequences
         complete = sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS
-        for name in dict.fromkeys([*printed, *hands.value_counts().index]):
+        for name in dict.fromkeys([*printed, *map(str, hands.value_counts().index)]):
             rewards = cell.rewards[(hands == name).to_numpy(bool)]
             summary, runs = None, 0 if complete else None
             if name in printed:
                 summary, runs = printed[name], printed[name].printed_runs
-            apart = _apart(rewards, summary)
-            rows.append(SequenceRow(cell, str(name), summary, runs, rewards, apart))
+            rows.append(PaperRow(cell, name, summary, runs, rewards))
     return rows
-
-
-def _apart(rewards: Array, published: Summary | None) -> Equivalence | None:
-    if published is None or not len(rewards):
-        return None
-    return difference(rewards, published.mean, published.sd, published.runs)

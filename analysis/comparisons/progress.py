@@ -38,7 +38,7 @@ class BestSoFar:
         """Whether it has a solution."""
         return len(self.rewards) > 0
 
-    def known(self, spend: str) -> bool:
+    def placeable(self, spend: str) -> bool:
         """Whether its steps can be placed: a run without a solution has none to place."""
         return not self.solved or bool(np.isfinite(self.total[spend]))
 
@@ -90,7 +90,7 @@ def cells_by_spend(study: Study) -> Iterator[tuple[CellRuns, str, list[BestSoFar
             continue
         runs = [best_so_far(study)[str(run_id)] for run_id in cell.runs.run_id]
         for spend in SPENDS:
-            yield cell, spend, [run for run in runs if run.known(spend)]
+            yield cell, spend, [run for run in runs if run.placeable(spend)]
 
 
 def improvements(rewards: Array, total: dict[str, float]) -> tuple[Array, dict[str, Array]]:

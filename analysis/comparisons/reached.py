@@ -11,7 +11,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,7 +20,7 @@ from coartic.analysis.comparisons.methods import group_of
 from coartic.analysis.comparisons.progress import SPENDS, BestSoFar, cells_by_spend
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps
 from coartic.analysis.methods import in_order, is_search, is_variant
-from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Interval, interval
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
@@ -37,16 +36,6 @@ PRICES = (
     ("seconds_to_half", "solve_s", 0.5),
 )
 """Columns of :func:`price`: what is spent to reach which share of the targets."""
-
-
-class Crossing(NamedTuple):
-    """The budget within which a method reaches a share of its pairs of run and target."""
-
-    budget: float
-    """Infinite where it never does."""
-    low: float
-    """Of the 95 % percentile interval over runs; NaN where runs are too few."""
-    high: float
 
 
 class Targets:
@@ -77,15 +66,16 @@ class Targets:
         """Share that is reached in the end."""
         return float(self.weights[np.isfinite(self.values)].sum())
 
-    def crossing(self, level: float) -> Crossing:
-        """The least budget within which ``level`` of the pairs are reached.
+    def crossing(self, level: float) -> Interval:
+        """The least budget within which ``level`` of the pairs are reached; infinite without any.
 
-        Runs are drawn anew within their task. No interval where a task has too few runs.
+        With its percentile interval: runs are drawn anew within their task. No interval where a
+        task has too few runs.
         """
         steps = np.append(self.values, math.inf)
         budget = float(steps[(np.cumsum(self.weights) < level - 1e-9).sum()])
         if min(self.sizes) < FEWEST:
-            return Crossing(budget, math.nan, math.nan)
+            return Interval(budget)
         # First between which of some places of the curve resamples cross, then at which pair.
         places = np.unique(np.linspace(0, len(self.values), COARSE + 1).astype(int))
         parts = [
@@ -104,7 +94,7 @@ class Targets:
             )
             budgets.append(steps[near.start + (shares < level - 1e-9).sum(axis=1)])
         low, high = np.quantile(np.concatenate(budgets), TAILS, method="inverted_cdf")
-        return Crossing(budget, float(low), float(high))
+        return Interval(budget, float(low), float(high))
 
 
 @lru_cache(maxsize=2)
@@ -165,12 +155,7 @@ def price(study: Study) -> pd.DataFrame:
             row["reached"] = by_method[over, label, "trials"].share()
             for name, spend, level in PRICES:
                 if (over, label, spend) in by_method:
-                    crossing = by_method[over, label, spend].crossing(level)
-                    row |= {
-                        name: crossing.budget,
-                        f"{name}_low": crossing.low,
-                        f"{name}_high": crossing.high,
-                    }
+                    row |= interval(name, by_method[over, label, spend].crossing(level))
             rows[label] = row
     columns = [f"{name}{end}" for name, *_ in PRICES for end in ("", "_low", "_high")]
     frame = pd.DataFrame.from_dict(rows, orient="index")

@@ -33,15 +33,13 @@ def learning_curves(study: Study) -> Parts:
     labels = sorted(data.method.unique(), key=comparison.CURVES.index)
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
-    drawing, panels = style.figure_of((rows, columns), size)
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
-    for place, (axes, task) in enumerate(zip(panels, tasks, strict=False)):
+    drawing, panels = style.figure_of((rows, columns), size, len(tasks))
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         draw_curves(axes, study, task, data[data.task == task.name], labels)
         axes.set_title(style.heading(task))
         axes.set_ylabel("" if place % columns else "reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
-    style.letters(panels[: len(tasks)])
+    style.letters(panels)
     handles = [
         style.entry(name_of(label), linewidth=1.3, **look.line)
         for label, look in style.looks(labels).items()

@@ -47,12 +47,10 @@ def recruitment(study: Study) -> Parts:
     shape = style.grid(len(tasks), 2)
     bars = data.drop_duplicates(["task", "method", "source"]).task.value_counts().max()
     size = style.TWO, (0.75 + 0.155 * bars) * shape[0]
-    drawing, panels = style.figure_of(shape, size)
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
-    for axes, task in zip(panels, tasks, strict=False):
+    drawing, panels = style.figure_of(shape, size, len(tasks))
+    for axes, task in zip(panels, tasks, strict=True):
         draw_bars(axes, task, data[data.task == task.name], order, colors)
-    style.letters(panels[: len(tasks)])
+    style.letters(panels)
     colors |= {"others": style.GREY} if len(order) > MOST else {}
     handles = [Patch(facecolor=color, label=hands, **_EDGE) for hands, color in colors.items()]
     style.legend(drawing, handles, len(handles), handlelength=1.0, columnspacing=1.2)

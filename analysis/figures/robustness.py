@@ -91,9 +91,9 @@ def specification_curve(table: pd.DataFrame) -> Plot:
         row, column = divmod(number, COLUMNS)
         above = figure.add_subplot(grid[2 * row, column], title=claim)
         below = figure.add_subplot(grid[2 * row + 1, column], sharex=above)
-        own = data[data.claim == claim].sort_values("effect", kind="stable")
-        draw_effects(above, own)
-        draw_choices(below, own, choices)
+        of_claim = data[data.claim == claim].sort_values("effect", kind="stable")
+        draw_effects(above, of_claim)
+        draw_choices(below, of_claim, choices)
         below.set_yticks(range(len(choices)), choices[::-1] if column == 0 else [])
     add_legend(figure)
     words = [
@@ -119,9 +119,11 @@ def draw_effects(axes: Axes, rows: pd.DataFrame) -> None:
     """Effects of a claim with their intervals, and a line at the default."""
     places = pd.Series(np.arange(len(rows)), rows.index)
     for verdict, (color, _) in LOOKS.items():
-        own = rows[rows.verdict == verdict]
-        axes.vlines(places[own.index], own.low, own.high, color=color, alpha=0.45, linewidth=0.7)
-        axes.plot(places[own.index], own.effect, ".", color=color, markersize=2.5)
+        alike = rows[rows.verdict == verdict]
+        axes.vlines(
+            places[alike.index], alike.low, alike.high, color=color, alpha=0.45, linewidth=0.7
+        )
+        axes.plot(places[alike.index], alike.effect, ".", color=color, markersize=2.5)
     for place in places[(rows.readings == "") & (rows.member == "")]:
         axes.axvline(float(place), color=style.INK, linewidth=0.6, zorder=0)
     axes.axhline(0.0, color=style.INK, linewidth=0.5)

@@ -136,11 +136,17 @@ def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
 
 
 def figure_of(
-    shape: tuple[int, int], size: tuple[float, float], **subplots: Any
+    shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with so many rows and columns of panels, in inches, and its panels row by row."""
+    """A figure with so many rows and columns of panels, in inches, and its panels row by row.
+
+    ``used``: the first so many panels, the others being empty.
+    """
     figure = Figure(figsize=size, layout="constrained")
-    return figure, figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
+    panels = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
+    for axes in panels[used or len(panels) :]:
+        axes.set_axis_off()
+    return figure, panels[:used]
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:

@@ -53,8 +53,10 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    drawing, panels = style.figure_of((rows, columns), (style.column_width(size[0]), size[1]))
-    for axes, task, corners in zip(panels, tasks, boxes, strict=False):
+    drawing, panels = style.figure_of(
+        (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
+    )
+    for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0, marked=task.hands)
         draw_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
@@ -68,7 +70,5 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_aspect("equal")
         axes.set_xlabel("x (length unit)")
         axes.set_ylabel("y (length unit)")
-    for axes in panels[len(tasks) :]:
-        axes.set_axis_off()
     style.legend(drawing, legend_entries(hand for task in tasks for hand in task.hands), 3)
     return drawing

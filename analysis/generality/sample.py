@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.optima import locks_base
+from coartic.analysis.methods import most_exploring
+from coartic.analysis.optima import KnownOptimum, locks_base
 from coartic.analysis.statistics.instances import Runs, Scores, gap_share
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
@@ -17,21 +17,6 @@ from coartic.runs.plan import SEARCH
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
-
-
-@dataclass(frozen=True)
-class ReferenceReward:
-    """What the solutions of an instance are measured by."""
-
-    best: int
-    """Highest reward of any run of the folder, or of the search for the optimum."""
-    bound: int | None
-    """Reward that is proven never to be exceeded; None where nothing is."""
-
-    @property
-    def proven(self) -> bool:
-        """Whether the best known reward is the optimum."""
-        return self.bound == self.best
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +40,11 @@ class Sample:
         return {family: tuple(names) for family, names in names_by_family.items()}
 
     @cached_property
-    def references(self) -> dict[str, ReferenceReward]:
-        """What the solutions of each instance are measured by, where there is any."""
+    def references(self) -> dict[str, KnownOptimum]:
+        """What the solutions of each instance are measured by, where there is any.
+
+        The highest reward of any run of the folder, or of the search for the optimum.
+        """
         runs = self.study.runs
         solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
         highest = solved.groupby("task").reward.max()
@@ -67,7 +55,7 @@ class Sample:
             if optimum is not None:
                 rewards.append(optimum.reward)
             if rewards and max(rewards) < 0:
-                by_name[name] = ReferenceReward(max(rewards), optimum.bound if optimum else None)
+                by_name[name] = KnownOptimum(max(rewards), optimum.bound if optimum else None)
         return by_name
 
     @cached_property
@@ -85,28 +73,31 @@ class Sample:
             )
         )
 
+    def label_on(self, name: str, label: str) -> str:
+        """Label of a method on an instance: ``learner`` is the condition that explores most."""
+        return most_exploring(self.tasks[name]) if label == "learner" else label
+
     def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
         """Of each solved run (n,), as a share of the best known reward; None without any.
 
         The gap to the optimum is at least this. To the proven bound, which it is at most, it is
         None where nothing is proven.
         """
-        cell, reference = self.study.cells.get((name, label)), self.references.get(name)
+        cell = self.study.cells.get((name, self.label_on(name, label)))
+        reference = self.references.get(name)
         if cell is None or reference is None or not len(cell.good):
             return None
-        to = reference.bound if to_bound else reference.best
+        to = reference.bound if to_bound else reference.reward
         return None if to is None else gap_share(cell.rewards, to)
 
-    def gaps(
-        self, label: str, *, families: Sequence[str] | None = None, to_bound: bool = False
-    ) -> Scores:
+    def gaps(self, label: str, *, to_bound: bool = False) -> Scores:
         """Gaps by family, on the instances that the method solved in some run.
 
         A family without one is left out.
         """
         by_family: dict[str, list[Runs]] = {}
-        for family in families or self.families:
-            for name in self.families.get(family, ()):
+        for family, names in self.families.items():
+            for name in names:
                 gap = self.gap(name, label, to_bound=to_bound)
                 if gap is not None:
                     by_family.setdefault(family, []).append((gap,))

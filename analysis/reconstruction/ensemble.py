@@ -94,15 +94,15 @@ def reconstruct(
 
     A row a member: coordinates, distance, and every figure of ``runs`` runs a condition with its
     distance. The first is the nearest set that was found; each of the others is as far as
-    possible from those before it. The layout's known sets of goals compete where they meet every
+    possible from those before it. The layout's earlier sets of goals compete where they meet every
     constraint, and come last; the first of them stands unless another one is nearer beyond
     chance, by ``last`` further runs a condition. The result depends on the arguments and on
     nothing else.
     """
     layout = search.layout
-    goals = np.array(list(layout.known.values())).reshape(-1, len(layout.goals), 2)
-    known = layout.points(goals)
-    compete = search.admitted(known[layout.allowed(known)], "known")
+    goals = np.array(list(layout.earlier.values())).reshape(-1, len(layout.goals), 2)
+    earlier = layout.points(goals)
+    compete = search.admitted(earlier[layout.allowed(earlier)], "known")
     pool = admissible_points(search, report)
     pool = np.concatenate([compete[:1], without(pool, compete[:1])])
     sequences = hand_sequences(search.task)
@@ -126,8 +126,8 @@ def reconstruct(
         nearest = nearest if better else compete[:1]
 
     chosen = np.concatenate([nearest, without(spread, nearest)])
-    names = [*(f"m{k:03d}" for k in range(1, len(chosen) + 1)), *layout.known]
-    points = np.concatenate([chosen, known])
+    names = [*(f"m{k:03d}" for k in range(1, len(chosen) + 1)), *layout.earlier]
+    points = np.concatenate([chosen, earlier])
     fresh = np.unique(without(points, begin), axis=0)
     by_point = {
         result.point.tobytes(): result

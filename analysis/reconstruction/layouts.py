@@ -36,7 +36,7 @@ class Layout:
     """a, b, gap: a + gap <= b."""
     apart: float = 0.0
     """Least distance of two goals' centres, length unit."""
-    known: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    earlier: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     """Sets of goals from before, by name."""
 
     @cached_property

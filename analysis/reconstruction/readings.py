@@ -120,12 +120,12 @@ def judge(texts: Sequence[str], *, runs: int, trials: int) -> tuple[dict[str, An
             cell = learned(task, condition, seeds, model=model, trials=trials)
             cells[f"{task.name}/{name}"] = cell
             figures = [test for test in printed_tests(task.name) if isinstance(test, Figure)]
-            own = likelihoods(figures, cell)
+            of_cell = likelihoods(figures, cell)
             for gain in entries_of(task.name, "test"):
                 if gain.kind == "gain" and reward is not None:
                     mean = next(figure for figure in figures if figure.kind == "mean")
-                    own += likelihood_of_gain(float(gain.value), reward, mean)
-            parts += [part._replace(what=f"{task.name} {part.what}") for part in own]
+                    of_cell += likelihood_of_gain(float(gain.value), reward, mean)
+            parts += [part._replace(what=f"{task.name} {part.what}") for part in of_cell]
     if None in initial.values():
         parts.append(Likelihood("the initial solution fails", -math.inf, 0.0))
     row |= initial
@@ -136,9 +136,9 @@ def judge(texts: Sequence[str], *, runs: int, trials: int) -> tuple[dict[str, An
         row[f"{name} mean"] = round(float(values.mean()), 2) if some else math.nan
         row[f"{name} sd"] = round(float(values.std(ddof=1)), 2) if some else math.nan
     row |= {f"p: {part.what}": float(f"{part.p:.3g}") for part in parts}
-    whole = together(parts)
-    row |= {"log likelihood": round(whole.log_chance, 2), "p": float(f"{whole.p:.3g}")}
-    row["verdict"] = "refuted" if whole.p < REFUTED else "stands"
+    joint = together(parts)
+    row |= {"log likelihood": round(joint.log_chance, 2), "p": float(f"{joint.p:.3g}")}
+    row["verdict"] = "refuted" if joint.p < REFUTED else "stands"
     return row, [initial, *(values.tolist() for values in rewards.values())]
 
 

@@ -66,9 +66,11 @@ def judged_specifications(
     names = [claim.id for claim in claims]
     views = dict(view for study in studies for view in specifications(study))  # each once
     with processes(jobs, len(views)) as do:
-        for specification, judged, own in do(judge_view, views, views.values(), repeat(names)):
+        for specification, judged, claims_judged in do(
+            judge_view, views, views.values(), repeat(names)
+        ):
             rows += judged
-            judgeable |= {(specification.task, name) for name in own}
+            judgeable |= {(specification.task, name) for name in claims_judged}
             progress(specification)
     kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
     return pd.DataFrame(kept, columns=list(COLUMNS))
@@ -135,7 +137,7 @@ def judge_view(
     specification: Specification, view: Study, names: Sequence[str]
 ) -> tuple[Specification, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
-    task, rows, own = specification.task, [], []
+    task, rows, claims_judged = specification.task, [], []
     wanted = [CLAIMS[name] for name in names]
     if task:  # what the default goals of the other task do is no matter of a member's
         for number, claim in enumerate(wanted):
@@ -150,7 +152,7 @@ def judge_view(
     for judged in judge(view, wanted):
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
-            own.append(claim.id)
+            claims_judged.append(claim.id)
         row = {**specification._asdict(), "claim": claim.id}
         row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
         row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
@@ -158,7 +160,7 @@ def judge_view(
             first = finding.tests[0]
             row |= {"effect": first.estimate, "low": first.low, "high": first.high, "p": first.p}
         rows.append(row)
-    return specification, rows, own
+    return specification, rows, claims_judged
 
 
 def shares(table: pd.DataFrame) -> pd.DataFrame:

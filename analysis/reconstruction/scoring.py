@@ -154,8 +154,8 @@ def printed_tests(task: str) -> tuple[Test, ...]:
             tests.append(Figure(condition, "sd", sd, runs, hands, None, entry.digits, counted))
         elif entry.kind == "count":
             tests.append(Figure(condition, "share", runs / RUNS, RUNS, hands))
-        elif entry.kind == "hand sequences" and len(entry.found) == 1:
-            tests.append(Figure(condition, "share", 1.0, RUNS, entry.found[0]))
+        elif entry.kind == "hand sequences" and len(entry.sequences) == 1:
+            tests.append(Figure(condition, "share", 1.0, RUNS, entry.sequences[0]))
         elif entry.kind == "order" and not (entry.sample or entry.goal):
             than = entry.than
             if than.condition is not None:

@@ -148,12 +148,12 @@ def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Sea
 
     Raises CoarticError for a task whose goals are printed, and for readings that are none.
     """
-    known = layouts()
-    if task not in known:
+    searched = layouts()
+    if task not in searched:
         raise CoarticError(
             f"the paper prints the goals of task {task!r}; tasks with goals that are not "
-            f"printed: {', '.join(known)}{did_you_mean(task, known)}"
+            f"printed: {', '.join(searched)}{did_you_mean(task, searched)}"
         )
     chosen = load_readings(readings)
     plain = task_under(chosen, load_task(task))
-    return Search(plain, known[task], constraints_of(plain), chosen, jobs)
+    return Search(plain, searched[task], constraints_of(plain), chosen, jobs)

@@ -13,11 +13,11 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
+import pandas as pd
+
 from coartic import CoarticError
 from coartic.analysis import tables
-from coartic.analysis.claims.ensemble import held_in_words
-from coartic.analysis.claims.judge import judged
-from coartic.analysis.claims.register import Verdict
+from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.figures import FIGURES, Plot
 from coartic.analysis.figures.plot import picture, svg_for_page
 from coartic.analysis.generality.sample import one_by_one
@@ -25,18 +25,46 @@ from coartic.analysis.report import facts
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
-from coartic.analysis.report.text import answers, environment, sentence
+from coartic.analysis.report.text import answers, environment, sentence, sentences
 from coartic.analysis.study import Study, cached
-from coartic.analysis.words import number, read_beside
+from coartic.analysis.words import NONE, number, read_beside
 from coartic.files import check_folder, publish
+from coartic.text import did_you_mean
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
-SECTIONS: dict[str, dict[str, Any]] = read_beside(__file__, "sections")
-"""The sections of the page by id, in its order."""
+KEYS = ("short", "title", "figure", "table", "caption", "note", "single")
+"""What ``sections.toml`` may say of a section."""
 SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
 _MAGNIFIED = 1.3  # figures on the page
 _PHONE = 320 / 72  # inches: a phone scrolls what is wider
+
+
+def checked(content: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The content of ``sections.toml``; raises CoarticError for a name that is none."""
+    ids = {"figure": list(FIGURES), "table": list(tables.TABLES)}
+    for name, section in content.items():
+        where = f"sections.toml, section {name!r}"
+        wanted = ("short", "title", *["caption"] * ("table" in section))
+        for key in (key for key in wanted if key not in section):
+            raise CoarticError(f"{where}: {key} is missing")
+        for key in (key for key in section if key not in KEYS):
+            raise CoarticError(f"{where}: {key} is an unknown key{did_you_mean(key, KEYS)}")
+        for kind in ids.keys() & section.keys():
+            if section[kind] not in ids[kind]:
+                hint = (
+                    did_you_mean(section[kind], ids[kind]) or f"; there are {', '.join(ids[kind])}"
+                )
+                raise CoarticError(f"{where}: there is no {kind} {section[kind]!r}{hint}")
+    for name in (name for name in sentences() if name not in content):
+        raise CoarticError(
+            f"sections.toml has no section {name!r}, for which sentences.jinja has a sentence"
+        )
+    return content
+
+
+SECTIONS = checked(read_beside(__file__, "sections"))
+"""The sections of the page by id, in its order."""
 
 
 def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
@@ -54,8 +82,7 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
                 caption = captions.get(name) or name.replace("-", " ").capitalize()
                 files[f"tables/{name}.tex"] = latex_table(frame, name, caption).encode()
     files["numbers.tex"] = numbers_tex(study).encode()
-    names = [section["figure"] for section in sections(study).values() if "figure" in section]
-    for name in FIGURES if for_paper else names:
+    for name in FIGURES if for_paper else plots(study):
         if plot := plots(study).get(name) or drawn(study, name):
             for ending in (".svg", ".pdf") if for_paper else (".svg",):
                 files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
@@ -97,33 +124,63 @@ def drawn(study: Study, name: str) -> Plot | None:
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    shown = {
-        section["figure"]
-        for section in SECTIONS.values()
-        if "figure" in section and (one_by_one(study) or not section.get("single"))
-    }
-    every = {name: drawn(study, name) for name in FIGURES if name in shown}
-    return {name: plot for name, plot in every.items() if plot is not None}
+    ids = [section["figure"] for section in shown(study).values() if "figure" in section]
+    return {name: plot for name in ids if (plot := drawn(study, name)) is not None}
+
+
+def shown(study: Study) -> dict[str, dict[str, Any]]:
+    """Sections that are not about single tasks where these are many."""
+    alone = one_by_one(study)
+    return {name: row for name, row in SECTIONS.items() if alone or not row.get("single")}
 
 
 @cached
-def sections(study: Study) -> dict[str, dict[str, Any]]:
-    """Sections of ``sections.toml`` that the runs allow, by id.
+def sections(study: Study) -> list[dict[str, Any]]:
+    """Sections of ``sections.toml`` that the runs allow, as the template wants them.
 
-    With their ``finding``, and without the figure or the table that the runs do not allow.
+    With their ``finding``; figure or table is None where the runs do not allow it.
     """
-    allowed = {}
-    for name, section in SECTIONS.items():
-        left_out = set()
-        if section.get("figure") not in plots(study):
-            left_out.add("figure")
-        if "table" in section and not len(tables.TABLES[section["table"]](study)):
-            left_out.add("table")
-        parts = {key: value for key, value in section.items() if key not in left_out}
-        if {"figure", "table"} & parts.keys() and (one_by_one(study) or not section.get("single")):
-            of = getattr(facts, name)(study) if hasattr(facts, name) else None
-            allowed[name] = parts | {"finding": "" if of is None else sentence(name, of)}
+    allowed = []
+    for name, section in shown(study).items():
+        plot = plots(study).get(section.get("figure", ""))
+        frame = tables.TABLES[section["table"]](study) if "table" in section else pd.DataFrame()
+        if plot is None and not len(frame):
+            continue
+        of = getattr(facts, name)(study) if hasattr(facts, name) else None
+        words = {
+            "note": "",
+            **section,
+            "id": name,
+            "finding": "" if of is None else sentence(name, of),
+        }
+        figure = None if plot is None else figure_for_page(plot)
+        table = table_for_page(frame, section) if len(frame) else None
+        allowed.append({**words, "figure": figure, "table": table})
     return allowed
+
+
+def figure_for_page(plot: Plot) -> dict[str, Any]:
+    """A figure as the template wants it."""
+    inches = plot.figure.get_figwidth()
+    return {
+        "id": plot.id,
+        "title": plot.title,
+        "caption": plot.caption,
+        "svg": svg_for_page(plot),
+        "wide": inches > _PHONE,
+        "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
+    }
+
+
+def table_for_page(frame: pd.DataFrame, section: dict[str, Any]) -> dict[str, Any]:
+    """The table of a section as the template wants it."""
+    return {
+        "id": section["table"],
+        "caption": section["caption"],
+        "html": html_table(frame, section["table"], section["caption"]),
+        "searched": len(frame) > SEARCHED,
+        "example": f"'{frame.index[0]}'",
+    }
 
 
 def page(study: Study) -> str:
@@ -144,7 +201,7 @@ def page(study: Study) -> str:
         script=script,
         player=player.replace("<", "\\u003c"),
         answers=answers(study),
-        sections=[section_for_page(study, *section) for section in sections(study).items()],
+        sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
         provenance=facts.provenance(study),
@@ -157,12 +214,11 @@ def page(study: Study) -> str:
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
     template = environment(escape=False).get_template("summary.md.jinja")
-    figures = [name for name in ("postures", "ranking", "price") if name in plots(study)]
     return template.render(
         title=title(study),
         answers=answers(study),
         provenance=facts.provenance(study),
-        figures=figures,
+        figures=[name for name in ("postures", "ranking", "price") if name in plots(study)],
     )
 
 
@@ -171,48 +227,20 @@ def title(study: Study) -> str:
     return f"Coarticulation of a simulated robot: suite {study.suite}"
 
 
-def section_for_page(study: Study, name: str, section: dict[str, Any]) -> dict[str, Any]:
-    """A section as the template wants it."""
-    values = {"note": "", **section, "id": name, "figure": None, "table": None}
-    if "figure" in section:
-        plot = plots(study)[section["figure"]]
-        inches = plot.figure.get_figwidth()
-        values["figure"] = {
-            "id": plot.id,
-            "title": plot.title,
-            "caption": plot.caption,
-            "svg": svg_for_page(plot),
-            "wide": inches > _PHONE,
-            "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
-        }
-    if "table" in section:
-        frame = tables.TABLES[section["table"]](study)
-        values["table"] = {
-            "id": section["table"],
-            "caption": section["caption"],
-            "html": html_table(frame, section["table"], section["caption"]),
-            "searched": len(frame) > SEARCHED,
-            "example": f"'{frame.index[0]}'",
-        }
-    return values
-
-
 def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them, supported ones first, those used for choosing last."""
     order = get_args(Verdict)
-    table = tables.claims(study)
+    rows = tables.claims(study).reset_index(names="id").to_dict("records")
     return [
         {
-            "id": entry.claim.id,
-            "statement": str(table.statement[entry.claim.id]),
-            "verdict": entry.verdict,
-            "tone": TONES[entry.verdict],
-            "evidence": entry.finding.evidence,
-            "test": str(table.test[entry.claim.id]),
-            "quote": entry.claim.quote,
-            "place": ", ".join(filter(None, (entry.claim.place, entry.claim.figure))),
-            "ensemble": held_in_words(entry.claim.id) or "–" if entry.claim.fitted else "–",
-            "p": "< 0.001" if entry.adjusted_p < 0.001 else number(entry.adjusted_p, 3),
+            **{
+                key: str(row[key])
+                for key in ("id", "statement", "verdict", "evidence", "test", "quote")
+            },
+            "tone": TONES[row["verdict"]],
+            "place": ", ".join(filter(None, (row["place"], CLAIMS[row["id"]].figure))),
+            "ensemble": row["ensemble"] or NONE,
+            "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }
-        for entry in sorted(judged(study), key=lambda entry: order.index(entry.verdict))
+        for row in sorted(rows, key=lambda row: order.index(row["verdict"]))
     ]

@@ -52,10 +52,19 @@ def shown(text: str) -> str:
     return one_line(text).replace(" %", f"{words.NO_BREAK}%")
 
 
+def macros() -> Any:
+    """The macros of ``sentences.jinja`` by name."""
+    return environment(escape=False).get_template("sentences.jinja").module
+
+
+def sentences() -> list[str]:
+    """Names of the facts that a macro puts into words: those of sections."""
+    return [name for name in vars(facts) if callable(getattr(macros(), name, None))]
+
+
 def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
-    module = environment(escape=False).get_template("sentences.jinja").module
-    text = str(getattr(module, name)(of)).replace("\n", " ")
+    text = str(getattr(macros(), name)(of)).replace("\n", " ")
     return shown(" ".join(part for part in text.split(" ") if part))
 
 

@@ -1,4 +1,4 @@
-"""Measures between tasks: the same goal in two contexts, or next to a goal that moves."""
+"""Signatures between tasks: the same goal in two contexts, or next to a goal that moves."""
 
 from __future__ import annotations
 
@@ -20,15 +20,21 @@ from coartic.analysis.signatures.context import (
 )
 from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from coartic.analysis.signatures.rows import Row, Rows, Signature, where, without
+from coartic.analysis.signatures.rows import (
+    FAMILIES,
+    REGISTER,
+    Row,
+    Rows,
+    estimated,
+    row,
+    where,
+    without,
+)
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import Trajectories, last_ticks, postures
 from coartic.robot import HANDS, Array
 from coartic.runs.plan import label_of
 
-Runs = tuple[Trajectory, ...]
-DEPENDENCE = "context dependence"
-"""Name of the signature whose test is the claim's."""
 NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
@@ -58,7 +64,7 @@ class TwoContexts:
         return {"goal": self.goal, "hand": self.hand, "against": self.second.task.name}
 
     @cached_property
-    def runs(self) -> tuple[Runs, Runs]:
+    def runs(self) -> tuple[tuple[Trajectory, ...], tuple[Trajectory, ...]]:
         """Of either context."""
         hand, goal = self.hand, self.goal
         return self.first.with_hand(hand, goal), self.second.with_hand(hand, goal)
@@ -73,11 +79,6 @@ class TwoContexts:
     def n(self) -> int:
         """Runs of both."""
         return sum(map(len, self.runs))
-
-    @property
-    def single(self) -> bool:
-        """Whether a context has one run only, and so no spread."""
-        return min(map(len, self.runs)) < 2
 
     @property
     def apart(self) -> float:
@@ -111,88 +112,67 @@ class TwoContexts:
     @cached_property
     def p(self) -> float:
         """Of the permutation test over runs; NaN where a context has one run."""
-        return self.p_within(DEPENDENCE)
+        return self.p_within("context dependence")
 
-    def p_within(self, name: str, basis: Array | None = None) -> float:
+    def p_within(self, signature: str, basis: Array | None = None) -> float:
         """The same within the span of an orthonormal ``basis`` (dof, d), with draws of its own."""
-        return float(permutation_p(*self.postures, rng_of(name, self.place), basis=basis))
+        return float(permutation_p(*self.postures, rng_of(signature, self.place), basis=basis))
 
 
-def context_distance(contexts: TwoContexts, signature: Signature) -> Rows:
-    """Distance of mean postures."""
-    yield signature.row(contexts.place, value=contexts.apart, n=contexts.n)
-
-
-def dependence(contexts: TwoContexts, signature: Signature) -> Rows:
-    """The distance in pooled standard deviations, with its test."""
-    value = contexts.spreads
-    why = "runs do not differ within contexts" if math.isnan(value) else ""
-    why = NO_SPREAD if contexts.single else why
-    yield signature.row(contexts.place, value=value, p=contexts.p, n=contexts.n, why_not=why)
-
-
-def parts(contexts: TwoContexts, equivalent: Signature, other: Signature) -> Rows:
-    """The difference that leaves the hand in place, and the one that moves it."""
+def between_contexts(contexts: TwoContexts) -> Rows:
+    """Rows of all signatures of two contexts, in the order of the register."""
+    place, n, few = contexts.place, contexts.n, min(map(len, contexts.runs)) < 2
+    yield row("context distance", place, value=contexts.apart, n=n)
+    spreads = contexts.spreads
+    why = "runs do not differ within contexts" if math.isnan(spreads) else ""
+    why = NO_SPREAD if few else why
+    yield row("context dependence", place, value=spreads, p=contexts.p, n=n, why_not=why)
     joints, jacobian = contexts.jacobian
-    why = "one run a context: no test" if contexts.single else ""
-    signatures = equivalent, other
-    for signature, value, basis in zip(
-        signatures, contexts.parts, subspaces(jacobian), strict=True
-    ):
+    names = "motor-equivalent part", "non-motor-equivalent part"
+    why = "one run a context: no test" if few else ""
+    for name, value, basis in zip(names, contexts.parts, subspaces(jacobian), strict=True):
         of_all_joints = np.zeros((contexts.first.task.robot.dof, basis.shape[1]))
         of_all_joints[joints] = basis
-        p = contexts.p_within(signature.name, of_all_joints)
-        yield signature.row(contexts.place, value=value, p=p, n=contexts.n, why_not=why)
-
-
-def lead(contexts: TwoContexts, signature: Signature) -> Rows:
-    """How long before the hit contexts differ."""
-    place, n = contexts.place, contexts.n
-    if contexts.single:
-        yield signature.row(place, n=n, why_not=NO_SPREAD)
-        return
+        p = contexts.p_within(name, of_all_joints)
+        yield row(name, place, value=value, p=p, n=n, why_not=why)
     count = min(int(run.hits[contexts.goal - 1]) for group in contexts.runs for run in group) + 1
-    if count == 1:
-        yield signature.row(place, n=n, why_not="a run hits it at the start")
+    if few or count == 1:
+        why = NO_SPREAD if few else "a run hits it at the start"
+        yield row("lead time", place, n=n, why_not=why)
         return
     first, second = (last_ticks(group, contexts.goal, count) for group in contexts.runs)
-    ticks = lead_time(first, second, rng_of(signature.name, place))
+    ticks = lead_time(first, second, rng_of("lead time", place))
     place["longest"] = count - 1
     why = "not distinguishable at the hit" if ticks is None else ""
-    yield signature.row(place, value=math.nan if ticks is None else float(ticks), n=n, why_not=why)
+    yield row("lead time", place, value=math.nan if ticks is None else ticks, n=n, why_not=why)
 
 
-@dataclass(frozen=True)
-class Members:
-    """What one method did on the tasks of a family."""
+def slopes(family: ContextFamily, cells: Mapping[str, Trajectories]) -> Rows:
+    """Slopes at the goals before (anticipatory) and after (carry-over) the moving one.
 
-    family: ContextFamily
-    of_task: Mapping[str, Trajectories]
-    """Those that it did, in the order of the family."""
-
-
-def slopes(members: Members, slope: Signature, norm: Signature) -> Rows:
-    """Slopes at the goals before (anticipatory) and after (carry-over) the moving one."""
-    family, task = members.family, next(iter(members.of_task.values())).task
+    ``cells``: what one method did on tasks of the family, in their order.
+    """
+    task = next(iter(cells.values())).task
     position = dict(zip(family.tasks, family.positions.tolist(), strict=True))
     beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
     for goal, hand in product(sorted(beside), HANDS):
-        runs = {name: cell.with_hand(hand, goal) for name, cell in members.of_task.items()}
+        runs = {name: cell.with_hand(hand, goal) for name, cell in cells.items()}
         places = [position[name] for name, of_task in runs.items() for _ in of_task]
         n, place = len(places), {"goal": goal, "hand": hand, "moving": family.moving}
         if not n:
             continue
         if len(set(places)) < LEAST:
             why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-            yield from without((slope, norm), why, place, n)
+            yield from without(FAMILIES, why, place, n)
             continue
         q = postures(tuple(chain.from_iterable(runs.values())), goal)
-        for joint, fitted in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
-            unit = "1" if joint.startswith("base") else slope.unit
-            yield slope.estimated({**place, "joint": joint}, fitted, n, unit=unit)
-        yield norm.estimated(place, slope_norm(q, places, rng_of(norm.name, place)), n)
+        for joint, slope in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
+            unit = "1" if joint.startswith("base") else REGISTER["locus slope"].unit
+            yield estimated("locus slope", {**place, "joint": joint}, slope, n, unit=unit)
+        norm = slope_norm(q, places, rng_of("locus slope norm", place))
+        yield estimated("locus slope norm", place, norm, n)
 
 
-def rng_of(name: str, place: Row) -> np.random.Generator:
+def rng_of(signature: str, place: Row) -> np.random.Generator:
     """A generator for each row of a signature, the same in every folder."""
-    return np.random.default_rng([SEED, zlib.crc32(f"{name} {where(place)}".encode())])
+    return np.random.default_rng([SEED, zlib.crc32(f"{signature} {where(place)}".encode())])

@@ -22,21 +22,14 @@ from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred
 from coartic.robot import Array
 
 
-def shared_goals(first: Task, second: Task) -> int:
-    """How many goals two tasks share before their first difference.
-
-    0 where anything but the goals differs, and where no goal differs.
-    """
-    others = any(getattr(first, key) != getattr(second, key) for key in KEPT)
-    if others or first.goals == second.goals:
-        return 0
-    same = (a == b for a, b in zip(first.goals, second.goals, strict=False))
-    return sum(1 for _ in takewhile(bool, same))
-
-
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Pairs of tasks that differ only after their first goals, and how many they share."""
-    pairs = [(a, b, shared_goals(tasks[a], tasks[b])) for a, b in combinations(tasks, 2)]
+    pairs = []
+    for (a, first), (b, second) in combinations(tasks.items(), 2):
+        others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
+        if not others_differ and first.goals != second.goals:
+            same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
+            pairs.append((a, b, len(list(takewhile(bool, same)))))
     return [pair for pair in pairs if pair[2]]
 
 
@@ -69,8 +62,6 @@ def dependence_below(
     second: Array,
     bound: float,
     rng: np.random.Generator,
-    *,
-    resamples: int = RESAMPLES,
 ) -> float:
     """Probability of so little context dependence if it were ``bound`` (pooled SDs) or more.
 
@@ -81,17 +72,17 @@ def dependence_below(
     """
     if min(len(first), len(second)) < 2:
         return math.nan
-    means, squares = [], np.zeros(resamples)
+    means, squares = [], np.zeros(RESAMPLES)
     for group in (first, second):
-        means.append(np.empty((resamples, group.shape[1])))
-        for start in range(0, resamples, 500):  # thousands of runs would fill the memory
-            rows = slice(start, min(start + 500, resamples))
+        means.append(np.empty((RESAMPLES, group.shape[1])))
+        for start in range(0, RESAMPLES, 500):  # thousands of runs would fill the memory
+            rows = slice(start, min(start + 500, RESAMPLES))
             drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
     pooled = np.sqrt(squares / (len(first) + len(second) - 2))
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
-    return float(1 + reached.sum()) / (resamples + 1)
+    return float(1 + reached.sum()) / (RESAMPLES + 1)
 
 
 def permutation_p(
@@ -137,7 +128,6 @@ def lead_time(
     rng: np.random.Generator,
     *,
     alpha: float = LEVEL,
-    resamples: int = 999,
 ) -> int | None:
     """How long before a hit two contexts become distinguishable, and stay so, in ticks.
 
@@ -155,6 +145,6 @@ def lead_time(
     a lead shorter than the movement speaks of noise or of different speeds, not of a late
     decision.
     """
-    failed = ~(permutation_p(first, second, rng, resamples=resamples)[::-1] <= alpha)
+    failed = ~(permutation_p(first, second, rng, resamples=999)[::-1] <= alpha)
     lead = int(failed.argmax()) if failed.any() else len(failed)
     return lead - 1 if lead else None

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import integrate
 
 from coartic import Trajectory
-from coartic.robot import BASE_DOF, Array
+from coartic.robot import Array
 
 REVERSAL = 0.01
 """Way back that makes a reversal, length unit: the model's step m."""
@@ -32,7 +32,7 @@ def base_reversals(positions: Array) -> int:
     has gone back by more than :data:`REVERSAL`; what is smaller is jitter.
     """
     reversals = direction = 0
-    low = high = float(positions[0])
+    low, high = math.inf, -math.inf
     for x in positions.tolist():
         low, high = min(low, x), max(high, x)
         if direction <= 0 and x - low > REVERSAL:
@@ -42,13 +42,6 @@ def base_reversals(positions: Array) -> int:
             reversals += direction
             direction, low = -1, x
     return reversals
-
-
-def reversals_of(path: Trajectory) -> tuple[int, ...]:
-    """:func:`base_reversals` of base x and y over a whole solution."""
-    if not path.ticks:
-        return (0,) * BASE_DOF
-    return tuple(base_reversals(path.configurations[:, k]) for k in range(BASE_DOF))
 
 
 def turning_angles(postures: Array) -> Array:

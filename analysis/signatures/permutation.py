@@ -43,14 +43,12 @@ def divisions(
     return blocks(), exact
 
 
-def orders(
-    size: int, rng: np.random.Generator, resamples: int = RESAMPLES
-) -> tuple[NDArray[np.int64], bool]:
+def orders(size: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], bool]:
     """Orders of so many things, shape ``(m, size)``, and whether these are all there are."""
-    exact = math.factorial(size) <= resamples
+    exact = math.factorial(size) <= RESAMPLES
     if exact:
         return np.array(list(permutations(range(size)))), True
-    return rng.permuted(np.tile(np.arange(size), (resamples, 1)), axis=1), False
+    return rng.permuted(np.tile(np.arange(size), (RESAMPLES, 1)), axis=1), False
 
 
 def p_values(null: Array, observed: Array, *, exact: bool) -> Array:

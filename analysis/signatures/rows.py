@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, ImportString, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from coartic.analysis.statistics.estimates import Interval
-from coartic.robot import Array
-
-NO_RUN = "no run has a solution"
-ONE_HAND = "the task has one hand"
-NO_INITIAL = "the corrective process alone does not complete the task"
-ONE_RUN = "one run: no interval"
+from coartic.analysis.words import read_beside
 
 COLUMNS = {
     "signature": "", "where": "", "value": math.nan, "low": math.nan, "high": math.nan,
@@ -34,26 +29,6 @@ not 0; ticks that a lead can have at most. What does not apply is None, or empty
 Row = dict[str, Any]
 """A value by :data:`COLUMNS` and :data:`PLACE`."""
 Rows = Iterator[Row]
-"""What a measure yields."""
-Measure = Callable[..., Rows]
-"""Takes what is measured (:class:`~.trajectories.Trajectories`, a pair of contexts or a family
-of tasks), then the signatures that it measures, in the order of the register."""
-
-
-def where(place: Row) -> str:
-    """A place in words: ``goal 1, right hand, against descending, of at most 141``."""
-    goal, hand, hands, against, moving, joint, neutral, longest = {**PLACE, **place}.values()
-    parts = [] if goal is None else [f"goal {goal}"]
-    if moving is not None:
-        kind = "anticipatory" if goal is None or goal < moving else "carry-over"
-        parts.append(f"{kind} of goal {moving}")
-    parts += [f"{hand} hand"] if hand else []
-    parts += [hands] if hands else []
-    parts += [f"against {against}"] if against else []
-    parts += [joint if moving is not None else joint.replace("_", " ")] if joint else []
-    parts += [] if neutral is None else [f"neutral at {neutral:.3f}"]
-    parts += [] if longest is None else [f"of at most {longest}"]
-    return ", ".join(parts)
 
 
 class Signature(BaseModel):
@@ -62,10 +37,7 @@ class Signature(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    measure: ImportString[Measure] | None = None
-    of_runs: ImportString[Callable[..., Array]] | None = None
     two_hands: bool = False
-    place: Row = {}
     missing: str = ""
     unit: str
     range: str = "share of runs"
@@ -85,19 +57,47 @@ class Signature(BaseModel):
         """Unit and range, and whether there is one of each goal."""
         return self.range + ", by goal" * self.by_goal
 
-    def row(self, place: Row | None = None, **values: Any) -> Row:
-        """A value of it with its unit, at a place; ``values`` by :data:`COLUMNS`."""
-        place = {**PLACE, **(place or {})}
-        names = {"signature": self.name, "where": where(place), "unit": self.unit}
-        return {**COLUMNS, **names, **values, **place}
 
-    def estimated(self, place: Row, interval: Interval, n: int, **values: Any) -> Row:
-        """The same of a value with its interval or test, over so many runs."""
-        why = ONE_RUN if n == 1 else ""
-        return self.row(place, **{"why_not": why, "n": n, **interval._asdict(), **values})
+_FILE = read_beside(__file__, "register")
+WITHIN, CONTEXTS, FAMILIES = (
+    tuple(Signature(name=name, **row) for name, row in _FILE[kind].items())
+    for kind in ("within", "contexts", "families")
+)
+"""Signatures of one method's runs on one task, of one goal in two contexts, and of tasks that
+differ in one goal."""
+REGISTER = {signature.name: signature for signature in (*WITHIN, *CONTEXTS, *FAMILIES)}
+"""All signatures by name."""
+
+
+def where(place: Row) -> str:
+    """A place in words: ``goal 1, right hand, against descending, of at most 141``."""
+    goal, hand, hands, against, moving, joint, neutral, longest = {**PLACE, **place}.values()
+    parts = [] if goal is None else [f"goal {goal}"]
+    if moving is not None:
+        kind = "anticipatory" if goal is None or goal < moving else "carry-over"
+        parts.append(f"{kind} of goal {moving}")
+    parts += [f"{hand} hand"] if hand else []
+    parts += [hands] if hands else []
+    parts += [f"against {against}"] if against else []
+    parts += [joint if moving is not None else joint.replace("_", " ")] if joint else []
+    parts += [] if neutral is None else [f"neutral at {neutral:.3f}"]
+    parts += [] if longest is None else [f"of at most {longest}"]
+    return ", ".join(parts)
+
+
+def row(signature: str, place: Row, **values: Any) -> Row:
+    """A value of a signature at a place, in its unit; ``values`` by :data:`COLUMNS`."""
+    names = {"signature": signature, "where": where(place), "unit": REGISTER[signature].unit}
+    return {**COLUMNS, **names, **values, **PLACE, **place}
+
+
+def estimated(signature: str, place: Row, interval: Interval, n: int, **values: Any) -> Row:
+    """The same of a value with its interval or test, over so many runs."""
+    why = "one run: no interval" if n == 1 else ""
+    return row(signature, place, **{"why_not": why, "n": n, **interval._asdict(), **values})
 
 
 def without(of: Iterable[Signature], why: str, place: Row | None = None, n: int = 0) -> Rows:
     """That none of them applies."""
     for signature in of:
-        yield signature.row(place, n=n, why_not=why, unit="")
+        yield row(signature.name, place or {}, n=n, why_not=why, unit="")

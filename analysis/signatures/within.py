@@ -1,16 +1,9 @@
-"""Signatures of one method on one task: means, shares and synergies over its runs.
-
-Most are functions of :class:`~.trajectories.Trajectories` that return a value for each run, shape
-``(runs,)``, or for each run and goal, shape ``(runs, goals)``; :func:`over_runs` makes them rows.
-Other measures yield rows themselves.
-"""
+"""Signatures of one method on one task: means, shares and synergies over its runs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from itertools import chain, groupby
-from operator import attrgetter
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -19,14 +12,14 @@ from numpy.typing import ArrayLike
 from coartic import Execution, Trajectory
 from coartic.analysis.signatures.manifold import jacobian_of, synergy
 from coartic.analysis.signatures.other_arm import preshaping, readiness, readiness_from_base, travel
-from coartic.analysis.signatures.paths import reversals_of, smoothness, turning_angles
+from coartic.analysis.signatures.paths import base_reversals, smoothness, turning_angles
 from coartic.analysis.signatures.rows import (
-    NO_INITIAL,
-    NO_RUN,
-    ONE_HAND,
+    REGISTER,
+    WITHIN,
     Row,
     Rows,
-    Signature,
+    estimated,
+    row,
     without,
 )
 from coartic.analysis.signatures.subtasks import excess, isolated_agreement, sacrifices
@@ -35,156 +28,114 @@ from coartic.analysis.trajectories import Trajectories, entropy, postures
 from coartic.robot import Array
 
 
-def measured_within(cell: Trajectories, signatures: Sequence[Signature]) -> Rows:
-    """Rows of all signatures of a cell; those with the same measure are measured together."""
-    for (measure, two_hands), group in groupby(signatures, attrgetter("measure", "two_hands")):
-        alike = list(group)
-        if not cell.runs:
-            yield from without(alike, NO_RUN)
-        elif two_hands and len(cell.task.hands) < 2:
-            yield from without(alike, ONE_HAND)
-        elif measure is not None:
-            yield from measure(cell, *alike)
-        else:
-            yield from chain.from_iterable(over_runs(cell, signature) for signature in alike)
-
-
-def over_runs(cell: Trajectories, signature: Signature) -> Rows:
-    """The mean over runs of a signature's values, or their share, by goal if it has goals."""
-    assert signature.of_runs is not None
-    values = signature.of_runs(cell)
-    if not len(values):
-        yield from without((signature,), NO_INITIAL)
+def measured_within(cell: Trajectories) -> Rows:
+    """Rows of all signatures of a cell, in the order of the register."""
+    runs = cell.runs
+    if not runs:
+        yield from without(WITHIN, "no run has a solution")
         return
-    columns = values.T if signature.by_goal else values[None]
-    for number, column in enumerate(columns, 1):
-        place = {"goal": number} if signature.by_goal else signature.place
-        if signature.share:
-            yield share_at(signature, place, column)
-        else:
-            yield mean_at(signature, place, column)
-
-
-def first_change(cell: Trajectories) -> Array:
-    """Ticks of the first subtask less the corrective process's with the same hands."""
-    return np.asarray(cell.against_same_hands[:, 0])
-
-
-def total_change(cell: Trajectories) -> Array:
-    """Ticks of the whole less the corrective process's with the same hands."""
-    return np.asarray(cell.against_same_hands.sum(axis=1))
-
-
-def sacrificed(cell: Trajectories) -> Array:
-    """Whether each run sacrifices the first subtask, against its own hands."""
-    return np.array([sacrifices(change) for change in cell.against_same_hands])
-
-
-def of_each_run(measure: Callable[[Trajectory], ArrayLike]) -> Callable[[Trajectories], Array]:
-    """The same for all runs of a cell."""
-    return lambda cell: np.array([measure(run) for run in cell.runs])
-
-
-def before_the_last_goal(
-    nearer: Callable[[Trajectory, Execution], Array],
-) -> Callable[[Trajectories], Array]:
-    """A measure against the initial solution at every goal but the last; no row without that."""
-
-    def values(cell: Trajectories) -> Array:
-        initial = cell.initial
-        if initial is None:
-            return np.empty((0, len(cell.task.goals) - 1))
-        return np.array([nearer(run, initial)[:-1] for run in cell.runs])
-
-    return values
-
-
-against_isolated_reach = of_each_run(excess)
-as_in_isolation = of_each_run(isolated_agreement)
-readiness_of_the_other_hand = before_the_last_goal(readiness)
-readiness_seen_from_the_base = before_the_last_goal(readiness_from_base)
-preshaping_of_the_other_arm = before_the_last_goal(preshaping)
-travel_of_the_other_arm = of_each_run(travel)
-turning = of_each_run(
-    lambda run: turning_angles(np.vstack([run.task.q0, run.execution.configurations]))
-)
-spectral_arc_lengths = of_each_run(lambda run: smoothness(run)[0])
-log_jerks = of_each_run(lambda run: smoothness(run)[1])
-
-
-def hand_entropy(cell: Trajectories, signature: Signature) -> Rows:
-    """Entropy of the hand sequences."""
-    counts = pd.Series(cell.sequences).value_counts()
-    yield signature.row(
-        {"hands": ", ".join(f"{hands} {count}" for hands, count in counts.items())},
-        value=entropy(cell.sequences),
-        n=len(cell.runs),
-        why_not="" if len(cell.runs) > 1 else "one run: no distribution",
-    )
-
-
-def as_the_best_corrective(cell: Trajectories, signature: Signature) -> Rows:
-    """Share of runs with a hand sequence that is best by the corrective process alone."""
-    best = cell.best_hands
-    if best:
-        agrees = [hands in best for hands in cell.sequences]
-        yield share_at(signature, {"hands": ", ".join(best)}, agrees)
+    changes = cell.against_same_hands
+    yield from over_runs("first subtask against the same hands", changes[:, 0], {"goal": 1})
+    yield from over_runs("total against the same hands", changes.sum(axis=1))
+    yield from over_runs("first subtask sacrificed", list(map(sacrifices, changes)))
+    yield from over_runs("subtask against isolated reach", list(map(excess, runs)))
+    if len(cell.task.hands) > 1:
+        yield from with_two_hands(cell)
     else:
-        yield from without((signature,), "the folder's table of sequences has no reward")
-
-
-def base_reversals(cell: Trajectories, signature: Signature) -> Rows:
-    """Mean number of reversals of each base coordinate."""
-    reversals = [reversals_of(run) for run in cell.runs]
+        two_hands = (signature for signature in WITHIN if signature.two_hands)
+        yield from without(two_hands, "the task has one hand")
     for k, name in enumerate("xy"):
         place = {"joint": f"base_{name}"}
         if name in cell.task.locked_base:
-            yield from without((signature,), "the coordinate is locked", place)
+            yield from without([REGISTER["base reversals"]], "the coordinate is locked", place)
         else:
-            yield mean_at(signature, place, [run[k] for run in reversals])
+            reversals = [base_reversals(run.configurations[:, k]) for run in runs]
+            yield from over_runs("base reversals", reversals, place)
+    paths = [np.vstack([run.task.q0, run.execution.configurations]) for run in runs]
+    yield from over_runs("turning angle", list(map(turning_angles, paths)))
+    spectral, jerk = zip(*map(smoothness, runs), strict=True)
+    yield from over_runs("hand path SPARC", spectral, {"hand": "chosen"})
+    yield from over_runs("hand path log dimensionless jerk", jerk, {"hand": "chosen"})
+    yield from synergies(cell)
 
 
-def synergies(cell: Trajectories, *signatures: Signature) -> Rows:
+def with_two_hands(cell: Trajectories) -> Rows:
+    """Rows of the signatures of tasks with two hands."""
+    runs, sequences, best = cell.runs, cell.sequences, cell.best_hands
+    counts = pd.Series(sequences).value_counts()
+    tally = {"hands": ", ".join(f"{hands} {count}" for hands, count in counts.items())}
+    why = "" if len(runs) > 1 else "one run: no distribution"
+    yield row("hand entropy", tally, value=entropy(sequences), n=len(runs), why_not=why)
+    yield from over_runs("hand as in isolation", list(map(isolated_agreement, runs)))
+    signature = "hands as the best corrective ones"
+    if best:
+        agrees = [hands in best for hands in sequences]
+        yield from over_runs(signature, agrees, {"hands": ", ".join(best)})
+    else:
+        why = "the folder's table of sequences has no reward"
+        yield from without([REGISTER[signature]], why)
+
+    def nearer(measure: Callable[[Trajectory, Execution], Array]) -> list[Array]:
+        """Against the initial solution, at every goal but the last; empty without that."""
+        initial = cell.initial
+        return [] if initial is None else [measure(run, initial)[:-1] for run in runs]
+
+    yield from over_runs("readiness of the other hand", nearer(readiness))
+    yield from over_runs("readiness seen from the base", nearer(readiness_from_base))
+    yield from over_runs("preshaping of the other arm", nearer(preshaping))
+    yield from over_runs("travel of the other arm", list(map(travel, runs)))
+
+
+def over_runs(signature: str, values: ArrayLike, place: Row | None = None) -> Rows:
+    """The mean of a value of each run, or their share, by goal if the signature has goals.
+
+    ``values`` has shape ``(runs,)``, or ``(runs, goals)``; none where there is no initial solution.
+    """
+    of_runs, kind = np.asarray(values), REGISTER[signature]
+    if not len(of_runs):
+        why = "the corrective process alone does not complete the task"
+        yield from without([kind], why)
+    elif kind.by_goal:
+        for goal, of_goal in enumerate(of_runs.T, 1):
+            yield over_some(signature, of_goal, {"goal": goal})
+    else:
+        yield over_some(signature, of_runs, place or {})
+
+
+def over_some(signature: str, values: Array, place: Row) -> Row:
+    """A mean over the runs that have a value with Student's interval, a share with Wilson's."""
+    if REGISTER[signature].share:
+        count, total = int(values.sum()), len(values)
+        share = wilson(count, total) if total > 1 else Interval(count / total)
+        return estimated(signature, place, share, total)
+    finite = values[np.isfinite(values)].astype(np.float64)
+    if not len(finite):
+        return row(signature, place, why_not=REGISTER[signature].missing)
+    return estimated(signature, place, student_mean(finite), len(finite))
+
+
+def synergies(cell: Trajectories) -> Rows:
     """Variance over runs by what it does to the hand, over runs with the commonest hands.
 
     Within the uncontrolled manifold, across it, their ratio ΔV, and its transform z.
     """
-    *parts, z = signatures
     runs, n = cell.typical, len(cell.typical)
+    names = "V_ucm", "V_ort", "ΔV", "ΔV z"
     if n < 2:
-        why = "one run: no variance across runs" if runs else NO_RUN
-        yield from without(signatures, why, n=n)
+        why = "one run: no variance across runs"
+        yield from without([REGISTER[name] for name in names], why, n=n)
         return
     for number in range(1, len(cell.task.goals) + 1):
         hand = runs[0].hands[number - 1]
         q = postures(runs, number)
         joints, jacobian = jacobian_of(cell.task, hand, q)
-        variance = synergy(q[:, joints], jacobian)
+        *variances, neutral, z = synergy(q[:, joints], jacobian)
         place: Row = {"goal": number, "hand": hand, "hands": runs[0].execution.hands}
-        why = "runs do not differ" if math.isnan(variance.z.value) else ""
-        for signature, value in zip(parts, variance[:3], strict=True):
-            yield signature.row(place, value=value, n=n, why_not=why)
+        why = "runs do not differ" if math.isnan(z.value) else ""
+        for name, value in zip(names[:3], variances, strict=True):
+            yield row(name, place, value=value, n=n, why_not=why)
         if not why:
-            place["neutral"] = variance.neutral
-            if math.isnan(variance.z.p):
+            place["neutral"] = neutral
+            if math.isnan(z.p):
                 why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield z.estimated(place, variance.z, n, why_not=why)
-
-
-def mean_at(signature: Signature, place: Row, values: ArrayLike) -> Row:
-    """Mean over the runs that have a value, with Student's interval.
-
-    The signature's ``missing`` says why a run may have none.
-    """
-    of_runs = np.asarray(values, dtype=np.float64)
-    finite = of_runs[np.isfinite(of_runs)]
-    if not len(finite):
-        return signature.row(place, why_not=signature.missing)
-    return signature.estimated(place, student_mean(finite), len(finite))
-
-
-def share_at(signature: Signature, place: Row, agrees: Sequence[bool]) -> Row:
-    """Share of runs, with Wilson's interval."""
-    count, total = sum(agrees), len(agrees)
-    share = wilson(count, total) if total > 1 else Interval(count / total)
-    return signature.estimated(place, share, total)
+        yield estimated("ΔV z", place, z, n, why_not=why)

@@ -75,6 +75,14 @@ class Interval(NamedTuple):
     p: float = math.nan
 
 
+def interval(name: str, of: Inference | Interval | None) -> dict[str, float]:
+    """An estimate with its interval, as three columns of a table; nothing where there is none."""
+    if of is None:
+        return {}
+    estimate = of.value if isinstance(of, Interval) else of.estimate
+    return {name: estimate, f"{name}_low": of.low, f"{name}_high": of.high}
+
+
 def sample(values: ArrayLike) -> Array:
     """Values as a vector. Raises ValueError where it is empty or holds NaN or infinity.
 

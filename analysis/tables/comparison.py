@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -163,18 +163,15 @@ def learning_curves(study: Study) -> pd.DataFrame:
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
     ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
     """
-    lengths = {run: len(rewards) for run, rewards in study.rewards()}
-    curves = [
-        LearningCurve(task, label, runs, min(lengths[run] for run in runs))
-        for task, label in drawn_curves(study)
-        if (runs := [str(r) for r in study.cells[task, label].good.run_id if str(r) in lengths])
-    ]
-    curve_of = {run: curve for curve in curves for run in curve.runs}
-    for run, rewards in study.rewards():
-        if run in curve_of:
-            curve_of[run].add(rewards)
-    return pd.concat([curve.table() for curve in curves], ignore_index=True) if curves else (
-        pd.DataFrame())  # fmt: skip
+    trials_of = dict(study.rewards())
+    curves = [pd.DataFrame()]
+    for task, label in drawn_curves(study):
+        ids = map(str, study.cells[task, label].good.run_id)
+        runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
+        if runs:
+            named = {"task": task, "method": label, "runs": len(runs)}
+            curves.append(pd.DataFrame(named | learning_curve(runs)))
+    return pd.concat(curves[1:] or curves, ignore_index=True)
 
 
 def drawn_curves(study: Study) -> Iterator[tuple[str, str]]:
@@ -185,42 +182,21 @@ def drawn_curves(study: Study) -> Iterator[tuple[str, str]]:
         yield from ((task, label) for label in labels if not (two_armed and label == EC1))
 
 
-class LearningCurve:
-    """Both curves of a method at chosen trials, made run by run: all rewards are large."""
-
-    def __init__(self, task: str, label: str, runs: list[str], length: int) -> None:
-        self.task, self.label, self.runs = task, label, runs
-        self.at = np.unique(np.round(np.geomspace(1, length, _POINTS)).astype(np.int64))
-        self.best: list[Array] = []
-        self.sums, self.counts = np.zeros(length), np.zeros(length)
-
-    def add(self, rewards: Array) -> None:
-        """One more run, by the reward of each of its trials (n,), NaN where it failed."""
-        rewards = rewards[: len(self.sums)]
-        # Until every run has a solution (NaN before) there is no mean of them.
-        self.best.append(np.fmax.accumulate(rewards)[self.at - 1])
-        self.sums += np.nan_to_num(rewards)
-        self.counts += ~np.isnan(rewards)
-
-    def table(self) -> pd.DataFrame:
-        """A row for each of the chosen trials."""
-        low, high = np.quantile(self.best, [0.25, 0.75], axis=0)
-        sums, counts = (
-            pd.Series(values).rolling(WINDOW, min_periods=1).sum()
-            for values in (self.sums, self.counts)
-        )
-        return pd.DataFrame(
-            {
-                "task": self.task,
-                "method": self.label,
-                "runs": len(self.runs),
-                "trial": self.at,
-                "best": np.mean(self.best, axis=0),
-                "best_low": low,
-                "best_high": high,
-                "trials": (sums / counts).to_numpy()[self.at - 1],
-            }
-        )
+def learning_curve(runs: Sequence[Array]) -> dict[str, Array]:
+    """Both curves at chosen trials, from the reward of every trial of runs, NaN where it failed."""
+    length = min(map(len, runs))
+    rewards = np.array([run[:length] for run in runs])
+    at = np.unique(np.round(np.geomspace(1, length, _POINTS)).astype(np.int64))
+    # Until every run has a solution (NaN before) there is no mean of them.
+    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+    low, high = np.quantile(best, [0.25, 0.75], axis=0)
+    sums, counts = (
+        pd.Series(values).rolling(WINDOW, min_periods=1).sum()
+        for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
+    )
+    trials = (sums / counts).to_numpy()[at - 1]
+    mean = best.mean(axis=0)
+    return {"trial": at, "best": mean, "best_low": low, "best_high": high, "trials": trials}
 
 
 @table(

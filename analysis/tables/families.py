@@ -4,26 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from coartic.analysis.generality.exploration import CONTRASTS, contrasts, gains
 from coartic.analysis.generality.presence import presence
-from coartic.analysis.generality.sample import Sample, sample
-from coartic.analysis.methods import INITIAL, is_variant, most_exploring, name_of
-from coartic.analysis.statistics.instances import Scores, other_tasks, value
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.methods import INITIAL, is_variant, name_of
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.estimates import interval
+from coartic.analysis.statistics.instances import other_tasks, value
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, interval, runs_of, table
-
-_SIGNS = {
-    "hand": "share of goals hit with the slower hand for them",
-    "arm": "ticks by which the next goal is nearer",
-    "other arm": "share of its way that the waiting hand makes",
-    "first": "ticks by which the first movement is slower",
-    "whole": "ticks by which the whole task is faster",
-}
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
 
 
 @table(
@@ -42,7 +35,7 @@ def family_gaps(study: Study) -> Rows:
     ]
     rows: list[tuple[str, Row]] = []
     for label in ("learner", *(name for name in instances.labels if not is_variant(name))):
-        scores, bounded = (family_scores(instances, label, to_bound=to) for to in (False, True))
+        scores, bounded = (instances.gaps(label, to_bound=to) for to in (False, True))
         if not scores:
             continue
         row: Row = {"method": label, "instances": sum(map(len, scores.values())), "gap": math.nan}
@@ -56,24 +49,10 @@ def family_gaps(study: Study) -> Rows:
         cells = [
             cell
             for (task, name), cell in study.cells.items()
-            if task in instances.tasks and name == label_on(instances, label, task)
+            if task in instances.tasks and name == instances.label_on(task, label)
         ]
         rows.append((label, row | runs_of(*cells)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
-
-
-def label_on(instances: Sample, label: str, task: str) -> str:
-    """Label on an instance: of the learner the condition that explores most."""
-    return most_exploring(instances.tasks[task]) if label == "learner" else label
-
-
-def family_scores(instances: Sample, label: str, *, to_bound: bool) -> Scores:
-    """Gaps of a method, or of the learner, by family."""
-    scores: dict[str, Any] = {}
-    for family, names in instances.families.items():
-        on_family = label_on(instances, label, names[0])
-        scores |= instances.gaps(on_family, families=[family], to_bound=to_bound)
-    return scores
 
 
 def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
@@ -127,7 +106,7 @@ def family_signs(study: Study) -> Rows:
     instances = sample(study)
     for sign in presence(instances) if instances else ():
         row: Row = {
-            "sign": _SIGNS[sign.sign],
+            "sign": SIGNS[sign.sign].in_short,
             "method": sign.label,
             "family": sign.family or "all",
             "instances": sign.instances,
@@ -173,7 +152,7 @@ def instance_gains(study: Study) -> pd.DataFrame:
         assert instances is not None
         names = instances.shared(first, second) if second != INITIAL else {}
         for family, scores in gains(instances, first, second, names).items():
-            row = {"method": f"{name_of(first)} over {name_of(second)}", "family": family}
+            row: Row = {"method": f"{name_of(first)} over {name_of(second)}", "family": family}
             row |= interval("mean", other_tasks({family: scores}))
             rows += [
                 {**row, "task": name, "gain": value(runs)}

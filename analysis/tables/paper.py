@@ -7,16 +7,23 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.claims.judge import claims_table
-from coartic.analysis.comparisons.paper import paper_rows, published_of, sequence_rows
+from coartic.analysis.claims.ensemble import held_in_words
+from coartic.analysis.claims.judge import judged, test_in_words
+from coartic.analysis.comparisons.paper import PaperRow, paper_rows, published_of, sequence_rows
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import RUNS, Summary, published_cell, published_initial
 from coartic.analysis.statistics.equivalence import MARGIN
-from coartic.analysis.statistics.estimates import Interval, mean, standard_deviation, student
+from coartic.analysis.statistics.estimates import (
+    Interval,
+    interval,
+    mean,
+    standard_deviation,
+    student,
+)
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, interval, runs_of, table
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
 from coartic.analysis.trajectories import initial_solution
 from coartic.analysis.words import marked
 
@@ -79,7 +86,7 @@ def published(study: Study) -> Rows:
         values: Row = {
             "task": marked(study.tasks[task].label, study.tasks[task]),
             "condition": condition,
-            **printed_mean(row.paper.summary),
+            **printed_mean(row.published),
             "published_initial": getattr(published_initial(task), "reward", None),
             **our_mean(row.rewards),
             "ours_initial": row.cell.good.initial_reward.dropna().mean(),
@@ -143,10 +150,22 @@ def our_mean(rewards: Any) -> Row:
 )
 def claims(study: Study) -> Rows:
     """The paper's claims with their verdicts."""
-    for row in claims_table(study).to_dict("records"):
-        dagger = " †" if row["fitted"] else ""
-        words = {"statement": row["statement"] + dagger, "run_ids": row["runs"]}
-        yield row["id"], {str(name): value for name, value in row.items()} | words
+    for entry in judged(study):
+        claim = entry.claim
+        row: Row = {
+            "statement": claim.statement + " †" * claim.fitted,
+            "verdict": entry.verdict,
+            "evidence": entry.finding.evidence,
+            "test": test_in_words(claim),
+            "p_holm": entry.adjusted_p,
+            "opposite_p_holm": entry.adjusted_opposite_p,
+            "ensemble": held_in_words(claim.id) if claim.fitted else "",
+            "place": claim.place,
+            "quote": claim.quote,
+            "section": claim.section,
+            "run_ids": " ".join(entry.run_ids),
+        }
+        yield claim.id, row
 
 
 @cached
@@ -198,11 +217,7 @@ def printed_interval(summary: Summary | None) -> Row:
         mean_of = Interval(math.nan if summary is None else summary.mean)
     else:
         mean_of = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
-    return {
-        "published": mean_of.value,
-        "published_low": mean_of.low,
-        "published_high": mean_of.high,
-    }
+    return interval("published", mean_of)
 
 
 @cached
@@ -214,41 +229,35 @@ def published_differences(study: Study) -> pd.DataFrame:
     ``published_runs``, ``pooled`` (whether the printed mean is one over several hand sequences),
     ``margin``, ``difference[]``, ``verdict``.
     """
-    rows = []
+    shown: list[PaperRow] = []
+    parts = sequence_rows(study)
     for row in sorted(paper_rows(study), key=lambda row: CONDITIONS.index(row.cell.label)):
-        if not row.comparable or not len(row.rewards):
-            continue
-        parts: list[Any] = [("", row.paper.summary, row.paper.summary and row.paper.summary.runs,
-                             row.rewards, row.difference)]  # fmt: skip
-        if len(row.paper.sequences) > 1:
-            parts += [
-                (part.hands, part.published, part.published_runs, part.rewards, part.difference)
-                for part in sequence_rows(study)
-                if part.cell is row.cell
-            ]
-        rows += [
+        if row.comparable and len(row.rewards):
+            paper = published_of(row.cell)
+            several = paper is not None and len(paper.sequences) > 1
+            shown += [row, *(part for part in parts if several and part.cell is row.cell)]
+    order = list(study.tasks)
+    return pd.DataFrame(
+        [
             {
                 "task": row.cell.task,
                 "method": row.cell.label,
-                "hands": sequence,
-                "of_runs": len(row.rewards),
-                **our_mean(rewards),
-                **printed_mean(paper),
-                "published_runs": printed_runs,
-                "pooled": paper.derived,
-                "margin": MARGIN * abs(paper.mean),
-                **interval("difference", difference),
-                "verdict": difference.verdict
-                if difference and not math.isnan(difference.low)
+                "hands": row.hands,
+                "of_runs": len(row.cell.good),
+                **our_mean(row.rewards),
+                **printed_mean(row.published),
+                "published_runs": row.published_runs,
+                "pooled": row.published.derived,
+                "margin": MARGIN * abs(row.published.mean),
+                **interval("difference", row.difference),
+                "verdict": row.difference.verdict
+                if row.difference and not math.isnan(row.difference.low)
                 else "",
             }
-            for sequence, paper, printed_runs, rewards, difference in parts
-            if paper is not None
+            for row in sorted(shown, key=lambda row: order.index(row.cell.task))
+            if row.published is not None
         ]
-    order = {name: place for place, name in enumerate(study.tasks)}
-    frame = pd.DataFrame(rows)
-    return frame.sort_values("task", key=lambda names: names.map(order), kind="stable",
-                             ignore_index=True) if rows else frame  # fmt: skip
+    )
 
 
 @cached

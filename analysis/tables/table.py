@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from coartic.analysis.cells import CellRuns
-from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.study import Study, cached
 from coartic.errors import CoarticError
 
@@ -55,7 +54,6 @@ def table(
     columns that begin so. ``words`` say how columns are shown that no other table has. Every
     table ends with the ids of the runs behind each row.
     """
-    COLUMNS.update(words)
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
         @cached
@@ -66,6 +64,12 @@ def table(
         name = rows.__name__.replace("_", "-")
         if name in TABLES:
             raise CoarticError(f"there are two tables {name!r}; the second is in {rows.__module__}")
+        for column in words.keys() & COLUMNS.keys():
+            raise CoarticError(
+                f"table {name!r} and an earlier one both say how column {column!r} is shown; "
+                "let one of them say it, or give one of the columns another name"
+            )
+        COLUMNS.update(words)
         TABLES[name] = frame
         return frame
 
@@ -87,13 +91,6 @@ def frame_of(rows: Iterable[tuple[str, Row]], columns: str) -> pd.DataFrame:
         else:
             names.append(column)
     return frame.reindex(columns=names).rename_axis("row")
-
-
-def interval(name: str, estimate: Inference | None) -> Row:
-    """An estimate with its interval, as three columns; nothing where there is none."""
-    if estimate is None:
-        return {}
-    return {name: estimate.estimate, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
 
 
 def runs_of(*cells: CellRuns) -> Row:
