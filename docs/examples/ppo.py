@@ -9,7 +9,7 @@ class Setting(AgentParameters):
     learning_rate: float = 3e-3
     log_std_init: float = -2.0
     steps: int = 16
-    epochs: int = 10
+    epochs: int = 5
 
 
 class PPOAgent(Agent):
