@@ -96,7 +96,9 @@ class Objective:
         """The hand sequence."""
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
-        self.x0: Array = alone.reached[best, self.joints]
+        self.postures: Array = alone.reached[best]
+        """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
+        self.x0: Array = self.postures[self.joints]
         """A point to begin with: where the corrective process hits the goals, shape ``(dim,)``."""
         self.dim = len(self.x0)
         """Number of parameters."""

@@ -36,6 +36,7 @@ nb_merge_streams = True
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autodoc_preserve_defaults = True
+autodoc_mock_imports = ["stable_baselines3", "torch"]  # of the extra coartic[rl]
 python_use_unqualified_type_names = True
 toc_object_entries = False
 # Names in signatures are short, and two packages may have one: the link goes to the first.

@@ -157,7 +157,13 @@ def test_one_kinematic_module():
 def test_no_module_is_imported_but_undeclared():
     """Every third-party import is a declared dependency."""
     declared = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    aliases = {"pydantic_core": "pydantic", "llvmlite": "numba", "click": "typer", "PIL": "pillow"}
+    aliases = {
+        "pydantic_core": "pydantic",
+        "llvmlite": "numba",
+        "click": "typer",
+        "PIL": "pillow",
+        "stable_baselines3": "stable-baselines3",
+    }
     for path in sources():
         for name in imported(path):
             root = name.split(".")[0]
@@ -169,8 +175,9 @@ def test_no_module_is_imported_but_undeclared():
 def everything():
     package = importlib.import_module("coartic")
     left_out = {"coartic.__main__"}
-    if importlib.util.find_spec("gymnasium") is None:  # which comes with an extra
-        left_out.add("coartic.gym")
+    for module, library in (("gym", "gymnasium"), ("agents", "stable_baselines3")):
+        if importlib.util.find_spec(library) is None:  # which comes with an extra
+            left_out.add(f"coartic.{module}")
     for module in pkgutil.walk_packages(package.__path__, "coartic."):
         if module.name not in left_out:
             importlib.import_module(module.name)

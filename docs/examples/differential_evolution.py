@@ -1,0 +1,23 @@
+"""Differential evolution of scipy."""
+
+from scipy.optimize import differential_evolution
+
+from coartic import Optimiser
+
+
+class DifferentialEvolution(Optimiser):
+    name = "differential-evolution"
+    title = "Differential evolution (scipy)"
+    citation = "R. Storn, K. Price (1997). Journal of Global Optimization 11."
+
+    def optimise(self, objective, rng):
+        differential_evolution(
+            objective,
+            objective.bounds,
+            x0=objective.x0,
+            rng=rng,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            maxiter=10**6,
+        )
