@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from fnmatch import fnmatch
 
 import numpy as np
 import pandas as pd
@@ -44,8 +45,9 @@ def results(tmp_path_factory):
 
 def test_every_method_runs_in_some_suite():
     suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon"))
-    blocks = [block for suite in suites for block in suite.cells]
-    assert {name for block in blocks for name in block.methods_among(())} == set(KNOWN)
+    patterns = {pattern for suite in suites for block in suite.cells for pattern in block.methods}
+    run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
+    assert run == set(KNOWN)
 
 
 def test_suite_ablations_frees_the_base():

@@ -143,7 +143,7 @@ def test_a_page_stands_alone(report):
         svg = ElementTree.fromstring(drawn)
         assert svg.get("viewBox")
         assert svg.get("aria-label")
-        assert "#000000" not in figure
+        assert "#000000" not in drawn
     assert len(re.findall(r"<section\b", text)) <= 12
     assert len(text) < 1_500_000
 
