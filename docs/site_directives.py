@@ -209,6 +209,9 @@ def claims() -> Iterator[str]:
             return "used to choose the goals"
         return "reconstructed †" if claim.fitted else "printed"
 
+    def source(claim: Any) -> str:
+        return f"{claim.place}: “{claim.quote}”" if claim.place else "nothing: it is our claim"
+
     def rule(claim: Any) -> str:
         text = test_in_words(claim)
         what = [", ".join(claim.compared)] if claim.compared else []
@@ -218,7 +221,7 @@ def claims() -> Iterator[str]:
         return text[0].upper() + text[1:] + "." + (f" *{'; '.join(what)}.*" if what else "")
 
     rows = (
-        (f"[{c.statement}]{{#{c.id}}} <br>`{c.id}`", goals(c), f"{c.place}: “{c.quote}”", rule(c))
+        (f"[{c.statement}]{{#{c.id}}} <br>`{c.id}`", goals(c), source(c), rule(c))
         for c in CLAIMS.values()
     )
     yield from table(("claim", "goals", "the paper says", "how it is judged"), rows)

@@ -23,6 +23,7 @@ from coartic.analysis.claims.register import (
     Claim,
     Finding,
     claim_of,
+    side,
 )
 from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
@@ -765,7 +766,10 @@ def test_every_sentence_is_accounted_for():
         assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
         assert set(each.get("claims", ())) <= set(CLAIMS), each["quote"]
     accounted = {name for each in sentences for name in each.get("claims", ())}
-    assert not set(CLAIMS) - accounted
+    lacking = {claim.id for claim in CLAIMS.values() if claim.place} - accounted
+    assert not lacking, f"in no sentence of sentences.toml: {lacking}"
+    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(sentences))
+    assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
 
 
 def test_margins_have_a_reason():
@@ -774,6 +778,15 @@ def test_margins_have_a_reason():
     assert MARGINS["ticks"] == ROUNDING
     for claim in CLAIMS.values():
         assert "{" not in judge.test_in_words(claim)
+
+
+def test_a_claim_that_is_not_the_papers_is_corrected_apart(monkeypatch):
+    paper, decide = planted(True, 0.03)
+    ours = paper.model_copy(update={"place": "", "quote": ""})
+    first, second = judge_planted(monkeypatch, (paper, decide), (ours, decide))
+    assert [entry.claim.group for entry in (first, second)] == ["paper", "ours"]
+    assert first.adjusted_p == second.adjusted_p == pytest.approx(0.03)
+    assert side("receding-horizon").who == "receding-horizon"
 
 
 def test_what_goals_were_admitted_by_has_no_count_over_them():

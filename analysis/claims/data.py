@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.claims.register import Side
+from coartic.analysis.claims.register import Side, is_method
 from coartic.analysis.generality.presence import signs
 from coartic.analysis.methods import LEARNER, most_exploring
 from coartic.analysis.published import TRIALS
@@ -40,7 +40,7 @@ class Data:
         """Label of a method: ``EC4`` is the learner's, ``EC`` its that explores most on a task."""
         if who == "EC":
             return most_exploring(self.task(task))
-        return who if "/" in who else LEARNER + who
+        return who if is_method(who) else LEARNER + who
 
     def runs(self, task: str, who: str, hands: str = "") -> pd.DataFrame:
         """Solved runs of a method, of ``hands`` only those that learned that sequence.

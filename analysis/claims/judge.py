@@ -10,9 +10,9 @@
 - *Undecided*: none of these, or the folder lacks the runs.
 
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
-groups of claims: those on the paper's own seven cells, those that take other runs beside them, and
-those on families of random tasks. A claim that a folder cannot test counts in its group all the
-same, so that what is decided stays decided whatever else is run.
+groups of claims: those on the paper's own seven cells, those that take other runs beside them,
+those on families of random tasks, and those that are not the paper's. A claim that a folder cannot
+test counts in its group all the same, so that what is decided stays decided whatever else is run.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
-from coartic.analysis.methods import name_of
+from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import read_beside
@@ -22,9 +22,9 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
-Group = Literal["paper", "beside", "families"]
-"""Which claims are corrected together: on the paper's cells, with runs beside them, on families of
-random tasks."""
+Group = Literal["paper", "beside", "families", "ours"]
+"""Which claims are corrected together: the paper's on its own cells, with runs beside them, on
+families of random tasks; and claims that are not the paper's."""
 
 _HANDS = "[LR]+"
 QUANTITIES = {
@@ -37,7 +37,9 @@ QUANTITIES = {
 } | {name.replace(" ", "-"): sign.words for name, sign in SIGNS.items()}
 """What is measured of runs beside their reward, by its name in comparisons."""
 _WHAT = "|".join(QUANTITIES)
-_SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>EC\S*|initial|best|\S+/.+?)(?: (?P<hands>{_HANDS}))?"
+_METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
+_WHO = rf"EC\S*|initial|best|\S+/.+?|{_METHODS}"
+_SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>{_WHO})(?: (?P<hands>{_HANDS}))?"
 _SHOWN = re.sub(r"\?P<\w+>", "?:", _SIDE)
 _NUMBER = r"-?\d+(\.\d+)?"
 _PAIR = rf"{_SHOWN} > ({_SHOWN}|{_NUMBER})( by ({'|'.join(MARGINS)}))?"
@@ -56,7 +58,11 @@ def written_as(pattern: str, words: str) -> AfterValidator:
 
 Shown = Annotated[
     str,
-    written_as(_SHOWN, "should be a SIDE, such as 'EC4', 'EC2 RRLR', 'replay EC1' or 'initial'"),
+    written_as(
+        _SHOWN,
+        "should be a SIDE, such as 'EC4', 'EC2 RRLR', 'replay EC1', 'initial' or the id of a "
+        "built-in method",
+    ),
 ]
 """What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
 Pair = Annotated[
@@ -64,7 +70,8 @@ Pair = Annotated[
     written_as(
         rf"{_PAIR}|{_HANDS} > ({_HANDS}|others)",
         "should be 'SIDE > SIDE' or 'SIDE > NUMBER', with 'by MARGIN' if it has a margin. A side "
-        "is such as 'EC4', 'EC2 RRLR', 'replay EC1' or 'initial'; margins are "
+        "is such as 'EC4', 'EC2 RRLR', 'replay EC1', 'initial' or the id of a built-in method; "
+        "margins are "
         f"{', '.join(MARGINS)}",
     ),
 ]
@@ -93,8 +100,13 @@ class Side(NamedTuple):
     """Only the runs that learned this sequence, where it is named."""
 
     def __str__(self) -> str:
-        who = name_of(self.who) if "/" in self.who else self.who
+        who = name_of(self.who) if is_method(self.who) else self.who
         return " ".join(filter(None, ("replay of" * (self.what == "replay"), who, self.hands)))
+
+
+def is_method(who: str) -> bool:
+    """Whether one side of a comparison is a method by its id or label."""
+    return "/" in who or who in KNOWN_METHODS
 
 
 def side(text: str) -> Side:
@@ -126,7 +138,7 @@ class Finding:
 
 
 class Claim(BaseModel):
-    """One statement of the paper and how it is decided."""
+    """One statement, of the paper where it has a place, and how it is decided."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -154,6 +166,8 @@ class Claim(BaseModel):
         """Which claims it is corrected with; None for what is counted exactly."""
         if self.exact:
             return None
+        if not self.place:
+            return "ours"
         if self.families:
             return "families"
         return "beside" if self.beside else "paper"

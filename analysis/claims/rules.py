@@ -161,7 +161,9 @@ def count_runs(data: Data, task: str, how: str, condition: str, what: str) -> Fi
     limit = f"at least {limits.low:.0%}" if how != "not most" else f"at most {limits.high:.0%}"
     test, against = (share_test(count, total, bound, tail) for tail in sides_of_test)
     holds = share < bound if how == "not most" else share > bound
-    return Finding(holds, f"{words}, {limit} of all (95 %)", (test,), (against,))
+    if limits.low > 0 or limits.high < 1:
+        words += f", {limit} of all (95 %)"
+    return Finding(holds, words, (test,), (against,))
 
 
 def runs_that(data: Data, task: str, condition: str, what: str) -> NDArray[np.bool_]:

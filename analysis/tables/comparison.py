@@ -42,7 +42,7 @@ _STEPS = 150  # of a price curve, at most
 
 @table(
     "method, knows, gap[], on *, runs",
-    knows=Column("methods"),
+    knows=Column("use of the reward"),
     gap=Column("gap (%)", 1, percent=True),
 )
 def ranking(study: Study) -> Rows:

@@ -139,7 +139,7 @@ def our_mean(rewards: Any) -> Row:
 
 @table(
     "statement, verdict, evidence, test, p_holm, opposite_p_holm, ensemble, place, quote, section",
-    statement=Column("the paper's claim"),
+    statement=Column("claim"),
     evidence=Column(page=False),
     test=Column(page=False),
     opposite_p_holm=Column("p of the opposite", p=True, page=False),
@@ -149,7 +149,7 @@ def our_mean(rewards: Any) -> Row:
     section=Column(page=False),
 )
 def claims(study: Study) -> Rows:
-    """The paper's claims with their verdicts."""
+    """Claims with their verdicts: the paper's, and others, which say so."""
     for entry in judged(study):
         claim = entry.claim
         row: Row = {
@@ -160,7 +160,7 @@ def claims(study: Study) -> Rows:
             "p_holm": entry.adjusted_p,
             "opposite_p_holm": entry.adjusted_opposite_p,
             "ensemble": held_in_words(claim.id) if claim.fitted else "",
-            "place": claim.place,
+            "place": claim.place or "not the paper's",
             "quote": claim.quote,
             "section": claim.section,
             "run_ids": " ".join(entry.run_ids),

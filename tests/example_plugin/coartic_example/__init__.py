@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from coartic.method import Information, Method, Parameters, Result, Session
+from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.solution import Movement
 
 
@@ -34,6 +34,9 @@ class NearestHand(Method):
                 if previous is not None and hand != previous:
                     misses[hand] += self.parameters.reluctance
             previous = min(misses, key=misses.get)
-            q = session.correct(q, previous, number).q
+            correction = session.correct(q, previous, number)
+            if not correction.converged:
+                raise MethodError("infeasible", f"no posture was found for goal {number}")
+            q = correction.q
             movements.append(Movement(number, previous, "planned", q))
         return Result(tuple(movements))
