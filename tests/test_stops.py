@@ -133,5 +133,5 @@ def test_without_a_stop_its_places_do_not_matter(cost):
 
 
 def test_stops_have_words(cost):
-    words = name_of(f"trajectory-optimisation/{cost} stop=1.0, stop_every=2")
-    assert words == f"minimum-{cost} plan (stop 1.0, goals per stop 2)"
+    words = name_of(f"trajectory-optimisation/{cost} stop=1, stop_every=2")
+    assert words == f"minimum-{cost} plan (stop 1, goals per stop 2)"
