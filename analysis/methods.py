@@ -63,6 +63,8 @@ _PARAMETERS = {
     "epsilon=": "ε ",
     "hands=": "hands ",
     "timing=fixed": "fixed times",
+    "stop=": "stop ",
+    "stop_every=": "goals per stop ",
 }
 _VARIANT = re.compile(r"=|\bEC\d-")
 

@@ -32,6 +32,7 @@ from coartic.motion.movement import follow
 from coartic.robot import Array, Hand
 from coartic.tasks.task import hands_of, letters_of
 
+_REST = 1e-6  # rates below this are none: IPOPT fixes a variable whose bounds are equal
 SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
 
 
@@ -68,10 +69,19 @@ class PathLengthParameters(TrajectoryParameters):
 
 
 class SmoothParameters(TrajectoryParameters):
-    """As above, and the timing."""
+    """As above, the timing, and the stops."""
 
     timing: Literal["free", "fixed"] = "free"
     """Times at which the goals are hit: free at a constant total, or equal intervals."""
+    stop: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """From passing through a goal (0) to a full stop at it (1): velocities there, for jerk
+    accelerations too, are at most 1 - ``stop`` of what they are in the cheapest plan of the
+    same hands that passes through, joint by joint. The model is kinematic. Its plans have no
+    torques, inertia, delays, feedback or limit of speed, its score counts steps along the
+    path whatever their times, and it cannot say when a person stops, or why: a stop here is
+    given, and shows only what is left to a plan that makes it."""
+    stop_every: Annotated[int, Field(ge=1)] = 1
+    """The plan stops at each goal whose number is a multiple of this; it passes the others."""
 
 
 class TrajectoryOptimisation(Method):
@@ -136,21 +146,30 @@ class TrajectoryOptimisation(Method):
                 still=self.parameters.other_arm == "still",
                 radius=self.target_radius(session, task),
             )
-            converged = []
-            for start in starts:
-                plan = problem.solve(
-                    instance,
-                    start,
-                    free_times=getattr(self.parameters, "timing", "") == "free",
-                )
-                session.spend(**plan.spent)
-                if plan.converged:
-                    converged.append(plan)
-            if converged:
-                plans.append((instance, min(converged, key=lambda plan: plan.cost)))
+            plan = self.cheapest(session, problem, instance, starts)
+            if plan.converged:
+                plans.append((instance, plan))
             else:
                 failed[letters_of(hands)] = plan.reason
         return plans, failed
+
+    def cheapest(
+        self,
+        session: Session,
+        problem: TrajectoryProblem,
+        instance: Instance,
+        starts: list[Array],
+        **limits: Any,
+    ) -> Plan:
+        """The cheapest plan that starts lead to; where none converges the last one.
+
+        ``limits`` are those of :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
+        """
+        plans = [problem.solve(instance, start, **limits) for start in starts]
+        for plan in plans:
+            session.spend(**plan.spent)
+        converged = [plan for plan in plans if plan.converged]
+        return min(converged, key=lambda plan: plan.cost) if converged else plans[-1]
 
     def starts(
         self, session: Session, task: Task, only: tuple[Hand, ...] | None
@@ -249,6 +268,27 @@ class Smooth(TrajectoryOptimisation):
 
     Parameters = SmoothParameters
 
+    def cheapest(
+        self,
+        session: Session,
+        problem: TrajectoryProblem,
+        instance: Instance,
+        starts: list[Array],
+        **limits: Any,
+    ) -> Plan:
+        """The cheapest plan that passes the goals or, with stops, that one with its stops.
+
+        A plan with stops starts from the plan that passes and from every other start.
+        """
+        parameters: SmoothParameters = self.parameters
+        limits["free_times"] = parameters.timing == "free"
+        passing = super().cheapest(session, problem, instance, starts, **limits)
+        if not (parameters.stop and passing.converged):
+            return passing
+        limits["most_rates"] = with_stops(passing.rates, parameters.stop, parameters.stop_every)
+        starts = [passing.configurations, *starts]
+        return super().cheapest(session, problem, instance, starts, **limits)
+
     def movements_of(
         self,
         session: Session,
@@ -259,6 +299,17 @@ class Smooth(TrajectoryOptimisation):
     ) -> list[Movement]:
         """The movements of a plan; the session spends what they take."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
+
+
+def with_stops(rates: Array, stop: float, every: int) -> Array:
+    """Most of each rate, shape ``(derivatives, G + 1, dof)``, where a plan with ``rates`` stops.
+
+    At goals whose numbers are multiples of ``every`` 1 - ``stop`` of their size; elsewhere inf.
+    """
+    most = np.full_like(rates, np.inf)
+    slowed = (1.0 - stop) * np.abs(rates[:, every::every])
+    most[:, every::every] = np.where(slowed < _REST, 0.0, slowed)
+    return most
 
 
 def path_movements(

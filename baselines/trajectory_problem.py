@@ -174,6 +174,7 @@ class TrajectoryProblem:
         *,
         lengths: Array | None = None,
         free_times: bool = False,
+        most_rates: Array | None = None,
         deep: Sequence[int] | None = None,
     ) -> Plan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
@@ -181,13 +182,14 @@ class TrajectoryProblem:
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
-        segments' durations vary at a constant total (smoothness costs only). A solve that
-        fails is a plan that has not converged.
+        segments' durations vary at a constant total (smoothness costs only). No rate exceeds
+        ``most_rates``, shape as :attr:`Plan.rates`, in size. A solve that fails is a plan that
+        has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         step_bound = np.where(instance.held, 0.0, np.inf).ravel()
-        rate_bound = self.rate_bound(instance)
+        rate_bound = self.rate_bound(instance, most_rates)
         first_lengths, low, high = self.length_bounds(steps, lengths)
         times, shortest, longest = self.time_bounds(steps, free_times)
         rim = instance.radius - _RIM
@@ -215,12 +217,13 @@ class TrajectoryProblem:
         )
         return self.plan_from(instance, solution)
 
-    def rate_bound(self, instance: Instance) -> Array:
+    def rate_bound(self, instance: Instance, most_rates: Array | None) -> Array:
         """Most of every rate: 0 at rest (start and end) and for joints held on either side."""
         still = np.vstack([instance.held[:1] | True, instance.held])
         still[:-1] |= instance.held
         still[-1] = True
-        return np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
+        bound = np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
+        return bound if most_rates is None else np.minimum(bound, most_rates.ravel())
 
     def length_bounds(self, steps: Array, lengths: Array | None) -> tuple[Array, Array, Array]:
         """Lengths of the segments to start from, with their least and most."""
