@@ -38,13 +38,9 @@ def model_essences() -> dict[Path, str]:
 
 def imported_files(path: Path, root: Path) -> Iterator[Path]:
     """The files below ``root`` that a module imports."""
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if not isinstance(node, ast.Import | ast.ImportFrom):
-            continue
-        base, names = root, [alias.name for alias in node.names]
-        if isinstance(node, ast.ImportFrom):
-            base = path.parents[node.level - 1] if node.level else root
-            base, names = base.joinpath(*(node.module or "").split(".")), ["", *names]
+    for level, module, names in syntax(path.read_bytes())[1]:
+        base = path.parents[level - 1] if level else root
+        base = base.joinpath(*filter(None, module.split(".")))
         for name in names:
             place = base.joinpath(*filter(None, name.split(".")))
             yield from filter(Path.is_file, (place.with_suffix(".py"), place / "__init__.py"))
@@ -52,7 +48,19 @@ def imported_files(path: Path, root: Path) -> Iterator[Path]:
 
 def essence(path: Path) -> str:
     """What counts of a module: its syntax tree without docstrings."""
-    for node in ast.walk(tree := ast.parse(path.read_bytes())):
+    return syntax(path.read_bytes())[0]
+
+
+@cache
+def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
+    """Syntax tree of a module without docstrings, as a text; its imports: level, module, names."""
+    imports = []
+    for node in ast.walk(tree := ast.parse(content)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             node.value.value = None
-    return ast.dump(tree)
+        elif isinstance(node, ast.Import):
+            imports.append((0, "", tuple(alias.name for alias in node.names)))
+        elif isinstance(node, ast.ImportFrom):
+            names = ("", *(alias.name for alias in node.names))
+            imports.append((node.level, node.module or "", names))
+    return ast.dump(tree), tuple(imports)

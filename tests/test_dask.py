@@ -52,9 +52,10 @@ def test_a_cluster_without_workers(tmp_path):
 
 def test_a_scheduler_that_is_lost(tmp_path):
     """What was finished before is kept."""
-    with distributed.LocalCluster(
-        n_workers=1, processes=False, protocol="tcp://", **QUIET
-    ) as cluster:
+    import dask
+
+    cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), cluster:
 
         def watch(progress, what):
             if progress.done == 2:
