@@ -1,5 +1,7 @@
 """Plans that stop at goals, by finite differences and closed forms."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -24,8 +26,10 @@ TASK = Task(
 pytestmark = pytest.mark.parametrize("cost", ["acceleration", "jerk"])
 
 
-def planned(cost, task=TASK, **parameters):
-    """The plan of a task's initial hands, and the task."""
+@cache
+def planned(cost, name=TASK.name, **parameters):
+    """The plan of a task's initial hands."""
+    task = TASK if name == TASK.name else load_task(name)
     method = BY_COST[cost](BY_COST[cost].Parameters(**QUICK, **parameters))
     session = Session(task, 0, method.told, trusted=True)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
@@ -70,10 +74,10 @@ def test_stops_are_at_multiples_alone(cost):
 
 @pytest.mark.parametrize("timing", ["free", "fixed"])
 def test_more_of_a_stop_costs_more(cost, timing):
-    costs = [planned(cost, timing=timing, stop=stop).cost for stop in (0, 0.25, 0.5, 0.75, 1)]
+    costs = [planned(cost, timing=timing, stop=stop).cost for stop in (0.0, 0.25, 0.75, 1.0)]
     assert costs == sorted(costs)
     assert costs[-1] > 2 * costs[0]
-    fewer = [planned(cost, timing=timing, stop=1, stop_every=every).cost for every in (2, 5)]
+    fewer = [planned(cost, timing=timing, stop=1.0, stop_every=every).cost for every in (2, 5)]
     assert costs[0] == pytest.approx(fewer[1], rel=1e-6)
     assert costs[0] < fewer[0] < costs[-1]
 
@@ -109,9 +113,8 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost, timing):
 @pytest.mark.parametrize("name", ["ascending", "descending"])
 def test_full_stops_at_equal_times_are_the_plan_of_squared_changes(cost, name):
     """Nothing of smoothness is left: the same programme, solved as another one."""
-    task = load_task(name)
-    plan = planned(cost, task, timing="fixed", stop=1.0)
-    jordan = planned("squared-changes", task)
+    plan = planned(cost, name, timing="fixed", stop=1.0)
+    jordan = planned("squared-changes", name)
     assert plan.cost == pytest.approx(ONE_SEGMENT[cost][0] * jordan.cost, rel=1e-6)
     np.testing.assert_allclose(plan.configurations, jordan.configurations, atol=1e-3)
 
