@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -163,15 +164,22 @@ def begin_worker(
     printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
     os.dup2(printed, 1)
     os.dup2(printed, 2)
-    if sys.platform == "linux":
-        kill_with_parent = 1  # PR_SET_PDEATHSIG
-        ctypes.CDLL(None).prctl(kill_with_parent, signal.SIGKILL, 0, 0, 0)
+    threading.Thread(target=end_with_parent, daemon=True).start()
     bound_memory(workers)
     prepare(tasks)
     if foreign:
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
         os.chdir(tempfile.tempdir)
         confine(Path(folder))
+
+
+def end_with_parent() -> None:
+    """End this process, whatever it does, when the one that it works for has ended. The server
+    that it was forked from lives as long as any worker."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def bound_memory(workers: int) -> None:
