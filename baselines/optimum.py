@@ -20,6 +20,7 @@ from pydantic import Field
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.shortest_paths import (
+    TOLD,
     Start,
     chain_starts,
     check_ticks,
@@ -129,15 +130,7 @@ class DynamicProgramming(Optimum):
     name = "optimum/dynamic-programming"
     title = "Optimum: dynamic programming over postures and hands, polished"
     citation = CITATION
-    told = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.KINEMATIC_MODEL,
-            Information.REWARD_FORMULA,
-        }
-    )
+    told = TOLD
     Parameters = GraphParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 

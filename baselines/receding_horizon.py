@@ -38,6 +38,7 @@ from pydantic import Field
 
 from coartic import Movement, Task, execute
 from coartic.baselines.shortest_paths import (
+    TOLD,
     Hands,
     PlanInTicks,
     ShortestPlans,
@@ -49,7 +50,7 @@ from coartic.baselines.shortest_paths import (
 )
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.baselines.whole_ticks import movements
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.motion.costs import CostlyJoints, joint_costs, segment_lengths
 from coartic.robot import BASE_DOF, HANDS, Array
 from coartic.tasks.task import MOST_GOALS, hands_of
@@ -93,15 +94,7 @@ class RecedingHorizon(Method):
         "predictive control: stability and optimality. Automatica; C. E. Garcia, D. M. Prett, "
         "M. Morari (1989). Model predictive control: theory and practice. Automatica."
     )
-    told = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.KINEMATIC_MODEL,
-            Information.REWARD_FORMULA,
-        }
-    )
+    told = TOLD
     stochastic = False
     Parameters = RecedingHorizonParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}

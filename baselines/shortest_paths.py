@@ -17,9 +17,19 @@ from coartic import Execution, MotionModel, Movement, Task, execute
 from coartic.baselines.posture_graph import cheapest_chains, spread_out
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.method import MethodError, Session
+from coartic.method import Information, MethodError, Session
 from coartic.robot import Array, Hand
 
+TOLD = frozenset(
+    {
+        Information.GOALS,
+        Information.FORWARD_KINEMATICS,
+        Information.JACOBIAN,
+        Information.KINEMATIC_MODEL,
+        Information.REWARD_FORMULA,
+    }
+)
+"""What a method is told that starts from posture graphs and rounds to whole ticks."""
 Hands = tuple[Hand, ...]
 Start = tuple[Hands, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""

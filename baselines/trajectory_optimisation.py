@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import cheapest_chains, spread_out
+from coartic.baselines.shortest_paths import chain_starts
 from coartic.baselines.trajectory_problem import (
     Cost,
     Instance,
@@ -82,6 +82,29 @@ class SmoothParameters(TrajectoryParameters):
     given, and shows only what is left to a plan that makes it."""
     stop_every: Annotated[int, Field(ge=1)] = 1
     """The plan stops at each goal whose number is a multiple of this; it passes the others."""
+
+
+def cheapest_plan(
+    session: Session,
+    problem: TrajectoryProblem,
+    instance: Instance,
+    starts: list[Array],
+    *,
+    free_times: bool = False,
+    most_rates: Array | None = None,
+) -> Plan:
+    """The cheapest plan that starts lead to; where none converges the last one.
+
+    ``free_times`` and ``most_rates`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
+    """
+    plans = [
+        problem.solve(instance, start, free_times=free_times, most_rates=most_rates)
+        for start in starts
+    ]
+    for plan in plans:
+        session.spend(**plan.spent)
+    converged = [plan for plan in plans if plan.converged]
+    return min(converged, key=lambda plan: plan.cost) if converged else plans[-1]
 
 
 class TrajectoryOptimisation(Method):
@@ -159,17 +182,9 @@ class TrajectoryOptimisation(Method):
         problem: TrajectoryProblem,
         instance: Instance,
         starts: list[Array],
-        **limits: Any,
     ) -> Plan:
-        """The cheapest plan that starts lead to; where none converges the last one.
-
-        ``limits`` are those of :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
-        """
-        plans = [problem.solve(instance, start, **limits) for start in starts]
-        for plan in plans:
-            session.spend(**plan.spent)
-        converged = [plan for plan in plans if plan.converged]
-        return min(converged, key=lambda plan: plan.cost) if converged else plans[-1]
+        """The cheapest plan that starts lead to; where none converges the last one."""
+        return cheapest_plan(session, problem, instance, starts)
 
     def starts(
         self, session: Session, task: Task, only: tuple[Hand, ...] | None
@@ -182,7 +197,7 @@ class TrajectoryOptimisation(Method):
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(parameters.sampling_seed)
         starts: dict[tuple[Hand, ...], list[Array]] = {}
-        for chain in cheapest_chains(
+        for hands, configurations in chain_starts(
             session,
             task,
             rng,
@@ -190,12 +205,10 @@ class TrajectoryOptimisation(Method):
             graphs=parameters.graphs,
             chains=parameters.chains,
             most=parameters.most_sequences,
+            spread=parameters.other_arm == "free",
             only=only,
         ):
-            starts_of_hands = starts.setdefault(chain.hands, [])
-            starts_of_hands.append(chain.configurations)
-            if parameters.other_arm == "free" and len(task.hands) > 1:
-                starts_of_hands.append(spread_out(task, chain))
+            starts.setdefault(hands, []).append(configurations)
         for starts_of_hands in starts.values():
             first = starts_of_hands[0]
             for _ in range(parameters.noisy_starts):
@@ -274,20 +287,21 @@ class Smooth(TrajectoryOptimisation):
         problem: TrajectoryProblem,
         instance: Instance,
         starts: list[Array],
-        **limits: Any,
     ) -> Plan:
         """The cheapest plan that passes the goals or, with stops, that one with its stops.
 
         A plan with stops starts from the plan that passes and from every other start.
         """
         parameters: SmoothParameters = self.parameters
-        limits["free_times"] = parameters.timing == "free"
-        passing = super().cheapest(session, problem, instance, starts, **limits)
+        free = parameters.timing == "free"
+        passing = cheapest_plan(session, problem, instance, starts, free_times=free)
         if not (parameters.stop and passing.converged):
             return passing
-        limits["most_rates"] = with_stops(passing.rates, parameters.stop, parameters.stop_every)
+        most_rates = with_stops(passing.rates, parameters.stop, parameters.stop_every)
         starts = [passing.configurations, *starts]
-        return super().cheapest(session, problem, instance, starts, **limits)
+        return cheapest_plan(
+            session, problem, instance, starts, free_times=free, most_rates=most_rates
+        )
 
     def movements_of(
         self,

@@ -42,7 +42,7 @@ class AgentParameters(Parameters):
     """Whether the agent chooses hands, too. If not, the hand sequence is the one with which the
     corrective process alone does best."""
     sees_targets: bool = True
-    """Whether observations have the last target of each joint, which the agent itself chose."""
+    """Whether observations have the last action for each joint."""
 
 
 class SessionEnvs(VecEnv):
@@ -70,10 +70,8 @@ class SessionEnvs(VecEnv):
         self._postures = first.postures
         self._hands = np.array([HANDS.index(hand) for hand in hands_of(first.hands)])
         self._chooses_hands = parameters.chooses_hands and len(session.hands) == 2
-        moves = session.hands if self._chooses_hands else hands_of(first.hands)
-        self._free = np.zeros(session.dof, dtype=np.bool_)
-        self._free[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
-        for hand in moves:
+        self._free = np.asarray(first.joints.any(axis=0))
+        for hand in session.hands if self._chooses_hands else ():
             self._free[session.joints(hand)] = True
         size = int(self._chooses_hands) + int(self._free.sum())
         self.render_mode = None

@@ -160,7 +160,7 @@ def perform_until_killed(folder, progress):
 
 @pytest.mark.skipif(
     sys.platform != "linux",
-    reason="forks a process that has imported everything, so that it begins at once",
+    reason="forks a process that has imported everything, which is safe on Linux alone",
 )
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
