@@ -14,15 +14,19 @@ from coartic.analysis.comparisons.progress import best_so_far
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.reached import targets
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps, standings
-from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import (
     CONDITIONS,
     EC1,
+    TOGETHER,
     in_order,
     is_search,
     is_variant,
     main_methods,
+    most_exploring,
 )
+from coartic.analysis.statistics.estimates import interval
+from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
 from coartic.analysis.words import marked
@@ -67,6 +71,45 @@ def ranking(study: Study) -> Rows:
             (str(method), row | {"runs": sum(len(c.runs) for c in cells)} | runs_of(*cells))
         )
     yield from sorted(named, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
+
+
+@table(
+    "method, runs, gap[], on *, instances, gap_in_general[], trials, movement_ticks, solve_s",
+    gap_in_general=Column("gap on random tasks (%)", 1, percent=True),
+)
+def variants(study: Study) -> Rows:
+    """Every method with each of its settings: gap over all tasks and over random ones, and cost.
+
+    The learner is one row: EC1 where a task has one arm, EC4 where it has two. What a run costs
+    is the mean over tasks.
+    """
+    labels_by_row: dict[str, dict[str, str]] = {}
+    for task, label in study.cells:
+        method, _, variant = label.partition(" ")
+        if method == most_exploring(study.tasks[task]):
+            method = f"{TOGETHER}EC1, EC4)"
+        if not is_search(label):
+            labels_by_row.setdefault(f"{method} {variant}".strip(), {})[task] = label
+    instances = sample(study)
+    for name, labels in labels_by_row.items():
+        rewards = gaps(study).merge(pd.DataFrame(labels.items(), columns=["task", "method"]))
+        by_task = {str(task): rows.gap.to_numpy() for task, rows in rewards.groupby("task")}
+        row: Row = {"method": name}
+        if by_task and len(by_task) == len(ends(study)) and rewards.gap.notna().all():
+            row |= interval("gap", task_mean(by_task))
+        row |= {f"on {task}": of_task.mean() for task, of_task in by_task.items()}
+        scores: dict[str, list[Runs]] = {}
+        for task, label in labels.items():
+            gap = instances.gap(task, label) if instances else None
+            if gap is not None:
+                scores.setdefault(str(study.tasks[task].family), []).append((gap,))
+        row["instances"] = sum(map(len, scores.values()))
+        if scores:
+            row |= interval("gap_in_general", other_tasks(scores))
+        cells = [study.cells[key] for key in labels.items()]
+        costs = method_rows(study).loc[list(labels.items())]
+        row |= {cost: costs[cost].mean() for cost in ("trials", "movement_ticks", "solve_s")}
+        yield name, row | {"runs": sum(len(cell.runs) for cell in cells)} | runs_of(*cells)
 
 
 def labels_of(study: Study, method: str) -> dict[str, str]:
