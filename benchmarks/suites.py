@@ -84,6 +84,8 @@ class Block(FileData):
     move: Move | None = None
     free_base: Annotated[bool, Field(strict=True)] = False
     """Whether the base moves in both directions, whatever the task locks."""
+    goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
+    """Only the tasks with so many goals; all where it is not given."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs per cell, where it is not the suite's number."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
@@ -344,6 +346,8 @@ def cells_of_block(
         if block.move is not None and ALL in block.tasks and name in user_tasks:
             continue
         task = user_tasks.get(name) or load_task(name)
+        if block.goals is not None and len(task.goals) not in block.goals:
+            continue
         if block.free_base:
             task = with_free_base(suite, task)
         variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)

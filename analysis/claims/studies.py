@@ -1,0 +1,221 @@
+"""Rules of our own studies: how far ahead a planner looks, and stops at goals.
+
+Tests are over random tasks, each of which counts alike. Where a run that is compared is missing
+on a task, or failed, that task is left out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.cells import CellRuns
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.register import MARGINS, Claim, Finding
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.methods import most_exploring
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.estimates import FEWEST, Inference, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.instances import gap_share
+from coartic.analysis.study import Study, cached
+from coartic.analysis.words import estimate
+from coartic.motion.costs import joint_costs, segment_lengths
+
+RESAMPLES_OF_STUDIES = 99_999
+"""As many as for families of tasks: p-values are corrected over many claims."""
+PLANNER = "receding-horizon"
+ALL_GOALS = "all"
+HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
+DEAR = ("base", "right-arm")
+"""Joints that cost more than the others, where the claim on them is tested."""
+STOPPING = "trajectory-optimisation/jerk"
+"""What stops at goals, without words for its parameters."""
+
+
+def reported(data: Data, name: str) -> bool:
+    """Whether a task is one of those that methods were not tuned on."""
+    return data.task(name).split != "development"
+
+
+@cached
+def gaps_by_horizon(study: Study) -> pd.DataFrame:
+    """Gaps of the planner on every random task, a row for each: per cent of the shortest.
+
+    Indexed by task, ``hands`` and ``costs``; columns :data:`HORIZONS`, missing where nothing was
+    run. A horizon that sees all goals of a task is that with all. Of ticks, over the best known of
+    the task; with costly joints of the weighted path length that was executed, over the shortest
+    of all runs with the same costs.
+    """
+    references = instances.references if (instances := sample(study)) else {}
+    lengths: dict[tuple[str, str, str], dict[int, float]] = {}
+    for cell, parameters in solved_cells(study, PLANNER):
+        if cell.task in references:
+            task, costly = study.tasks[cell.task], parameters["costs"]
+            length = -float(cell.rewards[0])
+            if costly != "none":
+                costs = joint_costs(task.robot, costly, parameters["cost_factor"])
+                (executed,) = study.trajectories(cell.task, cell.label).runs
+                length = float(segment_lengths(executed.configurations, costs).sum())
+            horizon = min(parameters["horizon"], len(task.goals) - 1)
+            lengths.setdefault((cell.task, parameters["hands"], costly), {})[horizon] = length
+    rows = {}
+    for (name, hands, costly), by_horizon in lengths.items():
+        last = len(study.tasks[name].goals) - 1
+        if hands == "optimal":  # with all goals in view it is the same plan
+            planned = lengths.get((name, "planned", costly), {})
+            by_horizon.setdefault(last, planned.get(last, math.nan))
+        shortest = -float(references[name].reward)
+        if costly != "none":
+            shortest = min(by_horizon.values())
+        seen = [last if h == ALL_GOALS else min(int(h), last) for h in HORIZONS]
+        there = [by_horizon.get(h, math.nan) for h in seen]
+        rows[name, hands, costly] = 100 * (np.array(there) / shortest - 1)
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(HORIZONS))
+    frame.index = pd.MultiIndex.from_tuples(list(rows), names=["task", "hands", "costs"])
+    return frame
+
+
+def solved_cells(study: Study, method: str) -> Iterator[tuple[CellRuns, dict[str, Any]]]:
+    """Cells of a method with a solved run, each with its parameters."""
+    for cell in study.cells.values():
+        if cell.method == method and len(cell.good):
+            yield cell, json.loads(str(cell.good.parameters.iloc[0]))
+
+
+def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataFrame:
+    """Gaps by horizon on the reported tasks, indexed by task."""
+    gaps = gaps_by_horizon(data.study)
+    places = gaps.index.to_frame()
+    judged = places.task.map(lambda name: reported(data, name)).astype(bool)
+    chosen = gaps[(places.hands == hands) & (places.costs == costs) & judged]
+    chosen = chosen.droplevel(["hands", "costs"])
+    runs = data.study.runs
+    data.run_ids.extend(runs[(runs.method == PLANNER) & runs.task.isin(chosen.index)].run_id)
+    return chosen
+
+
+def over_tasks(values: pd.Series, margin: float = 0.0) -> Inference:
+    """One-tailed test that the mean over tasks is above a margin; MissingError for too few."""
+    there = values.dropna().to_numpy(dtype=np.float64)
+    if len(there) < FEWEST:
+        raise MissingError(f"fewer than {FEWEST} random tasks can be judged")
+    return bootstrap_test(there, margin, resamples=RESAMPLES_OF_STUDIES)
+
+
+def mean_of(values: pd.Series) -> str:
+    """The mean over tasks with its interval, in words."""
+    there = values.dropna()
+    return f"{estimate(mean(there.to_numpy(dtype=np.float64)), 2)} ({len(there)} tasks)"
+
+
+def finding(parts: dict[str, tuple[pd.Series, float, int]]) -> Finding:
+    """What is seen of values by their words, each with a bound and the side (1, -1) it is on."""
+    tests = tuple(over_tasks(side * v, side * bound) for v, bound, side in parts.values())
+    words = "; ".join(f"{name} {mean_of(values)}" for name, (values, _, _) in parts.items())
+    return Finding(all(test.estimate > 0 for test in tests), f"{words}.", tests)
+
+
+def first_goal_ahead_gains_most(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap test over random tasks of the difference of both gains"""
+    gaps = gaps_of(data)
+    gained, left = gaps[0] - gaps[1], gaps[1] - gaps[ALL_GOALS]
+    return finding(
+        {
+            "The first goal ahead gains, more than all others, per cent:": (gained - left, 0.0, 1),
+        }
+    )
+
+
+def further_goals_gain_little(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap tests over random tasks of the gains against {gain:g} %"""
+    gaps, least = gaps_of(data), MARGINS["gain"]
+    return finding(
+        {
+            "The second goal ahead gains, per cent:": (gaps[1] - gaps[2], least, 1),
+            "the fourth": (gaps[3] - gaps[4], least, -1),
+        }
+    )
+
+
+def most_of_the_loss_is_posture(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap test over random tasks of the loss with given hands, less a share of \
+the loss"""
+    planned, given = gaps_of(data)[0], gaps_of(data, hands="optimal")[0]
+    share = MARGINS["share_of_loss"]
+    return finding(
+        {
+            f"Without look-ahead, given hands lose more than {share:.0%} of what planned "
+            "hands lose, by per cent of the best:": (given - share * planned, 0.0, 1),
+        }
+    )
+
+
+def dear_joints_keep_the_horizon(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap tests over random tasks of the gains against {gain:g} %, by costs"""
+    parts, least = {}, MARGINS["gain"]
+    for costs in DEAR:
+        gaps = gaps_of(data, costs=costs)
+        parts[f"{costs} dear: the second goal ahead gains, per cent:"] = (
+            gaps[1] - gaps[2], least, 1
+        )  # fmt: skip
+        parts[f"{costs} dear: those beyond the fourth"] = (gaps[4] - gaps[ALL_GOALS], least, -1)
+    return finding(parts)
+
+
+def learner_behind_one_goal_ahead(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap test over random tasks of the difference of the gaps"""
+    gaps = gaps_of(data)
+    instances = sample(data.study)
+    assert instances is not None  # or there would be no gaps
+    learner = {}
+    for name in gaps.index:
+        label = most_exploring(data.task(name))
+        cell = data.study.cells.get((name, label))
+        if cell is not None and len(cell.good):
+            share = gap_share(cell.rewards, instances.references[name].reward)
+            learner[name] = 100 * float(share.mean())
+            data.run_ids.extend(cell.good.run_id)
+    behind = pd.Series(learner, dtype=np.float64) - gaps[1]
+    return finding({"Per cent by which the learner loses more:": (behind, MARGINS["gain"], 1)})
+
+
+def served_next_goal(data: Data, timing: str, stop: int) -> pd.Series:
+    """Ticks by which postures leave the next goal nearer, on each reported random task."""
+    values = {}
+    for cell, parameters in solved_cells(data.study, STOPPING):
+        asked = (parameters["timing"], parameters["stop"], parameters["stop_every"])
+        drawn = data.task(cell.task).family is not None
+        if drawn and reported(data, cell.task) and asked == (timing, stop, 1):
+            nearer = SIGNS["arm"].of(data.study.trajectories(cell.task, cell.label))
+            data.run_ids.extend(cell.good.run_id)
+            if len(nearer):
+                values[cell.task] = float(nearer.mean())
+    return pd.Series(values, dtype=np.float64)
+
+
+def postures_serve_after_a_stop(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap tests over random tasks, with free and with equal times"""
+    least = MARGINS["ticks"]
+    return finding({
+        f"Ticks by which postures leave the next goal nearer, {timing} times:": (
+            served_next_goal(data, timing, 1), least, 1
+        )
+        for timing in ("free", "fixed")
+    })  # fmt: skip
+
+
+def stop_at_equal_times(data: Data, _: Claim) -> Finding:
+    """one-tailed bootstrap test over random tasks of the difference, passing less full stop"""
+    passing, stopping = (served_next_goal(data, "fixed", stop) for stop in (0, 1))
+    return finding(
+        {
+            "Ticks by which postures leave the next goal nearer when passing than with "
+            "a full stop, at equal times:": (passing - stopping, 0.0, 1),
+        }
+    )
