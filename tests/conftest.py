@@ -42,13 +42,6 @@ def _plain_width(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
-@pytest.fixture(autouse=True)
-def _pages(request):
-    """The pages' examples run suites as most tests do."""
-    if isinstance(request.node, pytest.DoctestItem):
-        request.getfixturevalue("in_this_process")
-
-
 @pytest.fixture
 def in_this_process(monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
