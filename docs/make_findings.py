@@ -15,6 +15,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
@@ -27,6 +28,8 @@ KEPT = {
     "ablations": ("methods signatures claims", ""),
     "locus": ("signatures", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
+    "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
+    "stops": ("stops claims", "stops"),
 }
 """Tables and figures that are kept of each suite's report."""
 
@@ -79,7 +82,10 @@ def expect(holds: bool, what: str) -> str:
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its file name."""
+    """Every page that is made from a template, by its file name.
+
+    A page that has the name of a suite waits until something of that suite is stored.
+    """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(DOCS),
         undefined=jinja2.StrictUndefined,
@@ -89,12 +95,14 @@ def filled_pages() -> dict[str, str]:
     )
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "expect": expect,
+        "expect": expect, "register": CLAIMS,
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
+    waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
     return {
         path.stem: environment.get_template(path.name).render()
         for path in sorted(DOCS.glob("*.md.jinja"))
+        if path.stem not in waiting
     }
 
 
