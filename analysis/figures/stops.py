@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import SMOOTH
 from coartic.analysis.tables.studies import stops as stops_table
 
-COLORS = {"jerk": style.BLUE, "acceleration": style.VERMILLION}
+LOOKS = {
+    ("ascending, descending", "jerk"): (style.BLUE, "o"),
+    ("ascending, descending", "acceleration"): (style.VERMILLION, "o"),
+    ("random, one arm", "jerk"): (style.GREEN, "D"),
+    ("random, two arms", "jerk"): (style.PURPLE, "s"),
+}
+"""Colour and mark by tasks and cost, of what is drawn."""
 TIMES = {"free": ("free times", style.SOLID), "fixed": ("equal times", style.DASHED)}
-MARKS = {"ascending, descending": "o", "random, one arm": "D", "random, two arms": "s"}
-"""Of the tasks that are drawn: those for which means over tasks are known."""
 
 
 @figure(
@@ -30,24 +36,26 @@ def stops(study: Study) -> Parts:
     data = stops_table(study)
     if not len(data):
         raise missing(study, "no runs that stop at goals")
-    drawn = data[data.group.isin(list(MARKS)) & (data.goals_per_stop == 1) & data.stop.notna()]
-    drawing, panels = style.figure_of((1, 2), (style.TWO, 2.6))
-    shift = 0.0
-    for (group, method, timing), part in drawn.groupby(["group", "method", "timing"], sort=False):
-        cost = str(method).removeprefix(SMOOTH)
+    costs = data.method.str.removeprefix(SMOOTH)
+    shown = np.array([pair in LOOKS for pair in zip(data.group, costs, strict=True)])
+    drawn = data.assign(cost=costs)[shown & (data.goals_per_stop == 1)]
+    drawing, panels = style.figure_of((1, 2), (style.TWO, 3.0))
+    for number, ((group, cost, timing), part) in enumerate(
+        drawn.groupby(["group", "cost", "timing"], sort=False)
+    ):
+        color, marker = LOOKS[str(group), str(cost)]
         words, dash = TIMES[str(timing)]
-        line: Any = {"color": COLORS[cost], "linestyle": dash, "marker": MARKS[str(group)]}
-        shift += 0.012
+        line: Any = {"color": color, "linestyle": dash, "marker": marker, "markersize": 3.5}
+        places = part.stop + 0.008 * number
         for axes, name in zip(panels, ("nearer", "turn"), strict=True):
-            ends = part[f"{name}_low"], part[f"{name}_high"]
-            axes.vlines(part.stop + shift, *ends, color=COLORS[cost], linewidth=0.8)
-            label = f"{group}: {cost}, {words}"
-            axes.plot(part.stop + shift, part[name], markersize=3.5, **line, label=label)
+            axes.vlines(places, part[f"{name}_low"], part[f"{name}_high"], color, linewidth=0.8)
+            axes.plot(places, part[name], **line, label=f"{group}: {cost}, {words}")
     panels[0].set_ylabel("next goal nearer (ticks)")
     panels[1].set_ylabel("turn at goals (rad)")
     for axes, title in zip(panels, ("posture", "velocity"), strict=True):
         axes.set_title(title)
         axes.set_xlabel("stop")
+        axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "¼", "½", "¾", "1"])
         axes.set_ylim(bottom=0)
     style.letters(panels)
     style.legend(drawing, panels[0].get_legend_handles_labels()[0], 2)

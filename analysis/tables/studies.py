@@ -23,7 +23,6 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
-from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 from coartic.tasks.task import MOST_GOALS
 
@@ -182,7 +181,10 @@ def horizon_signs(study: Study) -> Rows:
     for name, sign in SIGNS.items():
         values = pd.DataFrame(
             {
-                str(h): {cell.task: mean_or_nan(sign.of(runs_in(study, cell))) for cell in of}
+                str(h): {
+                    cell.task: mean_or_nan(sign.of(study.trajectories(cell.task, cell.label)))
+                    for cell in of
+                }
                 for h, of in cells.items()
             }
         ).dropna()
@@ -192,11 +194,6 @@ def horizon_signs(study: Study) -> Rows:
             row |= mean_of("to_come", values[ALL_GOALS] - values[str(h)])
             of_tasks = [cell for cell in cells[h] if cell.task in values.index]
             yield f"{name} h={h}", row | runs_of(*of_tasks)
-
-
-def runs_in(study: Study, cell: CellRuns) -> Trajectories:
-    """The solved runs of a cell, executed."""
-    return study.trajectories(cell.task, cell.label)
 
 
 def mean_or_nan(values: Sequence[float] | Array) -> float:
@@ -221,7 +218,7 @@ def stop_values(study: Study) -> pd.DataFrame:
             continue
         for cell, parameters in solved_cells(study, method.partition(" ")[0]):
             if cell.label == method:
-                runs = runs_in(study, cell)
+                runs = study.trajectories(cell.task, cell.label)
                 rows.append(
                     {
                         "group": group_of(study.tasks[cell.task]),
