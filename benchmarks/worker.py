@@ -178,7 +178,7 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
-        "meter": session.meter.as_dict(),
+        "meter": vars(session.meter),
         "rewards": session.rewards,
     }
     try:

@@ -23,6 +23,7 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.method import Information, Session
 from coartic.model import PAPER
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
@@ -211,11 +212,16 @@ def test_closest_hand_and_its_ties(shift, visited):
 def test_what_a_policy_spends_is_counted():
     content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
     run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
-    search = run.initial_search
-    assert (search.hands, search.trials, search.failed_trials) == ("LRLR", 16, 0)
-    assert search.movement_ticks > 16 * 532
-    assert search.corrections == 64
-    assert learn(load_task("two-armed-1"), "EC3", seed=0, trials=1).initial_search.trials == 0
+    assert run.first_hands == "LRLR"
+    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    session = Session(parse_task(content, "x"), 0, told)
+    assert session.find_initial_hands() == "LRLR"
+    assert (session.meter.trials, session.meter.failed_trials) == (16, 0)
+    assert session.meter.movement_ticks > 16 * 532
+    assert session.meter.corrections == 64
+    assert session.meter.jacobians == session.meter.corrective_iterations > 0
+    named = Session(load_task("two-armed-1"), 0, told)
+    assert (named.find_initial_hands(), named.meter.trials) == ("LRLR", 0)
 
 
 @pytest.mark.parametrize(

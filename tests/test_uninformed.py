@@ -205,7 +205,7 @@ def test_trials_made_together_are_those_made_one_by_one(method, parameters, task
     session, _ = solve(method, task, trials=300, **parameters)
     alone = one_by_one(method, task, 0, method.Parameters(trials=300, **parameters))
     assert session.rewards == alone.rewards
-    together, single = session.meter.as_dict(), alone.meter.as_dict()
+    together, single = vars(session.meter), vars(alone.meter)
     assert all(together[name] == single[name] for name in Meter.COUNTS)
 
 

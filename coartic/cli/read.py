@@ -167,9 +167,8 @@ def cite(
     ] = False,
 ) -> None:
     """Print what to cite, as BibTeX."""
-    from coartic.analysis.citations import MethodSource, bibliography
+    from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
-    from coartic.runs.plan import BUILT_IN
     from coartic.runs.store import open_store
 
     made_with = None
@@ -177,11 +176,7 @@ def cite(
     if folder is not None:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
-    methods = [
-        MethodSource(name, method.title, method.citation, method.origin == BUILT_IN)
-        for name, method in declared.items()
-    ]
-    text = bibliography(methods, analysis=analysis, environment=made_with)
+    text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
 
 

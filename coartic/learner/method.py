@@ -30,7 +30,7 @@ from coartic.learner.conditions import (
     Update,
 )
 from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.motion.lanes import LANES
 from coartic.tasks.task import Task
 
@@ -127,7 +127,7 @@ class DualProcess(Method):
 
 
 def _result(session: Session, run: LearningRun) -> Result | MethodError:
-    session.spend(**vars(run.counters))
+    session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
     session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
     if run.status != "ok":
         return MethodError("infeasible", run.reason)
