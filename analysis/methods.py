@@ -9,10 +9,11 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import TypeAdapter
 
 from coartic import Task
 from coartic.analysis.words import read_beside
+from coartic.inputs import FileData
 from coartic.learner import conditions
 from coartic.learner.learning import METHOD_PREFIX
 from coartic.runs.plan import SEARCH
@@ -32,10 +33,8 @@ Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey"
 Dash = Literal["solid", "dashed", "dotted", "dash-dotted"]
 
 
-class KnownMethod(BaseModel):
+class KnownMethod(FileData):
     """A built-in method's row."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     """Its one name, in figures, tables and sentences."""

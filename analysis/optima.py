@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict
 
 from coartic import PAPER, MotionModel, Task
+from coartic.inputs import FileData
 from coartic.runs.plan import SEARCH
 
 BASE = "task"
@@ -32,10 +32,8 @@ KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
 
 
-class ShippedOptimum(BaseModel):
+class ShippedOptimum(FileData):
     """What is shipped of one task under one restriction: a reward, or why there is none."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     task: str
     essence: str
@@ -49,7 +47,7 @@ class ShippedOptimum(BaseModel):
     hands: str = ""
     bound: int | None = None
     """Reward that no solution exceeds; None where nothing is proven."""
-    searches: dict[str, int] = {}
+    searches: Mapping[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
     """Movements as :func:`coartic.learner.rows.movements_from` reads them, in full precision."""

@@ -76,13 +76,8 @@ class Program(NamedTuple):
         self.upper[:task] = -least
 
 
-class Solved(NamedTuple):
-    """What a solver says."""
-
-    optimal: bool
-    status: str
-    variables: Array
-    iterations: int
+Solved = tuple[Array, int, str]
+"""What a solver says: variables, iterations, and why they are no optimum; empty where they are."""
 
 
 class Cascade:
@@ -114,14 +109,14 @@ class Cascade:
     def solve_level(self, level: Literal[1, 2], program: Program) -> Array:
         """The variables of a level. Raises CascadeError where the solver fails."""
         try:
-            solved = _SOLVERS[self.solver](program, SETTINGS[self.solver])
+            x, iterations, failure = _SOLVERS[self.solver](program, SETTINGS[self.solver])
         except ValueError as error:  # of what is no number
             raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
         self.solves += 1
-        self.iterations += solved.iterations
-        if not solved.optimal:
-            raise CascadeError(f"level {level}: {self.solver} ended {solved.status}")
-        return np.array(solved.variables, dtype=np.float64)
+        self.iterations += iterations
+        if failure:
+            raise CascadeError(f"level {level}: {self.solver} ended {failure}")
+        return np.array(x, dtype=np.float64)
 
 
 def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
@@ -139,7 +134,7 @@ def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
         np.zeros(len(free) + len(upper), dtype=np.intc),
         **settings,
     )
-    return Solved(flag == 1, f"with exit flag {flag}", x, info["iterations"])
+    return x, info["iterations"], "" if flag == 1 else f"with exit flag {flag}"
 
 
 def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
@@ -159,7 +154,7 @@ def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
         chosen,
     ).solve()
     status = str(solution.status)
-    return Solved(status == "Solved", status, np.array(solution.x), solution.iterations)
+    return np.array(solution.x), solution.iterations, "" if status == "Solved" else status
 
 
 _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {

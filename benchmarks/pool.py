@@ -20,7 +20,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from copy import copy
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
@@ -28,7 +27,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
+from coartic.benchmarks.worker import Answer, Job, failed, learns, perform, prepare
 from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
@@ -40,16 +39,6 @@ _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
 
 
-@dataclass(frozen=True)
-class Failure:
-    """Why a job has no answer."""
-
-    status: str
-    """``timeout`` or ``crashed``."""
-    reason: str
-    wall_s: float
-
-
 @runtime_checkable
 class Executor(Protocol):
     """Performs jobs, somewhere."""
@@ -59,7 +48,7 @@ class Executor(Protocol):
         """How many at once."""
         ...
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come, in any order."""
         ...
 
@@ -70,7 +59,7 @@ class Local:
     def __init__(self, jobs: int = -1) -> None:
         self.workers = threads_for(jobs)
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come."""
         numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
         for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
@@ -78,7 +67,7 @@ class Local:
 
     def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
-    ) -> Iterator[tuple[int, Answer | Failure]]:
+    ) -> Iterator[tuple[int, Answer]]:
         """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
@@ -109,7 +98,7 @@ class Local:
                     for future in done:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
-                        yield number, answer_of(future, jobs, number, seconds, Path(folder))
+                        yield number, answer_of(future, dict(jobs)[number], seconds, Path(folder))
             except RuntimeError:  # the pool's own
                 messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
@@ -125,26 +114,24 @@ def owner_of(job: Job) -> str:
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def answer_of(
-    future: Future[Answer], jobs: list[tuple[int, Job]], number: int, seconds: float, folder: Path
-) -> Answer | Failure:
-    """The answer to a job, or why there is none."""
+def answer_of(future: Future[Answer], job: Job, seconds: float, folder: Path) -> Answer:
+    """The answer to a job, or that it failed."""
     try:
         return future.result()
     except TimeoutError:
-        limit = dict(jobs)[number].time_limit_s or seconds
-        return Failure("timeout", f"time limit of {limit:g} s exceeded", limit)
+        limit = job.time_limit_s or seconds
+        return failed(job, "timeout", f"time limit of {limit:g} s exceeded", limit)
     except ProcessExpired as error:
         how = f"exit code {error.exitcode}"
         if error.exitcode is not None and error.exitcode < 0:
             with contextlib.suppress(ValueError):
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
         reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
-        return Failure("crashed", reason, seconds)
+        return failed(job, "crashed", reason, seconds)
     except BrokenProcessPool:
         raise
     except Exception as error:  # its answer cannot be read
-        return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
+        return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"), seconds)
 
 
 def last_words(file: Path) -> str:

@@ -17,7 +17,6 @@ from coartic import (
     CoarticError,
     corrective_trial,
     hand_sequences,
-    learn,
     load_task,
 )
 from coartic.analysis.reconstruction import ensemble, layouts, readings, scoring
@@ -281,20 +280,6 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert [test.p_below for test in tests if isinstance(test, scoring.Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
-
-
-def test_printed_results_stand_beside_fresh_runs() -> None:
-    names = ["two-armed-1-F2", "ascending"]
-    table = scoring.beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
-    assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
-    row = table.loc["ascending", "EC1 mean"]
-    seeds = range(800_000_000, 800_000_004)
-    rewards = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
-    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(rewards))
-    assert row.verdict == "different"
-    assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
-    with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
-        scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer(

@@ -87,7 +87,7 @@ def published(study: Study) -> Rows:
             "task": marked(study.tasks[task].label, study.tasks[task]),
             "condition": condition,
             **printed_mean(row.published),
-            "published_initial": getattr(published_initial(task), "reward", None),
+            "published_initial": getattr(published_initial(task), "number", None),
             **our_mean(row.rewards),
             "ours_initial": row.cell.good.initial_reward.dropna().mean(),
             "verdict": row.verdict,
@@ -191,7 +191,7 @@ def learned_rewards(study: Study) -> pd.DataFrame:
                 "task": name,
                 "method": "initial",
                 "reward": before,
-                "published": float(initial.reward) if initial else math.nan,
+                "published": float(initial.number) if initial else math.nan,
             }
         )
         for cell in solved:

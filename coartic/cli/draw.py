@@ -71,7 +71,7 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import Panel, animate, check_output
+    from coartic.analysis.figures.animation import animate, check_output
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
@@ -85,15 +85,15 @@ def animate(
         _, stored = find_run(name, folder)
         movement, number = trajectory_of(stored), stored.run.row["run"]
         title = one_line(f"{movement.task.label}: {name_of(stored.method)}, run {number}")
-        panels.append(Panel(title, movement))
+        panels.append((title, movement))
     if initial:
-        task = panels[0].trajectory.task
+        task = panels[0][1].task
         hands = initial_hands(task, model=stored.model)
         movements = corrective_trial(task, hands, model=stored.model).movements
         initial_solution = trajectory(task, movements, model=stored.model)
-        panels.insert(0, Panel(f"{task.label}: initial solution", initial_solution))
-    timed = animate(panels, out, speed=speed, width=width, replace=replace)
-    say(f"{out}: {len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second.")
+        panels.insert(0, (f"{task.label}: initial solution", initial_solution))
+    frames, ticks_a_second = animate(panels, out, speed=speed, width=width, replace=replace)
+    say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
 
 COMMANDS = (draw, animate)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -101,40 +100,6 @@ def goals(
     say(f"Written: {out / names[0]} and {out / names[1]}")
 
 
-@app.command("results")
-def results(
-    tasks: Annotated[
-        list[str], typer.Argument(metavar="TASK...", help="Tasks, or members of an ensemble.")
-    ],
-    runs: Annotated[
-        int, typer.Option(parser=at_least(3), metavar="N", help="Runs of each condition.")
-    ] = 100,
-    trials: TrialsOfRun = 10_000,
-    out: Annotated[
-        str | None, typer.Option(metavar="FOLDER", help="Folder for a table of it.")
-    ] = None,
-    reading: given.Readings = None,
-    jobs: given.Jobs = -1,
-) -> None:
-    """Compare every printed result of a task with fresh runs."""
-    from coartic.analysis.reconstruction.scoring import beside_printed
-
-    folder = None if out is None else checked_folder(out, ["printed.csv"])
-    table = beside_printed(
-        tasks,
-        readings=tuple(reading or ()),
-        runs=runs,
-        trials=trials,
-        jobs=jobs,
-        progress=say,
-    )
-    columns = ["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]
-    show_frame(table[columns].map(short))
-    if folder is not None:
-        publish(folder, {"printed.csv": csv_of(table)})
-        say(f"Written: {folder / 'printed.csv'}")
-
-
 @app.command("claims")
 def claims(
     folders: Annotated[
@@ -187,10 +152,3 @@ def checked_folder(name: str, files: Sequence[str], what: str = "--out") -> Path
 def csv_of(table: pd.DataFrame) -> bytes:
     """A table as a file."""
     return table.to_csv(index=False, lineterminator="\n").encode()
-
-
-def short(value: object) -> str:
-    """A cell of a table: numbers with at most three decimals, nothing for NaN."""
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{round(value, 3):g}"
-    return str(value)

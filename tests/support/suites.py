@@ -6,11 +6,10 @@ import pandas as pd
 
 from coartic import load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import plan_suite
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
-from coartic.benchmarks.worker import perform
+from coartic.benchmarks.worker import failed, perform
 from coartic.runs.store import TIMINGS
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +38,7 @@ class Failing(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):
             lost = number in self.numbers
-            yield number, Failure("crashed", "exit code 9", 1.0) if lost else perform(job)
+            yield number, failed(job, "crashed", "exit code 9", 1.0) if lost else perform(job)
 
 
 def paper_cells(**selection):
