@@ -40,8 +40,8 @@ class KnownMethod(FileData):
     """Its one name, in figures, tables and sentences."""
     algorithm: str
     """What it is a form of; a ranking counts algorithms."""
-    look: tuple[Color, Dash, str] | None = None
-    """Colour, dash and matplotlib's marker in all figures; None: one that is free."""
+    look: tuple[Color, Dash] | None = None
+    """Colour and dash in all figures; None: one that is free."""
     headline: bool = False
     """Whether it stands for its algorithm where no methods are named."""
     works: tuple[str, ...]

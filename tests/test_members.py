@@ -113,6 +113,6 @@ def test_parameters_of_a_reading_are_no_variant():
     runs = study.runs.assign(variant="ties=right")
     changed = replace(study, plan=replace(study.plan, cells=cells), runs=runs)
     ((specification, view),) = specifications(changed)
-    assert specification.label == "ties=right"
+    assert specification == ("ties=right", "", "")
     assert {label for _, label in view.cells} == {"dual-process/EC3", "dual-process/EC4"}
     assert all(len(cell.runs) == 20 for cell in view.cells.values())

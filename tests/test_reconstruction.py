@@ -246,14 +246,12 @@ def test_a_reconstruction_is_found_and_scored(
     monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
     monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
     monkeypatch.setattr(scoring, "RESAMPLES", 20)
-    effort = {
-        "members": 4,
-        "runs": 2,
-        "plan": (ensemble.Wave(3, 2), ensemble.Wave(2, 2, 2, 0.01)),
-        "trials": 30,
-    }
+    monkeypatch.setattr(ensemble, "PLAN", ((3, 2, 0, 0.0), (2, 2, 2, 0.01)))
+    monkeypatch.setattr(ensemble, "TRIALS", 30)
+    monkeypatch.setattr(ensemble, "LAST_RUNS", 2)
+    effort = {"members": 4, "runs": 2}
     small = replace(search, tried=Counter())
-    members = ensemble.reconstruct(small, **effort, last=2)
+    members = ensemble.reconstruct(small, **effort)
     # Four that are spread, and the nearest where it is none of them.
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
@@ -265,7 +263,7 @@ def test_a_reconstruction_is_found_and_scored(
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
+    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort)
     pd.testing.assert_frame_equal(again, members)
 
 

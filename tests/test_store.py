@@ -85,7 +85,7 @@ def test_what_is_written_is_read_back(written):
     assert handed[planner].movements["solution"][0].waypoints is not None
     with open_store(study.folder) as store:
         for cell in study.plan.cells:
-            for run_id in study.run_ids[cell.task, cell.label]:
+            for run_id in study.cells[cell.task, cell.label].runs.run_id:
                 stored = store.run(run_id)
                 assert plain(stored.run) == plain(handed[run_id])
                 assert (stored.task, stored.method) == (study.tasks[cell.task], cell.method)

@@ -60,7 +60,7 @@ def draw_bars(axes: Axes, rows: pd.DataFrame, runs: dict[str, Any]) -> None:
     diamond: Any = {"markersize": 3.4, "markerfacecolor": style.PAPER, "zorder": 4}
     for place, row in enumerate(rows.to_dict("records")):
         if place:
-            color = look_of[row["method"]].color
+            color = look_of[row["method"]]["color"]
             axes.bar(place, row["reward"] - initial, 0.62, color=color, **bar)
             draw_interval(axes, place - 0.16, row, "reward")
             rewards = np.sort(runs[row["method"]])

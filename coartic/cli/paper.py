@@ -123,7 +123,7 @@ def claims(
     table = judged_specifications(
         map(load, folders),
         jobs=jobs,
-        progress=lambda specification: say(f"Judged: {specification.label}"),
+        progress=lambda specification: say(f"Judged: {specification}"),
     )
     if table.empty:
         raise CoarticError(
