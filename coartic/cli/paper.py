@@ -113,13 +113,10 @@ def claims(
 ) -> None:
     """Judge the claims under other readings and goals."""
     from coartic.analysis import load
-    from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.figures.robustness import specification_curve, verdicts
     from coartic.analysis.reconstruction.robustness import judged_specifications, shares
 
-    tables = ("specifications.csv", "shares.csv")
-    pictures = [f"{name}{kind}" for name in ("verdicts", "specification-curve") for kind in FORMATS]
-    folder = checked_folder(out, [*tables, *pictures])
+    names = ("specifications.csv", "shares.csv")
+    folder = checked_folder(out, names)
     table = judged_specifications(
         map(load, folders),
         jobs=jobs,
@@ -130,14 +127,7 @@ def claims(
             "no claim of the paper can be judged there. Run its conditions with 10 000 trials."
         )
     counts = shares(table)
-    files = dict(zip(tables, map(csv_of, (table, counts)), strict=True))
-    figures = [verdicts(table)]
-    if table.effect.notna().any():
-        figures.append(specification_curve(table))
-    files |= {
-        f"{plot.id}{kind}": picture(plot.figure, kind) for plot in figures for kind in FORMATS
-    }
-    publish(folder, files)
+    publish(folder, dict(zip(names, map(csv_of, (table, counts)), strict=True)))
     show_frame(counts)
     say(f"Written: {folder}")
 
