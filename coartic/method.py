@@ -108,7 +108,7 @@ class Meter:
     """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
     cannot end a movement; a robot would sense its hand on every one of the ticks."""
     jacobians: int = 0
-    """Jacobian evaluations, one per corrective iteration and per biased movement of the learner."""
+    """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
     corrections: int = 0
     """Corrective movements made."""

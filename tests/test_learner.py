@@ -46,7 +46,7 @@ def assert_equals_reference(task, condition, trials, seed=11):
     assert counters.corrections == slow.corrections
     parts = [slow.corrections_by_trial[:1], *_tenths(slow.corrections_by_trial[1:])]
     assert fast.corrections.tolist() == [part.sum() for part in parts]
-    assert counters.corrective_iterations == counters.jacobians - slow.biased_movements
+    assert counters.corrective_iterations == counters.jacobians
     assert counters.corrective_iterations == slow.corrective_iterations
     assert counters.failed_trials == (~slow.completed).sum()
     assert counters.trials == trials
@@ -117,11 +117,8 @@ def test_conditions_are_data(chosen, other, hands):
     assert slow.corrections > len(task.goals)
     assert slow.completed.all() == (hands != "random")  # a random hand fails now and then
     assert bettered(slow) or not other
-    if hands == "closest":  # the variants' fields, all of them at once
-        informed = replace(condition, nullspace_gain=0.1, bias=0.7)
-        slow = assert_equals_reference(task, informed, trials=4)
-        assert slow.biased_movements > len(task.goals)
-        free = replace(informed, corrects=False, noise_sd=0.02)
+    if hands == "closest":
+        free = replace(condition, corrects=False, noise_sd=0.02)
         slow = assert_equals_reference(task, free, trials=6)
         assert set(slow.completed) == {True, False}
 
@@ -293,7 +290,7 @@ def test_errors():
     with pytest.raises(ValueError, match="at least 1"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
-        ("epsilon", 1.5), ("nullspace_gain", float("nan")), ("bias", -1.0), ("noise_sd", 1e20),
+        ("epsilon", 1.5), ("noise_sd", float("nan")), ("noise_sd", -1.0), ("noise_sd", 1e20),
         ("discount", 1.5), ("discount", 0.5), ("credit", "goal"),
     ]:  # fmt: skip
         with pytest.raises(ValueError, match=field):

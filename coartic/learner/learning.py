@@ -265,7 +265,7 @@ def learn_together(
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
         np.array(codes, dtype=np.int64),
-        problem_of(task, model, nullspace_gain=condition.nullspace_gain),
+        problem_of(task, model),
         rules_of(task, condition),
         tables,
         kept,
@@ -296,7 +296,7 @@ def learn_together(
                 trials=trials,
                 movement_ticks=int(kept.counts[n, COUNT.ticks]),
                 forward_kinematics=int(kept.counts[n, COUNT.evaluations]),
-                jacobians=int(kept.counts[n, [COUNT.iterations, COUNT.biased]].sum()),
+                jacobians=int(kept.counts[n, COUNT.iterations]),
                 corrective_iterations=int(kept.counts[n, COUNT.iterations]),
                 corrections=int(kept.counts[n, COUNT.corrections]),
                 failed_trials=int(kept.counts[n, COUNT.failed]),
