@@ -163,8 +163,8 @@ class Study:
         return {}
 
     @cached_property
-    def optima(self) -> dict[tuple[str, str], KnownOptimum]:
-        """Best known reward by task and other arm (``"free"``, ``"still"``)."""
+    def optima(self) -> dict[str, KnownOptimum]:
+        """Best known reward by task, with all joints free."""
         return known_optima(self.runs, self.tasks, self.model)
 
     def _frame(self, view: str) -> pd.DataFrame:

@@ -7,8 +7,7 @@ short of it no more than that, the one nearest to the preferred: ``min |x - z|^2
 
 Inequality tasks in lexicographic quadratic programs: O. Kanoun, F. Lamiraux, P.-B. Wieber
 (2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
-to inequality tasks, IEEE Transactions on Robotics. With one row and no limit the answer is
-:func:`damped_projection`, which the tests check.
+to inequality tasks, IEEE Transactions on Robotics.
 """
 
 from __future__ import annotations
@@ -161,19 +160,3 @@ _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
     "clarabel": solve_by_clarabel,
     "daqp": solve_by_daqp,
 }
-
-
-def damped_projection(
-    row: Array, least: float, preferred: Array, damping: float = DAMPING
-) -> Array:
-    """What the cascade gives for a task of one row where no limit is active, in closed form.
-
-    ``z + a (b - a.z)_+ / |a|^2``, with ``a`` the row and ``b`` what the damping leaves of a
-    demand, ``least |a|^2 / (|a|^2 + λ^2)`` if that is positive; shapes ``(joints,)``. Sources:
-    Liegeois (1977) for the projection, Nakamura & Hanafusa (1986) for the damping.
-    """
-    square = float(row @ row)
-    left = least * square / (square + damping**2) if least > 0 else least
-    missing = max(0.0, left - float(row @ preferred))
-    rates: Array = preferred + row * (missing / square if missing else 0.0)
-    return rates

@@ -14,7 +14,6 @@ import os
 import signal
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -31,7 +30,7 @@ from coartic.benchmarks.worker import Answer, Job, failed, learns, perform, prep
 from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
-from coartic.threads import one_thread_each
+from coartic.threads import begin_worker, one_thread_each
 
 _LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it
@@ -74,7 +73,7 @@ class Local:
         tasks = [(task, learned) for (_, learned), task in kernels.items()]
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
-                workers, initializer=begin_worker, initargs=(folder, foreign, workers, tasks),
+                workers, initializer=begin_job_worker, initargs=(folder, foreign, workers, tasks),
                 context=context(),
             )  # fmt: skip
             running: dict[Future[Answer], tuple[int, float]] = {}
@@ -143,30 +142,20 @@ def last_words(file: Path) -> str:
     return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
 
 
-def begin_worker(
+def begin_job_worker(
     folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
 ) -> None:
     """What a worker does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
     os.dup2(printed, 1)
     os.dup2(printed, 2)
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    begin_worker()
     bound_memory(workers)
     prepare(tasks)
     if foreign:
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
         os.chdir(tempfile.tempdir)
         confine(Path(folder))
-
-
-def end_with_parent() -> None:
-    """End this process, whatever it does, when the one that it works for has ended. The server
-    that it was forked from lives as long as any worker."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def bound_memory(workers: int) -> None:

@@ -22,7 +22,7 @@ from matplotlib.patches import Circle, Polygon
 
 from coartic import CoarticError, Trajectory
 from coartic.analysis.figures.robot import MARKERS, box, numbered_below
-from coartic.files import check_outputs, write_outputs
+from coartic.files import check_output, write_output
 
 FORMATS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -68,7 +68,7 @@ def animate(
     CoarticError for an ending that is not in :data:`FORMATS`, for MP4 without ffmpeg, and where
     the file cannot be written.
     """
-    check_output(path, replace=replace)
+    check_film(path, replace=replace)
     if not any(movement.ticks for _, movement in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     ticks = max(len(movement.configurations) for _, movement in panels)
@@ -89,7 +89,7 @@ def animate(
                     for scene in scenes:
                         scene.show(row)
                     writer.grab_frame()
-            write_outputs({path: film.read_bytes()}, replace=replace)
+            write_output(path, film.read_bytes(), replace=replace)
     except OSError as error:
         raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
     except subprocess.CalledProcessError as error:
@@ -97,16 +97,16 @@ def animate(
     return len(rows), stride / interval_s
 
 
-def check_output(path: Path, *, replace: bool = False) -> None:
+def check_film(path: Path, *, replace: bool = False) -> None:
     """Raises CoarticError for what cannot be written: before anything is drawn.
 
-    An ending that is not supported, MP4 without ffmpeg, what :func:`check_outputs` refuses.
+    An ending that is not supported, MP4 without ffmpeg, what :func:`check_output` refuses.
     """
     if path.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {path}: the name must end in {', '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
-    check_outputs([path], replace=replace)
+    check_output(path, replace=replace)
 
 
 class Scene:

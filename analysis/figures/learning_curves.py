@@ -69,7 +69,7 @@ def draw_curves(
     if initial is not None:
         axes.axhline(-initial.ticks, **style.INITIAL)
         floor, top = -initial.ticks, max(top, -initial.ticks)
-    optimum = study.optima.get((task.name, "free"))
+    optimum = study.optima.get(task.name)
     if optimum is not None:
         axes.axhline(optimum.reward, **style.OPTIMUM)
         top = max(top, optimum.reward)

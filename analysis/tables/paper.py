@@ -48,7 +48,7 @@ def tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
         task, label = study.tasks[name], best_condition(study, name)
-        best = study.optima.get((name, "free"))
+        best = study.optima.get(name)
         row: Row = {
             "task": marked(task.label, task),
             "arms": len(task.hands),

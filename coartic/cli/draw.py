@@ -29,7 +29,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.files import check_outputs, publish, write_outputs
+    from coartic.files import check_output, publish, write_output
     from coartic.tasks.families import named_by, task_text
 
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
@@ -41,8 +41,8 @@ def draw(
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
-        check_outputs([out], replace=replace)
-        write_outputs({out: picture(drawing, out.suffix.lower())}, replace=replace)
+        check_output(out, replace=replace)
+        write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(drawing, ".svg")}
@@ -71,11 +71,11 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import animate, check_output
+    from coartic.analysis.figures.animation import animate, check_film
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
-    check_output(out, replace=replace)
+    check_film(out, replace=replace)
     if speed is not None and not speed > 0:
         raise CoarticError(f"--speed {speed:g}: give a number of ticks per second above 0.")
     if initial and other is not None:
