@@ -100,7 +100,7 @@ def test_each_work_once_with_the_methods_that_rest_on_it():
     assert set(keys) == {"coartic", *BIB} - set(ANALYSIS)
     assert keys[:2] == ["coartic", PAPER]
     assert f"% cma-es/bandit, cma-es/every\n{references()['hansen2016']}\n" in text
-    assert set(keys_in(bibliography([], analysis=True))) == {"coartic", PAPER, *ANALYSIS}
+    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", PAPER, *ANALYSIS}
 
 
 def test_methods_of_others_cite_themselves():

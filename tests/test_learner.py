@@ -218,7 +218,7 @@ def test_what_a_policy_spends_is_counted():
     assert session.meter.corrections == 64
     assert session.meter.jacobians == session.meter.corrective_iterations > 0
     named = Session(load_task("two-armed-1"), 0, told)
-    assert (named.find_initial_hands(), named.meter.trials) == ("LRLR", 0)
+    assert (named.find_initial_hands(), named.meter.trials) == ("RRRR", 0)
 
 
 @pytest.mark.parametrize(
