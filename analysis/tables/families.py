@@ -10,22 +10,37 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.generality.exploration import (
-    CONTRASTS,
-    gains,
-    gains_by_hands,
-    told_apart,
-)
 from coartic.analysis.generality.presence import THERE, scores_of
-from coartic.analysis.generality.sample import sample
-from coartic.analysis.methods import CONDITIONS, INITIAL, is_variant, name_of
+from coartic.analysis.generality.sample import Sample, sample
+from coartic.analysis.methods import (
+    CONDITIONS,
+    EC1,
+    EC2,
+    EC3,
+    EC4,
+    INITIAL,
+    is_variant,
+    name_of,
+)
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import interval
-from coartic.analysis.statistics.instances import other_tasks, value
+from coartic.analysis.statistics.estimates import LEVEL, interval
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.robot import Array
 
 Part = TypeVar("Part")
+CONTRASTS = (
+    (EC2, INITIAL),
+    (EC1, INITIAL),
+    (EC3, EC2),
+    (EC4, EC3),
+    (EC4, EC2),
+)
+"""More exploration against less: learning at all; random hands in place of the closest, the other
+arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
+differ in nothing but the hands that they try."""
 ALL = "all"
 """In the column of families: the mean over all of them, each counting alike."""
 
@@ -64,6 +79,45 @@ def family_gaps(study: Study) -> Rows:
         ]
         rows.append((label, row | runs_of(*cells)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
+
+
+def gains(instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]) -> Scores:
+    """Rewards of both as shares of the best known, by family: what the first gains."""
+
+    def share(name: str, label: str) -> Array:
+        gap = instances.gap(name, label)
+        assert gap is not None  # of shared instances
+        return -gap
+
+    return {
+        family: [(share(name, first), share(name, second)) for name in of_family]
+        for family, of_family in names.items()
+    }
+
+
+def gains_by_hands(
+    instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]
+) -> Scores:
+    """The part of it that the hand sequences make: as if each run got the best that is known with
+    its hands. The rest is what joints make of them."""
+
+    def share(name: str, label: str) -> Array:
+        best_by_hands, best = instances.by_hands(name), instances.references[name].reward
+        hands = instances.study.cells[name, label].good.hands
+        return np.array([best_by_hands[str(sequence)] for sequence in hands]) / abs(best)
+
+    return {
+        family: [(share(name, first), share(name, second)) for name in of_family]
+        for family, of_family in names.items()
+    }
+
+
+def told_apart(first: Array, second: Array) -> bool:
+    """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
+    if not np.ptp(first) and not np.ptp(second):
+        return bool(first[0] != second[0])
+    other = second if len(second) > 1 else float(second[0])
+    return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
 def each_and_all(by_family: dict[str, Part]) -> Iterator[tuple[str, dict[str, Part]]]:

@@ -86,6 +86,8 @@ def goals(
 
     It keeps an ensemble of them.
     """
+    import pandas as pd
+
     from coartic.analysis.reconstruction.ensemble import reconstruct
     from coartic.analysis.reconstruction.search import search_for
 
@@ -93,8 +95,8 @@ def goals(
     search = search_for(task, readings=tuple(reading or ()), jobs=jobs)
     out = checked_folder(folder, names)
     ensemble = reconstruct(search, members=members, runs=runs, report=say)
-    tables = zip(names, (ensemble, search.tried_table), strict=True)
-    publish(out, {name: csv_of(table) for name, table in tables})
+    tried = pd.DataFrame(search.tried.items(), columns=["stage", "sets of goals"])
+    publish(out, dict(zip(names, map(csv_of, (ensemble, tried)), strict=True)))
     distance = ensemble.distance[0]
     say(f"The nearest set lies {distance:.2f} standard errors from the printed results.")
     say(f"Written: {out / names[0]} and {out / names[1]}")
