@@ -45,7 +45,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
     for family in families:
         for number, name in enumerate(names_in(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
-            best[name, "free"] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
+            best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
                 if (label == EC1) == (family in ONE) or label == INITIAL:
                     value = centre(number) if callable(centre) else centre
