@@ -10,6 +10,7 @@ It is the global part of a search whose local part is :mod:`coartic.baselines.tr
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -20,17 +21,12 @@ from coartic.method import MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
+Hands = tuple[Hand, ...]
+Start = tuple[Hands, Array]
+"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
-
-
-@dataclass
-class Spent:
-    """Kinematics evaluated while sampling."""
-
-    forward_kinematics: int = 0
-    jacobians: int = 0
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class Chain:
 
 
 def sample_postures(
-    task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Spent
+    task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
     """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
 
@@ -67,18 +63,18 @@ def sample_postures(
     miss = aim - robot.forward_kinematics(q, hand)
     far = np.maximum(1.0 - _NEAR / np.maximum(np.hypot(*miss.T), _NEAR), 0.0)
     q[:, :BASE_DOF] += far[:, None] * miss * moving[:BASE_DOF]
-    spent.forward_kinematics += count
+    spent["forward_kinematics"] += count
     for _ in range(_PROJECTIONS):
         position, jacobian = robot.linearised(q, hand)
         miss, jacobian = aim - position, jacobian * moving
-        spent.forward_kinematics += count
-        spent.jacobians += count
+        spent["forward_kinematics"] += count
+        spent["jacobians"] += count
         square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-6 * np.eye(2)
         step = (jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, miss[..., None]))[..., 0]
         length = np.linalg.norm(step, axis=1, keepdims=True)
         q = q + step * np.minimum(1.0, 0.5 / np.maximum(length, 1e-12))
     miss = task.goal_array[goal] - robot.forward_kinematics(q, hand)
-    spent.forward_kinematics += count
+    spent["forward_kinematics"] += count
     return np.asarray(q[np.hypot(*miss.T) <= task.radius])
 
 
@@ -102,7 +98,8 @@ class PostureGraph:
     task: Task
     layers: dict[tuple[int, Hand], Array]
     """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
-    spent: Spent = field(default_factory=Spent)
+    spent: Counter[str] = field(default_factory=Counter)
+    """Kinematics evaluated while sampling."""
     costs: Array | float = 1.0
     """What the movement of each joint costs, shape ``(dof,)``, or of all of them."""
 
@@ -116,7 +113,7 @@ class PostureGraph:
         40 one-armed random tasks the best path known was then found more often on 23, less
         often on 11.
         """
-        spent = Spent()
+        spent: Counter[str] = Counter()
         layers: dict[tuple[int, Hand], Array] = {}
         before = np.empty((0, task.robot.dof))
         for goal in range(len(task.goals)):
@@ -228,26 +225,30 @@ def cheapest_chains(
     graphs: int,
     chains: int,
     most: int,
-    only: tuple[Hand, ...] | None = None,
+    spread: bool = False,
+    only: Hands | None = None,
     costs: Array | float = 1.0,
-) -> Iterator[Chain]:
+) -> Iterator[Start]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
     :meth:`PostureGraph.chains`, ``costs`` of joints as in :class:`PostureGraph`. The session
     spends what it takes.
 
-    Raises MethodError where a goal has no posture.
+    With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
+    MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
         graph = PostureGraph.sampled(task, nodes, rng, costs)
-        session.spend(**vars(graph.spent))
+        session.spend(**graph.spent)
         missing = graph.why_none(only)
         if missing:
             raise MethodError("infeasible", missing)
         for chain in graph.chains(only, most):
             yielded += 1
-            yield chain
+            yield chain.hands, chain.configurations
+            if spread and len(task.hands) > 1:
+                yield chain.hands, spread_out(task, chain)
         if number >= graphs and yielded >= chains:
             return
 

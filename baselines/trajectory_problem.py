@@ -25,7 +25,6 @@ from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
-COSTS: tuple[Cost, ...] = ("path-length", "squared-changes", "acceleration", "jerk")
 
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two

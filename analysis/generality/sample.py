@@ -50,7 +50,7 @@ class Sample:
         highest = solved.groupby("task").reward.max()
         by_name = {}
         for name in self.tasks:
-            optimum = self.study.optima.get((name, "free"))
+            optimum = self.study.optima.get(name)
             rewards = [int(highest[name])] if name in highest.index else []
             if optimum is not None:
                 rewards.append(optimum.reward)

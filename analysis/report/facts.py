@@ -144,7 +144,7 @@ def nearest(study: Study) -> Facts | None:
         return None
     by_trial = groups["trial"].to_dict("records")
     places = [place for place, row in enumerate(by_trial) if is_learner(row["method"])]
-    optima = [best for (_, arm), best in study.optima.items() if arm == "free"]
+    optima = study.optima.values()
     return {
         **{name: rows.to_dict("records") for name, rows in groups.items()},
         "best": nearest_first[0],
@@ -306,7 +306,7 @@ def limits(study: Study) -> Facts:
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
     fewest = min((len(cell.runs) for cell in learners), default=0)
     tasks = {name: study.tasks[name] for name in study.tasks if name in one_by_one(study)}
-    optima = {name: study.optima.get((name, "free")) for name in tasks}
+    optima = {name: study.optima.get(name) for name in tasks}
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
     return {
         "runs": len(runs),

@@ -11,9 +11,8 @@ trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy genera
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
 and the pick is random, or where two hands are equal and ties are broken at random; one
-standard normal per explored joint, in the order of ``q``, where a target is stored; a bias
-draws nothing. Runs share nothing: the result of one depends neither on the others nor on
-their number.
+standard normal per explored joint, in the order of ``q``, where a target is stored. Runs share
+nothing: the result of one depends neither on the others nor on their number.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ from coartic.motion.compiled import (
     joint_chain,
     record_type,
 )
-from coartic.motion.corrective import correct_lanes, shift_kernel
+from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
-from coartic.motion.movement import Scratch, move_lanes, scratch_for
+from coartic.motion.movement import move_lanes
 from coartic.motion.problem import arm_of, goal_of
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
@@ -57,7 +56,6 @@ class Rules(NamedTuple):
     exploration: int
     epsilon: float
     noise_sd: float
-    bias: float
     corrects: bool
     ties: int
     rounding: float  # distances that differ by no more are equal
@@ -99,7 +97,6 @@ class Count(NamedTuple):
     iterations: int = 2
     corrections: int = 3
     failed: int = 4
-    biased: int = 5
 
 
 COUNT = Count()
@@ -113,7 +110,8 @@ class Work(NamedTuple):
     runs: Any  # (N,) records: see runs_for
     trials: Any  # (N,) records: see _TRIAL
     lanes: Lanes
-    scratch: Scratch
+    xs: Any  # (n + 1,) for the longer arm: positions of its joints
+    ys: Any
 
 
 def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
@@ -133,7 +131,6 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         exploration=_EXPLORATION[condition.hand_exploration],
         epsilon=float(condition.epsilon),
         noise_sd=float(condition.noise_sd),
-        bias=float(condition.bias),
         corrects=bool(condition.corrects),
         ties=_TIES[condition.ties],
         rounding=_EQUALLY_NEAR if condition.equal_distance == "random" else -1.0,
@@ -189,7 +186,8 @@ def work_for(runs: int, task: Task) -> Work:
         runs=runs_for(runs, task.robot),
         trials=np.zeros(runs, _TRIAL),
         lanes=lanes_for(task.robot),
-        scratch=scratch_for(task.robot),
+        xs=np.empty(task.robot.most_links + 1),
+        ys=np.empty(task.robot.most_links + 1),
     )
 
 
@@ -197,12 +195,11 @@ def work_for(runs: int, task: Task) -> Work:
 def distance_to_goal(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
     """How far a hand of run ``n`` is from the centre of a goal, length unit."""
     arm = arm_of(problem, hand)
-    scratch = work.scratch
-    joint_chain(work.runs[n].q, arm, scratch.xs, scratch.ys)
+    joint_chain(work.runs[n].q, arm, work.xs, work.ys)
     work.trials[n].counts[COUNT.evaluations] += 1
     tip = len(arm.links)
-    dx = problem.goals[number, 0] - scratch.xs[tip]
-    dy = problem.goals[number, 1] - scratch.ys[tip]
+    dx = problem.goals[number, 0] - work.xs[tip]
+    dy = problem.goals[number, 1] - work.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
 
 
@@ -310,7 +307,6 @@ def aim(
     work: Any,
 ) -> None:
     """Where something is learned, set the target; elsewhere see whether the goal is hit."""
-    goal = goal_of(problem, number)
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         run.acting = False
@@ -327,13 +323,6 @@ def aim(
             run.hit = distance_to_goal(n, number, hand, problem, work) <= problem.radius
             continue
         set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
-        if explore and rules.bias > 0.0:
-            # The mean of η moves into the direction in which **A** would step from q*(s, a).
-            arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
-            explored = rules.explored[hand]
-            shift_kernel(run.target, stored, arm, goal, explored, length, work.scratch)
-            trial.counts[COUNT.evaluations] += 1
-            trial.counts[COUNT.biased] += 1
         run.acting = True
 
 

@@ -28,10 +28,11 @@ from coartic.learner.kernel import (
     rules_of,
     work_for,
 )
+from coartic.method import Meter
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
-from coartic.motion.initial import InitialSearch, search_initial_hands
+from coartic.motion.initial import initial_hands
 from coartic.motion.lanes import LANES
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
@@ -47,27 +48,6 @@ CORRECTIONS = "corrections"
 
 
 @dataclass(frozen=True)
-class Counters:
-    """What one run spent. The replay is not part of it."""
-
-    trials: int
-    """Trials made, trial 0 included."""
-    movement_ticks: int
-    """Control ticks of all trials, those of failed trials included."""
-    forward_kinematics: int
-    """Forward-kinematics evaluations the compiled kernels made. They skip steps that
-    cannot end a movement; a robot would sense its hand on every one of the ticks."""
-    jacobians: int
-    """Jacobian evaluations: one per corrective iteration and per biased movement."""
-    corrective_iterations: int
-    corrections: int
-    """Corrective movements made."""
-    failed_trials: int
-    """Trials that did not hit every goal: the corrective process did not converge, or
-    the variant has none for stored targets."""
-
-
-@dataclass(frozen=True)
 class LearningRun:
     """One run of the learner and everything it found."""
 
@@ -75,8 +55,8 @@ class LearningRun:
     condition: ExplorationCondition
     model: MotionModel
     seed: int
-    initial_search: InitialSearch
-    """Hands of trial 0, and what a policy spent on finding them."""
+    first_hands: str
+    """Hands of trial 0."""
     rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
     """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
     best_trial: int | None
@@ -95,15 +75,11 @@ class LearningRun:
     """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
     corrections: NDArray[np.int64]
     """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
-    counters: Counters
+    counters: Meter
+    """What it spent; the replay is not part of it."""
     wall_s: float
     """Its share of the time that it and the runs beside it took."""
     cpu_s: float
-
-    @property
-    def first_hands(self) -> str:
-        """Hands of trial 0."""
-        return self.initial_search.hands
 
     @property
     def completed(self) -> NDArray[np.bool_]:
@@ -220,16 +196,16 @@ def learn_many(
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
-    search = search_initial_hands(task, condition.hands, model=model)
+    first_hands = initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(checked_seed, seeds))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
     def perform(lot: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, search, lot, trials)
+        return learn_together(task, condition, model, first_hands, lot, trials)
 
-    compile_learner(task, condition, model, search)
+    compile_learner(task, condition, model, first_hands)
     if threads == 1:
         return [run for lot in lots for run in perform(lot)]
     with ThreadPoolExecutor(threads) as pool:
@@ -262,7 +238,7 @@ def learn_together(
     task: Task,
     condition: ExplorationCondition,
     model: MotionModel,
-    search: InitialSearch,
+    first_hands: str,
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
@@ -271,9 +247,9 @@ def learn_together(
     Raises ValueError for more runs than there are lanes, and for initial hands that do not fit.
     """
     runs, dof = len(seeds), task.robot.dof
-    first_hands = [HANDS.index(hand) for hand in hands_of(search.hands)]
-    if len(first_hands) != len(task.goals):
-        raise ValueError(f"{len(first_hands)} initial hands for {len(task.goals)} goals")
+    codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
+    if len(codes) != len(task.goals):
+        raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
     tables = empty_tables(runs, task)
     kept = Kept(
         rewards=np.zeros((runs, trials), dtype=np.int64),
@@ -288,8 +264,8 @@ def learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
-        np.array(first_hands, dtype=np.int64),
-        problem_of(task, model, nullspace_gain=condition.nullspace_gain),
+        np.array(codes, dtype=np.int64),
+        problem_of(task, model),
         rules_of(task, condition),
         tables,
         kept,
@@ -306,7 +282,7 @@ def learn_together(
             condition=condition,
             model=model,
             seed=seed,
-            initial_search=search,
+            first_hands=first_hands,
             rewards=np.ma.array(kept.rewards[n], mask=~kept.completed[n]),
             best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
             initial=logged_movements(kept.first, n, dof),
@@ -316,11 +292,11 @@ def learn_together(
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),
-            counters=Counters(
+            counters=Meter(
                 trials=trials,
                 movement_ticks=int(kept.counts[n, COUNT.ticks]),
                 forward_kinematics=int(kept.counts[n, COUNT.evaluations]),
-                jacobians=int(kept.counts[n, [COUNT.iterations, COUNT.biased]].sum()),
+                jacobians=int(kept.counts[n, COUNT.iterations]),
                 corrective_iterations=int(kept.counts[n, COUNT.iterations]),
                 corrections=int(kept.counts[n, COUNT.corrections]),
                 failed_trials=int(kept.counts[n, COUNT.failed]),
@@ -342,19 +318,19 @@ def warm_up(task: Task, *, learns: bool = True) -> None:
     hands = letters_of([hand] * len(task.goals))
     if learns:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        compile_learner(task, condition, PAPER, InitialSearch(hands))
+        compile_learner(task, condition, PAPER, hands)
     move(task.robot, task.q0, task.q0, hand, goal, task.radius)
     correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
     make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
 
 
 def compile_learner(
-    task: Task, condition: ExplorationCondition, model: MotionModel, search: InitialSearch
+    task: Task, condition: ExplorationCondition, model: MotionModel, first_hands: str
 ) -> None:
     """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
     links = task.robot.most_links
     if links not in _compiled_for:
-        learn_together(task, condition, model, search, [0], 0)
+        learn_together(task, condition, model, first_hands, [0], 0)
         _compiled_for.add(links)
 
 

@@ -26,8 +26,8 @@ class Problem(NamedTuple):
     model: MotionModel
 
 
-def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -> Problem:
-    """The task for a kernel; ``nullspace_gain`` is that of the corrective process.
+def problem_of(task: Task, model: MotionModel) -> Problem:
+    """The task for a kernel.
 
     Raises ValueError for a task that is none any more: a copy with changed fields is unchecked,
     and kernels would read beyond their arrays.
@@ -40,7 +40,7 @@ def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -
         radius=float(task.radius),
         left=task.robot.arm("left"),
         right=task.robot.arm("right"),
-        corrector=Corrector("x" not in locked, "y" not in locked, float(nullspace_gain)),
+        corrector=Corrector("x" not in locked, "y" not in locked),
         model=model,
     )
 

@@ -35,7 +35,6 @@ class ReferenceRun(NamedTuple):
     corrections: int
     corrections_by_trial: NDArray[np.int64]
     corrective_iterations: int
-    biased_movements: int
 
 
 def move(
@@ -75,13 +74,11 @@ def correct(
     goal: tuple[float, float],
     *,
     locked_base: tuple[str, ...] = (),
-    nullspace_gain: float = 0.0,
     model: MotionModel = PAPER,
 ) -> Correction:
     """:func:`coartic.motion.corrective.correct`, with the Jacobian as a matrix."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
-    start = np.array(q)
     q = np.array(q)
     for iteration in range(model.max_iterations):
         error = goal - robot.forward_kinematics(q, hand)
@@ -90,10 +87,6 @@ def correct(
         if not np.isfinite(error).all():
             return Correction(q, False, iteration)
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
-        if nullspace_gain:
-            jacobian = robot.jacobian(q, hand) * free
-            away = free * (start - q)
-            step += nullspace_gain * (away - np.linalg.pinv(jacobian) @ jacobian @ away)
         before, q = q, q + step
         if (q == before).all():  # a stationary point away from the goal: it stays for ever
             return Correction(q, False, iteration + 1)
@@ -117,7 +110,7 @@ def learn(
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
-    ticks = corrections = iterations = biased = 0
+    ticks = corrections = iterations = 0
     by_trial = np.zeros(trials, dtype=np.int64)
     for trial in range(trials):
         q = np.array(task.q0)
@@ -135,8 +128,7 @@ def learn(
             has_target = (state, hand) in targets
             if has_target or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
-                target = _explore(task, condition, q, hand, goal, stored, rng)
-                biased += condition.bias > 0
+                target = _explore(task, condition, q, hand, stored, rng)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
@@ -146,9 +138,8 @@ def learn(
                 if has_target and not condition.corrects:
                     break
                 correction = correct(
-                    task.robot, q, hand, goal, locked_base=task.locked_base,
-                    nullspace_gain=condition.nullspace_gain, model=model,
-                )  # fmt: skip
+                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model
+                )
                 iterations += correction.iterations
                 if not correction.converged:
                     break
@@ -179,7 +170,7 @@ def learn(
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, ticks, corrections, by_trial, iterations, biased
+        rewards, completed, values, targets, ticks, corrections, by_trial, iterations
     )
 
 
@@ -222,7 +213,6 @@ def _explore(
     condition: ExplorationCondition,
     q: Array,
     hand: Hand,
-    goal: tuple[float, float],
     stored: Array,
     rng: np.random.Generator,
 ) -> Array:
@@ -233,12 +223,6 @@ def _explore(
     explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
     if not condition.modify_other:
         target[task.robot.joints(other)] = q[task.robot.joints(other)]
-    if condition.bias:
-        error = goal - task.robot.forward_kinematics(stored, hand)
-        step = explored * (task.robot.jacobian(stored, hand).T @ error)
-        length = math.sqrt(_sum_of_squares(step))
-        if length:
-            target += condition.bias * condition.noise_sd / length * step
     target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))
     return target
 
