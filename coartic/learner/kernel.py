@@ -37,6 +37,7 @@ from coartic.motion.compiled import (
 from coartic.motion.corrective import correct_lanes, shift_kernel
 from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
 from coartic.motion.movement import Scratch, move_lanes, scratch_for
+from coartic.motion.penalty import penalty_at
 from coartic.motion.problem import arm_of, goal_of
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
@@ -74,7 +75,7 @@ class Log(NamedTuple):
 
     count: Any  # (N,)
     movements: Any  # (N, 2 G) records of goal, hand, kind, ticks and target
-    hits: Any  # (N, G) records of hand and q
+    hits: Any  # (N, G) records of hand, penalty and q
 
 
 class Kept(NamedTuple):
@@ -84,6 +85,7 @@ class Kept(NamedTuple):
     completed: Any  # (N, T)
     best_trial: Any  # (N,), -1 for none
     replayed: Any  # (N,) whether the replay hit every goal
+    replay_rewards: Any  # (N,)
     counts: Any  # (N, counters) what was spent, without the replay
     corrections: Any  # (N, 1 + PARTS) made until the end of trial 0, and of each part of the rest
     first: Log
@@ -112,6 +114,7 @@ class Work(NamedTuple):
 
     runs: Any  # (N,) records: see runs_for
     trials: Any  # (N,) records: see _TRIAL
+    before: Any  # (N, width) where each hit the goal before, or started; with a penalty alone
     lanes: Lanes
     scratch: Scratch
 
@@ -163,7 +166,7 @@ def empty_log(runs: int, task: Task) -> Log:
     goals, q = len(task.goals), (np.float64, width_of(task.robot))
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
     movement = record_type({**numbers, "target": q})
-    hit = record_type({"hand": np.int64, "q": q})
+    hit = record_type({"hand": np.int64, "penalty": np.int64, "q": q})
     count = np.zeros(runs, dtype=np.int64)
     return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
@@ -175,7 +178,7 @@ _TRIAL = record_type(
         "stored": np.bool_,  # whether the hand has a stored target
         "aimed": np.bool_,  # whether it moves to a target of its own before A acts
         "going": np.bool_,  # whether the trial has not failed
-        "total": np.int64,  # ticks
+        "total": np.int64,  # ticks and penalties
         "counts": (np.int64, len(COUNT)),  # of all trials of the run
     }
 )
@@ -188,6 +191,7 @@ def work_for(runs: int, task: Task) -> Work:
     return Work(
         runs=runs_for(runs, task.robot),
         trials=np.zeros(runs, _TRIAL),
+        before=np.zeros((runs, width_of(task.robot))),
         lanes=lanes_for(task.robot),
         scratch=scratch_for(task.robot),
     )
@@ -405,6 +409,17 @@ def correct_runs(number: int, problem: Any, rules: Any, log: Any, work: Any) -> 
             run.acting = trial.going = run.converged
 
 
+@inlined
+def pay_penalty(n: int, number: int, hit: Any, problem: Any, work: Any) -> None:
+    """What run ``n`` loses beside ticks at the goal that it has just hit."""
+    before, arm, scratch = work.before[n], arm_of(problem, hit.hand), work.scratch
+    hit.penalty = penalty_at(
+        before, hit.q, arm, number == 0, problem.penalty, scratch.xs, scratch.ys
+    )
+    work.trials[n].total += hit.penalty
+    fill_row(before, hit.q)
+
+
 @inner
 def make_trial(
     first: bool,
@@ -421,6 +436,8 @@ def make_trial(
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         fill_row(run.q, problem.start)
+        if problem.penalty.exist:
+            fill_row(work.before[n], problem.start)
         run.evaluations = 0
         trial.previous = NO_HAND
         trial.going = True
@@ -443,6 +460,8 @@ def make_trial(
                 hit = log.hits[n, number]
                 hit.hand = trial.previous = trial.hand
                 fill_row(hit.q, work.runs[n].q)
+                if problem.penalty.exist:
+                    pay_penalty(n, number, hit, problem, work)
     for n in range(len(work.runs)):
         work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
 
@@ -459,7 +478,7 @@ def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> N
             while row > 0 and log.movements[n, row - 1].goal == number:
                 row -= 1
                 ticks += log.movements[n, row].ticks
-            credit = later = rules.discount * later - ticks
+            credit = later = rules.discount * later - (ticks + log.hits[n, number].penalty)
         hit = log.hits[n, number]
         knows = number > 0 and not rules.goal_alone
         before = log.hits[n, number - 1].hand if knows else NO_HAND
@@ -526,4 +545,5 @@ def learn_kernel(
             learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
         kept.replayed[n] = work.trials[n].going
+        kept.replay_rewards[n] = -work.trials[n].total
         copy_movements(n, log, kept.replay)

@@ -87,7 +87,8 @@ class LearningRun:
     """Movements of the best trial."""
     replay: tuple[Movement, ...]
     """Movements of one noiseless greedy trial with the final tables."""
-    replay_completed: bool
+    replay_reward: int | None
+    """Its reward; None where it did not hit every goal."""
     values: Array
     """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Ticks: total
     rewards, or returns from that goal on where the condition credits subtasks."""
@@ -161,11 +162,9 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     @property
-    def replay_reward(self) -> int | None:
-        """Reward of the noiseless greedy trial with the final tables."""
-        if not self.replay_completed:
-            return None
-        return -sum(movement.ticks or 0 for movement in self.replay)
+    def replay_completed(self) -> bool:
+        """Whether the replay hit every goal."""
+        return self.replay_reward is not None
 
     @property
     def replay_hands(self) -> str | None:
@@ -280,6 +279,7 @@ def learn_together(
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
         replayed=np.zeros(runs, dtype=np.bool_),
+        replay_rewards=np.zeros(runs, dtype=np.int64),
         counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
         first=empty_log(runs, task),
@@ -312,7 +312,7 @@ def learn_together(
             initial=logged_movements(kept.first, n, dof),
             solution=logged_movements(kept.best, n, dof),
             replay=logged_movements(kept.replay, n, dof),
-            replay_completed=bool(kept.replayed[n]),
+            replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),

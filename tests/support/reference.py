@@ -163,6 +163,8 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
+            hits, hands = [q for *_, q in visited], [hand for _, hand, _ in visited]
+            total -= penalty(task, hits, hands)[-1]
             subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
@@ -181,6 +183,35 @@ def learn(
     return ReferenceRun(
         rewards, completed, values, targets, ticks, corrections, by_trial, iterations, biased
     )
+
+
+def penalty(task: Task, hits: list[Array], hands: list[Hand]) -> list[int]:
+    """What each goal loses beside its ticks (coartic.motion.penalty), from where they were hit."""
+    lost = []
+    before = np.array(task.q0)
+    for number, (q, hand) in enumerate(zip(hits, hands, strict=False)):
+        rule = task.penalty
+        if rule is None:
+            lost.append(0)
+            continue
+        arm = range(task.robot.dof)[task.robot.joints(hand)]
+        costly = {
+            "base": [0, 1],
+            "arms": range(2, task.robot.dof),
+            "left-arm": range(task.robot.dof)[task.robot.joints("left")],
+            "right-arm": range(task.robot.dof)[task.robot.joints("right")],
+        }[rule.costly]
+        ticks = rule.joints * math.sqrt(sum((q[j] - before[j]) ** 2 for j in costly))
+        elbows = task.robot.joint_positions(q, hand)[1:-1]
+        centre = np.mean(task.goals, axis=0) if rule.centre is None else rule.centre
+        distances = [math.dist(elbow, centre) for elbow in elbows]
+        ticks += rule.region * max([0.0, *(1 - d / rule.radius for d in distances)])
+        if number > 0:
+            change = math.sqrt(sum((q[j] - before[j]) ** 2 for j in arm))
+            ticks += rule.distinct * max(0.0, 1 - change / rule.apart)
+        lost.append(math.floor(ticks + 0.5))
+        before = q
+    return lost
 
 
 def _choose(
