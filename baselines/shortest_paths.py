@@ -19,6 +19,7 @@ from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProbl
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 from coartic.robot import Array, Hand
+from coartic.tasks.task import Penalty
 
 TOLD = frozenset(
     {
@@ -77,6 +78,7 @@ def chain_starts(
     spread: bool,
     only: Hands | None = None,
     costs: Array | float = 1.0,
+    penalty: Penalty | None = None,
 ) -> Iterator[Start]:
     """The chains of :func:`~coartic.baselines.posture_graph.cheapest_chains`.
 
@@ -85,6 +87,7 @@ def chain_starts(
     for chain in cheapest_chains(
         session, task, rng,
         nodes=nodes, graphs=graphs, chains=chains, most=most, only=only, costs=costs,
+        penalty=penalty,
     ):  # fmt: skip
         yield chain.hands, chain.configurations
         if spread and len(task.hands) > 1:
@@ -99,17 +102,19 @@ def shortest_plans(
     *,
     still: bool,
     radius: float,
+    penalty: Penalty | None = None,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
+    Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
+    penalised problem. Raises MethodError where no
     solve finds a path.
     """
     best: dict[Hands, tuple[Instance, Plan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
-        plan = problem.solve(instance, start)
+        plan = problem.solve(instance, start, penalty=penalty)
         session.spend(**plan.spent)
         solves += 1
         failed += not plan.converged

@@ -307,13 +307,14 @@ def aim(
     number: int,
     first: bool,
     explore: bool,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
     rngs: Any,
     work: Any,
 ) -> None:
-    """Where something is learned, set the target; elsewhere see whether the goal is hit."""
+    """Where a target is planned or learned, set it; elsewhere see whether the goal is hit."""
     goal = goal_of(problem, number)
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
@@ -321,6 +322,10 @@ def aim(
         if not trial.going:
             continue
         hand = trial.hand
+        if first and not math.isnan(first_targets[number, 0]):
+            trial.stored, trial.aimed, run.acting = False, True, True
+            fill_row(run.target, first_targets[number])
+            continue
         learned = tables[n, number, previous_hand(trial, rules), hand]
         stored = learned.target
         trial.stored = trial.aimed = learned.value > -math.inf
@@ -425,6 +430,7 @@ def make_trial(
     first: bool,
     explore: bool,
     first_hands: Any,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
@@ -432,7 +438,7 @@ def make_trial(
     rngs: Any,
     work: Any,
 ) -> None:
-    """One trial of every run into ``log``; the ``first`` one with ``first_hands``."""
+    """One trial of every run into ``log``; the ``first`` one with ``first_hands`` and targets."""
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         fill_row(run.q, problem.start)
@@ -449,7 +455,7 @@ def make_trial(
                 work.trials[n].hand = first_hands[number]
         else:
             choose_hands(number, explore, problem, rules, tables, rngs, work)
-        aim(number, first, explore, problem, rules, tables, rngs, work)
+        aim(number, first, explore, first_targets, problem, rules, tables, rngs, work)
         for kind in range(2):
             if kind == CORRECTIVE:
                 correct_runs(number, problem, rules, log, work)
@@ -522,6 +528,7 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
 @entry
 def learn_kernel(
     first_hands: Any,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
@@ -532,7 +539,8 @@ def learn_kernel(
 ) -> None:
     """All trials of N runs, each with its own generator, and the replay of what they learned.
 
-    ``first_hands`` (G,) are those of trial 0. ``tables`` and ``kept`` are filled; ``log``
+    ``first_hands`` (G,) are those of trial 0, ``first_targets`` (G, width) where it moves to, NaN
+    where the corrective process acts. ``tables`` and ``kept`` are filled; ``log``
     is overwritten by every trial.
     """
     trials = kept.rewards.shape[1]
@@ -540,7 +548,10 @@ def learn_kernel(
         replay = trial == trials
         for n in range(len(work.trials) if replay else 0):  # which is not part of the runs
             fill_row(kept.counts[n], work.trials[n].counts)
-        make_trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
+        first = trial == 0
+        make_trial(
+            first, not replay, first_hands, first_targets, problem, rules, tables, log, rngs, work
+        )
         if not replay:
             learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):

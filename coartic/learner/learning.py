@@ -32,10 +32,10 @@ from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import InitialSearch, search_initial_hands
-from coartic.motion.lanes import LANES
+from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
-from coartic.motion.solution import Execution, Movement, execute, hands_in
+from coartic.motion.solution import Execution, Movement, execute, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of, letters_of
@@ -205,11 +205,14 @@ def learn_many(
     trials: int = TRIALS,
     model: MotionModel = PAPER,
     jobs: int = -1,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """Run :func:`learn` for many seeds; one run per seed, in their order.
 
-    Runs go on side by side, on ``jobs`` threads, -1 for one per core; neither changes
-    anything but the time. Raises what :func:`learn` does.
+    ``start`` are movements that trial 0 makes in place of the corrective process, one to a target
+    for each goal, such as those of a plan; what they miss is corrected. Runs go on side by side, on
+    ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
+    :func:`learn` does, and SolutionError for such movements that break the rules.
     """
     need(task, Task, LOADED)
     condition = load_condition(condition)
@@ -219,14 +222,17 @@ def learn_many(
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
-    search = search_initial_hands(task, condition.hands, model=model)
+    if start:
+        search = InitialSearch(hands_in(start))
+    else:
+        search = search_initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(checked_seed, seeds))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
     def perform(lot: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, search, lot, trials)
+        return learn_together(task, condition, model, search, lot, trials, start)
 
     compile_learner(task, condition, model, search)
     if threads == 1:
@@ -264,12 +270,16 @@ def learn_together(
     search: InitialSearch,
     seeds: Sequence[int],
     trials: int,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """All trials of runs side by side, one a seed, which differ in nothing else.
 
-    Raises ValueError for more runs than there are lanes, and for initial hands that do not fit.
+    Raises ValueError for more runs than there are lanes, and for a first trial that does not fit.
     """
     runs, dof = len(seeds), task.robot.dof
+    first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
+    for number, movements in movements_by_goal(task, list(start)) if start else ():
+        first_targets[number - 1, :dof] = movements[0].target
     first_hands = [HANDS.index(hand) for hand in hands_of(search.hands)]
     if len(first_hands) != len(task.goals):
         raise ValueError(f"{len(first_hands)} initial hands for {len(task.goals)} goals")
@@ -289,6 +299,7 @@ def learn_together(
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
         np.array(first_hands, dtype=np.int64),
+        first_targets,
         problem_of(task, model, nullspace_gain=condition.nullspace_gain),
         rules_of(task, condition),
         tables,

@@ -9,6 +9,7 @@ whole numbers, and no bit of a joint decides between two of them.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from coartic.motion.compiled import entry, inner, joint_chain
 from coartic.motion.costs import joint_costs
 from coartic.robot import HANDS, Array
-from coartic.tasks.task import Penalty, Task
+from coartic.tasks.task import Penalty, Point, Task
 
 
 class Terms(NamedTuple):
@@ -37,7 +38,7 @@ class Terms(NamedTuple):
 def terms_of(task: Task) -> Terms:
     """A task's penalty for kernels; that of a task without one is never read."""
     given = task.penalty or Penalty()
-    centre = mean_goal(task) if given.centre is None else given.centre
+    centre = disc_centre(task.goals, given)
     return Terms(
         exist=task.penalty is not None,
         joints=float(given.joints),
@@ -51,9 +52,11 @@ def terms_of(task: Task) -> Terms:
     )
 
 
-def mean_goal(task: Task) -> tuple[float, float]:
-    """The mean of the centres of a task's goals, length unit."""
-    xs, ys = zip(*task.goals, strict=True)
+def disc_centre(goals: Sequence[Point], penalty: Penalty) -> Point:
+    """The centre of the disc of a penalty, length unit: the mean of the goals if it names none."""
+    if penalty.centre is not None:
+        return penalty.centre
+    xs, ys = zip(*goals, strict=True)
     return math.fsum(xs) / len(xs), math.fsum(ys) / len(ys)
 
 

@@ -8,6 +8,7 @@ policy's initial hands are taken over. Draws from its generator in the same orde
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction
 from coartic.motion.initial import initial_hands
 from coartic.motion.movement import MoveResult
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task, hands_of
 
@@ -109,10 +111,13 @@ def learn(
     seed: int,
     trials: int,
     model: MotionModel = PAPER,
+    start: Sequence[Movement] = (),
 ) -> ReferenceRun:
-    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line."""
+    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line; ``start``: trial 0."""
     rng = np.random.default_rng(seed)
-    first_hands = hands_of(initial_hands(task, condition.hands, model=model))
+    first_hands = [movement.hand for movement in start] or hands_of(
+        initial_hands(task, condition.hands, model=model)
+    )
     values: dict[tuple[State, Hand], float] = {}
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
@@ -133,7 +138,12 @@ def learn(
             else:
                 hand = _choose(task, condition, q, goal, state, previous, values, rng)
             has_target = (state, hand) in targets
-            if has_target or (trial > 0 and condition.unknown_target == "explores"):
+            if trial == 0 and start:
+                target = start[number].target
+                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
+                q, total, hit = result.q, total - result.ticks, result.hit
+                ticks += result.ticks
+            elif has_target or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
                 target = _explore(task, condition, q, hand, goal, stored, rng)
                 biased += condition.bias > 0
