@@ -11,7 +11,7 @@
 
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
 groups of claims: those on the paper's own seven cells, those that take other runs beside them,
-those on families of random tasks, and those that are not the paper's. A claim that a folder cannot
+those on families of random tasks, and our own on one suite. A claim that a folder cannot
 test counts in its group all the same, so that what is decided stays decided whatever else is run.
 """
 
@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from coartic.analysis.claims import rules, single
+from coartic.analysis.claims import objectives, rules, single
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import mostly_refuted
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
@@ -37,6 +37,7 @@ RULES: dict[str, Callable[[Data, Claim], Finding]] = {
         *(rules.higher, rules.some_higher, rules.in_every_family, rules.counted, rules.ordered),
         *(single.context, single.sequences_change, single.initial_base_reverses),
         *(single.corrective_ensures, single.corrective_near_shortest, single.printed_p_values),
+        *(objectives.less_regret,),
     )
 }
 """The rules by their names in ``claims.toml``."""
@@ -107,9 +108,11 @@ def opposite_p(claim: Claim, finding: Finding) -> float:
 
 @cached
 def judged(study: Study) -> list[Judged]:
-    """Every claim about such tasks as the folder has, judged and corrected."""
+    """The claims on the folder's suite, judged and corrected; without any, those on its tasks."""
+    of_suite = [claim for claim in CLAIMS.values() if claim.suite == study.suite]
     drawn = {task.family is not None for task in study.tasks.values()} or {False}
-    return judge(study, [c for c in CLAIMS.values() if bool(c.families) in drawn])
+    of_tasks = [c for c in CLAIMS.values() if not c.suite and bool(c.families) in drawn]
+    return judge(study, of_suite or of_tasks)
 
 
 def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:

@@ -24,7 +24,7 @@ MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.
 Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
 Group = Literal["paper", "beside", "families", "ours"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; and claims that are not the paper's."""
+families of random tasks; and claims of our own, those on one suite."""
 
 _HANDS = "[LR]+"
 QUANTITIES = {
@@ -157,6 +157,8 @@ class Claim(BaseModel):
     cells: Mapping[str, Sequence[str]] = {}
     families: Sequence[str] = ()
     compared: Sequence[Pair] = ()
+    suite: str = ""
+    power: str = ""
     place: str = ""
     quote: str = ""
     figure: str = ""
