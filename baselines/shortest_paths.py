@@ -16,6 +16,7 @@ from coartic.baselines.posture_graph import Hands, Start
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
+from coartic.tasks.task import Penalty
 
 TOLD = frozenset(
     {
@@ -67,17 +68,18 @@ def shortest_plans(
     *,
     still: bool,
     radius: float,
+    penalty: Penalty | None = None,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
-    solve finds a path.
+    Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
+    penalised problem. Raises MethodError where no solve finds a path.
     """
     best: dict[Hands, tuple[Instance, Plan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
-        plan = problem.solve(instance, start)
+        plan = problem.solve(instance, start, penalty=penalty)
         session.spend(**plan.spent)
         solves += 1
         failed += not plan.converged

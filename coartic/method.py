@@ -338,7 +338,7 @@ class Session:
         self._meter.jacobians += int(trials.iterations.sum())
         self._meter.forward_kinematics += int(trials.evaluations.sum())
         self._meter.failed_trials += int((~trials.completed).sum())
-        rewards: list[int | None] = (-trials.ticks).tolist()
+        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
         for failed in np.flatnonzero(~trials.completed).tolist():
             rewards[failed] = None
         self._rewards.extend(rewards)

@@ -67,7 +67,7 @@ def sequences_of(session: Session) -> list[str]:
 
 
 class Objective:
-    """The cost of a trial in ticks, a function of its target configurations.
+    """The cost of a trial, ticks and penalty, a function of its target configurations.
 
     A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
     by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
@@ -139,8 +139,7 @@ class Objective:
         targets = np.full((left, *self.joints.shape), np.nan)
         targets[:, self.joints] = array[:left]
         trials = self._session.trials(self.hands, targets)
-        in_time = trials.completed & (trials.ticks < FAILED)
-        costs = np.where(in_time, trials.ticks, FAILED).astype(np.float64)
+        costs = np.minimum(-trials.rewards, FAILED)
         self.evaluations += len(costs)
         if len(costs) and costs.min() < self.best_cost:
             best = int(costs.argmin())

@@ -44,7 +44,7 @@ def results(tmp_path_factory):
 
 
 def test_every_method_runs_in_some_suite():
-    suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon"))
+    suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon", "objectives"))
     patterns = {pattern for suite in suites for block in suite.cells for pattern in block.methods}
     run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
     assert run == set(KNOWN)

@@ -33,10 +33,10 @@ from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
-from coartic.motion.lanes import LANES
+from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
-from coartic.motion.solution import Execution, Movement, execute, hands_in
+from coartic.motion.solution import Execution, Movement, execute, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of, letters_of
@@ -67,7 +67,8 @@ class LearningRun:
     """Movements of the best trial."""
     replay: tuple[Movement, ...]
     """Movements of one noiseless greedy trial with the final tables."""
-    replay_completed: bool
+    replay_reward: int | None
+    """Its reward; None where it did not hit every goal."""
     values: Array
     """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Ticks: total
     rewards, or returns from that goal on where the condition credits subtasks."""
@@ -137,11 +138,9 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     @property
-    def replay_reward(self) -> int | None:
-        """Reward of the noiseless greedy trial with the final tables."""
-        if not self.replay_completed:
-            return None
-        return -sum(movement.ticks or 0 for movement in self.replay)
+    def replay_completed(self) -> bool:
+        """Whether the replay hit every goal."""
+        return self.replay_reward is not None
 
     @property
     def replay_hands(self) -> str | None:
@@ -182,11 +181,14 @@ def learn_many(
     trials: int = TRIALS,
     model: MotionModel = PAPER,
     jobs: int = -1,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """Run :func:`learn` for many seeds; one run per seed, in their order.
 
-    Runs go on side by side, on ``jobs`` threads, -1 for one per core; neither changes
-    anything but the time. Raises what :func:`learn` does.
+    ``start`` are movements that trial 0 makes in place of the corrective process, one to a target
+    for each goal, such as those of a plan; what they miss is corrected. Runs go on side by side, on
+    ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
+    :func:`learn` does, and SolutionError for such movements that break the rules.
     """
     need(task, Task, LOADED)
     condition = load_condition(condition)
@@ -196,14 +198,14 @@ def learn_many(
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
-    first_hands = initial_hands(task, condition.hands, model=model)
+    first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(checked_seed, seeds))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
     def perform(lot: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, first_hands, lot, trials)
+        return learn_together(task, condition, model, first_hands, lot, trials, start)
 
     compile_learner(task, condition, model, first_hands)
     if threads == 1:
@@ -241,12 +243,16 @@ def learn_together(
     first_hands: str,
     seeds: Sequence[int],
     trials: int,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """All trials of runs side by side, one a seed, which differ in nothing else.
 
-    Raises ValueError for more runs than there are lanes, and for initial hands that do not fit.
+    Raises ValueError for more runs than there are lanes, and for a first trial that does not fit.
     """
     runs, dof = len(seeds), task.robot.dof
+    first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
+    for number, movements in movements_by_goal(task, list(start)) if start else ():
+        first_targets[number - 1, :dof] = movements[0].target
     codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
     if len(codes) != len(task.goals):
         raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
@@ -256,6 +262,7 @@ def learn_together(
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
         replayed=np.zeros(runs, dtype=np.bool_),
+        replay_rewards=np.zeros(runs, dtype=np.int64),
         counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
         first=empty_log(runs, task),
@@ -265,6 +272,7 @@ def learn_together(
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
         np.array(codes, dtype=np.int64),
+        first_targets,
         problem_of(task, model),
         rules_of(task, condition),
         tables,
@@ -288,7 +296,7 @@ def learn_together(
             initial=logged_movements(kept.first, n, dof),
             solution=logged_movements(kept.best, n, dof),
             replay=logged_movements(kept.replay, n, dof),
-            replay_completed=bool(kept.replayed[n]),
+            replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),

@@ -8,7 +8,7 @@ declares holds under all its parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import chain
 from typing import Annotated, ClassVar
 
@@ -30,6 +30,7 @@ from coartic.learner.conditions import (
 from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
 from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.motion.lanes import LANES
+from coartic.motion.solution import Movement
 from coartic.tasks.task import Task
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
@@ -86,13 +87,19 @@ class DualProcess(Method):
         trials: int = self.parameters.trials
         return max(1, min(LANES, _MOST_TRIALS // trials))
 
+    def first_trial(self, sessions: Sequence[Session], task: Task) -> tuple[Movement, ...]:
+        """The movements of trial 0, one for each goal; none where the corrective process acts."""
+        return ()
+
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's."""
         parameters: DualProcessParameters = self.parameters
-        condition = replace(self.condition, **parameters.model_dump(exclude={"trials"}))
+        of_condition = parameters.model_dump(include={f.name for f in fields(ExplorationCondition)})
+        condition = replace(self.condition, **of_condition)
         tasks = [session.hand_over(*self.told) for session in sessions]
         task, model = tasks[0], sessions[0].model
-        for session in sessions:
+        start = self.first_trial(sessions, task)
+        for session in sessions if not start else ():
             session.find_initial_hands(condition.hands)
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -106,6 +113,7 @@ class DualProcess(Method):
             trials=trials,
             model=model,
             jobs=1,
+            start=start,
         )
         return [_result(*pair) for pair in zip(sessions, runs, strict=True)]
 

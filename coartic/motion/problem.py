@@ -10,6 +10,7 @@ from coartic.model import MotionModel
 from coartic.motion.compiled import inlined
 from coartic.motion.corrective import Corrector
 from coartic.motion.movement import Goal, checked_goal, configuration
+from coartic.motion.penalty import Terms, terms_of
 from coartic.robot import Arm
 from coartic.tasks.task import Task
 
@@ -24,6 +25,7 @@ class Problem(NamedTuple):
     right: Arm
     corrector: Corrector
     model: MotionModel
+    penalty: Terms
 
 
 def problem_of(task: Task, model: MotionModel) -> Problem:
@@ -42,6 +44,7 @@ def problem_of(task: Task, model: MotionModel) -> Problem:
         right=task.robot.arm("right"),
         corrector=Corrector("x" not in locked, "y" not in locked),
         model=model,
+        penalty=terms_of(task),
     )
 
 

@@ -8,6 +8,7 @@ policy's initial hands are taken over. Draws from its generator in the same orde
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction
 from coartic.motion.initial import initial_hands
 from coartic.motion.movement import MoveResult
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task, hands_of
 
@@ -102,10 +104,13 @@ def learn(
     seed: int,
     trials: int,
     model: MotionModel = PAPER,
+    start: Sequence[Movement] = (),
 ) -> ReferenceRun:
-    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line."""
+    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line; ``start``: trial 0."""
     rng = np.random.default_rng(seed)
-    first_hands = hands_of(initial_hands(task, condition.hands, model=model))
+    first_hands = [movement.hand for movement in start] or hands_of(
+        initial_hands(task, condition.hands, model=model)
+    )
     values: dict[tuple[State, Hand], float] = {}
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
@@ -126,7 +131,12 @@ def learn(
             else:
                 hand = _choose(task, condition, q, goal, state, previous, values, rng)
             has_target = (state, hand) in targets
-            if has_target or (trial > 0 and condition.unknown_target == "explores"):
+            if trial == 0 and start:
+                target = start[number].target
+                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
+                q, total, hit = result.q, total - result.ticks, result.hit
+                ticks += result.ticks
+            elif has_target or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
                 target = _explore(task, condition, q, hand, stored, rng)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
@@ -154,6 +164,8 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
+            hits, hands = [q for *_, q in visited], [hand for _, hand, _ in visited]
+            total -= penalty(task, hits, hands)[-1]
             subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
@@ -172,6 +184,35 @@ def learn(
     return ReferenceRun(
         rewards, completed, values, targets, ticks, corrections, by_trial, iterations
     )
+
+
+def penalty(task: Task, hits: list[Array], hands: list[Hand]) -> list[int]:
+    """What each goal loses beside its ticks (coartic.motion.penalty), from where they were hit."""
+    lost = []
+    before = np.array(task.q0)
+    for number, (q, hand) in enumerate(zip(hits, hands, strict=False)):
+        rule = task.penalty
+        if rule is None:
+            lost.append(0)
+            continue
+        arm = range(task.robot.dof)[task.robot.joints(hand)]
+        costly = {
+            "base": [0, 1],
+            "arms": range(2, task.robot.dof),
+            "left-arm": range(task.robot.dof)[task.robot.joints("left")],
+            "right-arm": range(task.robot.dof)[task.robot.joints("right")],
+        }[rule.costly]
+        ticks = rule.joints * math.sqrt(sum((q[j] - before[j]) ** 2 for j in costly))
+        elbows = task.robot.joint_positions(q, hand)[1:-1]
+        centre = np.mean(task.goals, axis=0) if rule.centre is None else rule.centre
+        distances = [math.dist(elbow, centre) for elbow in elbows]
+        ticks += rule.region * max([0.0, *(1 - d / rule.radius for d in distances)])
+        if number > 0:
+            change = math.sqrt(sum((q[j] - before[j]) ** 2 for j in arm))
+            ticks += rule.distinct * max(0.0, 1 - change / rule.apart)
+        lost.append(math.floor(ticks + 0.5))
+        before = q
+    return lost
 
 
 def _choose(
