@@ -32,7 +32,7 @@ QUICK = {"nodes": 40, "graphs": 1, "starts": 4}
 def plan_of(terms, belief=1.0):
     """What the planner hands over on the small task with a penalty, executed."""
     task = with_penalty(SMALL, **TERMS[terms]) if terms else SMALL
-    method = BelievedReward(BelievedReward.Parameters(belief=belief, nodes=120, starts=8))
+    method = BelievedReward(BelievedReward.Parameters(belief=belief, nodes=60, starts=4))
     session = Session(task, 0, method.told, trusted=True)
     return execute(task, method.solve(session).solution)
 
@@ -44,7 +44,7 @@ def test_who_is_told_the_truth_plans_best(terms):
     assert rewards[1] <= rewards[2] + 2  # ticks of rounding
     task = with_penalty(SMALL, **TERMS[terms])
     for seed in range(2):  # long trial and error finds nothing that is much better
-        searched = Bandit(Bandit.Parameters(trials=4000)).solve(Session(task, seed, Bandit.told))
+        searched = Bandit(Bandit.Parameters(trials=2000)).solve(Session(task, seed, Bandit.told))
         assert execute(task, searched.solution).reward <= rewards[2] + 3
 
 
