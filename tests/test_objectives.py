@@ -1,14 +1,21 @@
 """The study of wrong objectives, on a small folder: against a slow loop, and in closed form."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from coartic import execute
+from coartic import execute, load_task
+from coartic.analysis import tables
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.objectives import less_regret
 from coartic.analysis.claims.register import CLAIMS, Claim
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.report import build, facts
+from coartic.analysis.report.text import sentence
+from coartic.analysis.studies import objectives
 from coartic.analysis.studies.objectives import advantage, crossing, crossings, rewards
 from coartic.analysis.study import load
 from coartic.benchmarks.run import run_suite
@@ -16,6 +23,7 @@ from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
 from coartic.tasks.task import hands_of
 from tests.support import reference
+from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN, InProcess
 
 SMALL = """
@@ -120,3 +128,40 @@ def test_suite_has_what_its_claims_compare():
     instances = {c.task.name for c in cells if "/" in c.task.name and c.task.penalty is None}
     assert len(instances) >= 40
     assert all("/i" in name for name in instances)
+
+
+def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
+    """Regrets of ten tasks, planted in the place of solutions."""
+    planted = {"told": 0.0, "ticks": 50.0, "learner": 20.0, "from plan": 10.0}
+    rows = []
+    for number in range(10):
+        for weight, share in ((0.0, 0.0), (100.0, 0.5), (300.0, 1.0)):
+            for who, regret in planted.items():
+                at = {"ticks": share, "from plan": share}.get(who, 1.0)
+                rows.append(
+                    {
+                        "task": f"one-armed/v1/i{number:03d}", "family": "one-armed/v1",
+                        "split": "test", "term": "region", "weight": weight, "who": who,
+                        "reward": -100.0, "regret": regret * at * (0.8 + 0.4 * number / 9),
+                        "cell": SimpleNamespace(runs=pd.DataFrame({"run_id": [f"{number}"]})),
+                    }
+                )  # fmt: skip
+    frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
+    monkeypatch.setattr(objectives, "rewards", lambda study: frame)
+    study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
+    table = tables.TABLES["objectives"](study)
+    assert table.regret["region 300 ticks"] == pytest.approx(50)
+    assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]
+    assert table.helps["region 100 from plan"] == pytest.approx(15)  # 20 % against 5 %
+    assert set(table.tasks) == {10}
+    crossings = tables.TABLES["crossings"](study)
+    # 25 % at 100, so that 20 % lie at 80.
+    assert crossings.crossing["region learner"] == pytest.approx(80)
+    assert list(crossings.index) == ["region learner"]
+    assert build.drawn(study, "objectives")
+    assert "weight of 80 with a costly disc" in sentence("objectives", facts.objectives(study))
+
+
+def test_variants_of_instances_are_not_listed_one_by_one(study):
+    assert len(study.tasks) == 9
+    assert not one_by_one(study)

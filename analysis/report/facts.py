@@ -33,6 +33,8 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.paper import best_condition
 
 Facts = dict[str, Any]
+PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
+"""Terms of a penalty in words."""
 
 
 @cached
@@ -295,6 +297,29 @@ def stops(study: Study) -> list[Facts] | None:
         if {0.0, 1.0} <= set(at.index):
             both.append({"times": words, "passing": at.loc[0.0], "stopping": at.loc[1.0]})
     return both or None
+
+
+@cached
+def objectives(study: Study) -> Facts | None:
+    """Regrets at the largest weight, by penalty, and where trial and error overtakes."""
+    rows = tables.TABLES["objectives"](study)
+    if not len(rows):
+        return None
+    last = rows[rows.weight == rows.weight.max()]
+    by_term = {term: part.set_index("who") for term, part in last.groupby("term", sort=False)}
+    crossings = tables.TABLES["crossings"](study)
+    return {
+        "tasks": int(rows.tasks.max()),
+        "weight": rows.weight.max(),
+        "penalties": [
+            {"term": PENALTIES[str(term)], "regret": part.regret.to_dict()}
+            for term, part in by_term.items()
+        ],
+        "crossings": [
+            {**row, "term": PENALTIES[row["term"]]}
+            for row in crossings[crossings.who == "learner"].to_dict("records")
+        ],
+    }
 
 
 @cached

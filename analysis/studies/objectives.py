@@ -12,12 +12,14 @@ import numpy as np
 import pandas as pd
 
 from coartic import Movement, Task, execute
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import Study, cached
 from coartic.learner.rows import movements_from
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
+Solution = tuple[Movement, ...]
 TERMS = ("joints", "region", "distinct")
 """Penalties, each by its one weight."""
 WHO = ("told", "ticks", "smooth", "learner", "from plan", "cma-es")
@@ -53,9 +55,9 @@ def rewards(study: Study) -> pd.DataFrame:
     """Mean reward under the true objective: a row for each task, term, weight and who.
 
     Columns ``task`` (without its variant), ``family`` (missing for the paper's), ``split``,
-    ``term``, ``weight``, ``who``, ``reward`` and ``regret``, in per cent of the best reward that is
-    known under this objective. A task without a penalty is one of weight 0 under every term. Runs
-    that failed are left out.
+    ``term``, ``weight``, ``who``, ``reward``, ``regret``, in per cent of the best reward that is
+    known under this objective, and ``cell``, whose runs are behind it. A task without a penalty is
+    one of weight 0 under every term. Runs that failed are left out.
     """
     rows = []
     plans = plans_without_penalty(study)
@@ -63,55 +65,59 @@ def rewards(study: Study) -> pd.DataFrame:
         address = address_of(base_of(name))
         family, split = (address.family, address.split) if address else (None, None)
         term, weight = term_of(task)
-        seen: dict[str, float] = {}
+        seen: dict[str, tuple[float, CellRuns]] = {}
         best = -np.inf
         for (of, label), cell in study.cells.items():
             method = label.partition(" ")[0]
             who = _METHODS.get(method) or _METHODS.get(method.partition("/")[0])
             if of == name and who is not None and len(cell.good):
-                seen[who] = float(cell.rewards.mean())
+                seen[who] = float(cell.rewards.mean()), cell
                 best = max(best, float(cell.rewards.max()))
-        for who, movements in plans.get(base_of(name), {}).items():
+        for who, (movements, cell) in plans.get(base_of(name), {}).items():
             scored = execute(task, movements, model=study.model)
             if scored.reward is not None:
-                seen[who] = float(scored.reward)
-                best = max(best, seen[who])
+                seen[who] = float(scored.reward), cell
+                best = max(best, float(scored.reward))
         for one in TERMS if weight == 0 else (term,):
-            for who, reward in seen.items():
+            for who, (reward, cell) in seen.items():
                 regret = 100 * (best - reward) / abs(best)
-                row = (base_of(name), family, split, one, weight, who, reward, regret)
+                row = (base_of(name), family, split, one, weight, who, reward, regret, cell)
                 rows.append(row)
-    columns = ["task", "family", "split", "term", "weight", "who", "reward", "regret"]
+    columns = ["task", "family", "split", "term", "weight", "who", "reward", "regret", "cell"]
     return pd.DataFrame(rows, columns=columns).astype({"family": "string", "split": "string"})
 
 
 @cached
-def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Movement, ...]]]:
-    """By task without a penalty, the movements of the planners that know of none."""
+def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Solution, CellRuns]]]:
+    """By task without a penalty, the plans of those that know of none, and their runs."""
     movements, waypoints = study.movements
-    plans: dict[str, dict[str, tuple[Movement, ...]]] = {}
+    plans: dict[str, dict[str, tuple[Solution, CellRuns]]] = {}
     for (name, label), cell in study.cells.items():
         who = _PLANNERS.get(label.partition(" ")[0])
         if who and study.tasks[name].penalty is None and len(cell.good):
             run = str(cell.good.run_id.iloc[0])
             task = study.tasks[name]
-            plans.setdefault(name, {})[who] = movements_from(
-                task, movements[run], waypoints.get(run)
-            )
+            solution = movements_from(task, movements[run], waypoints.get(run))
+            plans.setdefault(name, {})[who] = solution, cell
     return plans
+
+
+def on_random_tasks(study: Study) -> pd.DataFrame:
+    """Rows of :func:`rewards` on random tasks; development instances where there are no others."""
+    frame = rewards(study)
+    frame = frame[frame.family.notna()]
+    reported = frame[frame.split != "development"]
+    return reported if len(reported) else frame
 
 
 def advantage(study: Study, first: str, second: str, term: str) -> pd.DataFrame:
     """By how much less ``first`` regrets than ``second``, in per cent of the best known reward.
 
     A row for each random task that both solved under every weight of a term, a column for each
-    weight, 0 first; indexed by family and task. Development instances count where there are no
-    others.
+    weight, 0 first; indexed by family and task.
     """
-    frame = rewards(study)
-    frame = frame[frame.family.notna() & (frame.term == term)]
-    reported = frame[frame.split != "development"]
-    frame = reported if len(reported) else frame
+    frame = on_random_tasks(study)
+    frame = frame[frame.term == term]
     sides = [
         frame[frame.who == who].pivot_table("regret", index=["family", "task"], columns="weight")
         for who in (second, first)
