@@ -100,7 +100,7 @@ def gain(study: Study) -> Facts | None:
 def paper(study: Study) -> Facts | None:
     """What became of the paper's rewards and claims; None without its tasks and families."""
     entries = [entry for entry in judged(study) if entry.claim.place]
-    if not paper_rows(study) and not any(entry.run_ids for entry in entries):
+    if not entries or not (paper_rows(study) or any(entry.run_ids for entry in entries)):
         return None
     rewards = Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
     return {
