@@ -37,7 +37,7 @@ def opened(browser, address):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
     problems, contexts = [], []
 
-    def open_page(width=1280, **options):
+    def open_page(width=1280, link=address, **options):
         context = browser.new_context(viewport={"width": width, "height": 900}, **options)
         contexts.append(context)
         page = context.new_page()
@@ -49,7 +49,7 @@ def opened(browser, address):
                 None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
             ),
         )
-        page.goto(address)
+        page.goto(link)
         return page
 
     yield open_page
@@ -207,6 +207,41 @@ def test_the_next_goal_is_dragged_by_a_finger(opened):
     assert place(page)[0] == 5
     finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     assert page.evaluate("scrollY") == before  # the page did not scroll instead
+
+
+STATE = """[...document.querySelectorAll("select[id], input[id]")].map(each => each.value)
+    .concat([...document.querySelectorAll(".facts")].map(each => each.innerText))"""
+
+
+def test_the_address_holds_the_view(opened, address):
+    page = opened(reduced_motion="reduce")
+    untouched = page.evaluate(STATE)
+    assert page.url == address
+    page.locator("#next-goal-place").fill("5")
+    page.select_option("#player-view", "own")
+    page.select_option("#player-0", "ascending initial")
+    page.select_option("#player-1", "two-armed-1 dual-process/EC4")
+    page.locator("#player-tick").fill("57")
+    page.get_by_label("One tick back").click()
+    page.select_option("#claims-verdict", "undecided")
+    page.locator("#price").scroll_into_view_if_needed()
+    page.evaluate("document.getElementById('price').scrollIntoView()")
+    page.wait_for_url("**player-tick=56**#price")
+    again = opened(link=page.url, reduced_motion="no-preference")
+    assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
+    again.wait_for_timeout(300)
+    assert again.url == page.url
+    assert abs(again.evaluate("document.getElementById('price').getBoundingClientRect().top")) < 2
+    # Back at the beginning nothing is left of it.
+    page.evaluate("scrollTo(0, 0)")
+    page.select_option("#claims-verdict", "")
+    page.locator("#next-goal-place").fill(untouched[0])
+    page.select_option("#player-view", "0")
+    page.locator("#player-tick").fill(untouched[4])
+    page.wait_for_url(address)
+    # What an old link names and the page does not have is left out.
+    odd = opened(link=f"{address}?player-0=nobody&player-tick=x&nothing=1", reduced_motion="reduce")
+    assert odd.evaluate(STATE) == untouched
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])

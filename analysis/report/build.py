@@ -188,7 +188,7 @@ def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
     player = player_json(study)
-    scripts = ["page.js", "next_goal.js", *(["player.js"] if player else [])]
+    scripts = ["page.js", "next_goal.js", *(["player.js"] if player else []), "address.js"]
     template = environment(escape=True).get_template("page.html.jinja")
     script = "\n".join(f"{{\n{(here / name).read_text(encoding='utf-8')}}}" for name in scripts)
     try:
