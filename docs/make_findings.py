@@ -17,7 +17,6 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
@@ -126,7 +125,7 @@ def filled_pages() -> dict[str, str]:
     )
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "seen": seen, "expect": expect, "name_of": name_of, "register": CLAIMS,
+        "seen": seen, "expect": expect, "name_of": name_of,
         "printed": tomllib.loads((ANALYSIS / "published.toml").read_text("utf-8"))["general"],
         "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
         "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
