@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import integrate, stats
+from scipy import stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.signatures.context import (
@@ -22,22 +22,13 @@ from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
 from coartic.analysis.signatures.other_arm import (
     preshaping,
-    readiness,
-    readiness_from_base,
     travel,
-)
-from coartic.analysis.signatures.paths import (
-    base_reversals,
-    dimensionless_jerk,
-    smoothness,
-    spectral_arc_length,
-    turning_angles,
 )
 from coartic.analysis.signatures.register import REGISTER, signatures
 from coartic.analysis.signatures.subtasks import (
     isolated_agreement,
-    isolated_reaches,
-    sacrifices,
+    isolated_reach,
+    turning_angles,
 )
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
 from tests.support.made_up import MadeUp, study_of
@@ -239,21 +230,12 @@ def test_synergy_finds_what_is_planted():
 
 def test_isolated_reaches_are_the_corrective_process():
     task = load_task("two-armed-1")
-    alone = isolated_reaches(task, task.q0, 1)
     for hand, letter in (("left", "L"), ("right", "R")):
-        assert alone[hand] == corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
-    assert isolated_reaches(tiny_task(), posture(0.5, 0.9), 1)["right"] == 0
+        ticks, _ = isolated_reach(task, task.q0, 1, hand)
+        assert ticks == corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
+    assert isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
-    assert isolated_reaches(unreachable, unreachable.q0, 3) == {}
-
-
-@pytest.mark.parametrize(
-    ("change", "seen"),
-    [((2, -3), True), ((1, -3), False), ((2, -2), False), ((2, 5, -8), True), ((-2, -3), False)],
-)
-def test_a_tick_is_no_sacrifice(change, seen):
-    """A planned movement can lose one to rounding."""
-    assert sacrifices(np.array(change)) is seen
+    assert isolated_reach(unreachable, unreachable.q0, 3, "right") is None
 
 
 def test_other_hands_are_no_sacrifice():
@@ -266,7 +248,6 @@ def test_other_hands_are_no_sacrifice():
     rows = frame.set_index("signature")
     assert rows.loc["first subtask against the same hands"].value == 0
     assert rows.loc["total against the same hands"].value == 0
-    assert rows.loc["first subtask sacrificed"].value == 0
 
 
 def test_choice_in_isolation():
@@ -290,39 +271,11 @@ def test_best_corrective_sequences():
 # The other arm
 
 
-def test_readiness_and_travel():
-    """While the right hand works, the left one comes half the way to its goal."""
+def test_travel_is_of_the_arm_that_waits():
     task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
-    initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
-    bent = posture(1.0, left_4=0.5)
-    path = trajectory(task, planned(bent, posture(4.0), hands="RL"))
-    left = [
-        task.robot.forward_kinematics(execution.configurations[0], "left") - [7.5, 0.1]
-        for execution in (path.execution, initial)
-    ]
-    gains = readiness(path, initial)
-    assert gains[0] == pytest.approx(1 - np.linalg.norm(left[0]) / np.linalg.norm(left[1]))
-    assert gains[0] < 0  # bent away
-    assert math.isnan(gains[1])
-    same = trajectory(task, planned(posture(1.0), posture(4.0), hands="RL"))
-    assert readiness(same, initial)[0] == 0.0
+    path = trajectory(task, planned(posture(1.0, left_4=0.5), posture(4.0), hands="RL"))
     assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
     assert travel(path)[1] == 0.0  # the right arm, when the left hand works
-
-
-def test_readiness_by_the_base_alone():
-    """The left arm keeps its joints, the base brings it half a length nearer."""
-    task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
-    initial = execute(task, planned(posture(1.0), posture(4.0), hands="RL"))
-    bent = posture(1.5, right_1=0.8, right_2=-1.6)  # the right hand stays behind
-    hand = task.robot.forward_kinematics(bent, "right")
-    near = tiny_task(goals=[hand.tolist(), [7.5, 0.1]], initial_hands="RL")
-    path = trajectory(near, planned(bent, posture(4.0), hands="RL"))
-    assert path.execution.configurations[0, 0] > initial.configurations[0, 0] + 0.1
-    assert readiness(path, initial)[0] > 0.05
-    for arm_alone in (readiness_from_base, preshaping):
-        assert arm_alone(path, initial)[0] == 0.0
-        assert math.isnan(arm_alone(path, initial)[1])
 
 
 def test_preshaping_by_the_arm_alone():
@@ -337,10 +290,12 @@ def test_preshaping_by_the_arm_alone():
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, planned(swung, end, hands="RL"))
     path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
-    gains = readiness(path, initial)
-    assert 0.2 < gains[0] < 0.8
-    np.testing.assert_array_equal(readiness_from_base(path, initial), gains)
-    np.testing.assert_array_equal(preshaping(path, initial), gains)
+    now, before = (
+        np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
+        for of in (path.execution, initial)
+    )
+    assert 0.2 < preshaping(path, initial)[0] == pytest.approx(1 - now / before)
+    assert np.isnan(preshaping(path, initial)[1])
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -348,7 +303,6 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
     path = trajectory(task, corrective_trial(task, "LRLR").movements)
-    assert abs(readiness_from_base(path, initial)[1]) > 0.1
     np.testing.assert_array_equal(preshaping(path, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
@@ -383,74 +337,11 @@ def test_waiting_arms_keep_still_under_condition_3_only():
 # Form
 
 
-@pytest.mark.parametrize(
-    ("positions", "count"),
-    [
-        ([0, 1, 2, 3], 0),
-        ([0, 1, 0, 1], 2),
-        ([0, -1, -2, 0], 1),
-        ([0, 1, 0.995, 2], 0),  # jitter below the tolerance
-        ([0, 1, 1, 1, 0.5], 1),
-        ([0, 0.5, 1, 0.995, 0.99, 0.98, 0.97], 1),  # slowly, but back
-        ([2, 2, 2], 0),
-        ([0.0], 0),
-    ],
-)
-def test_base_reversals(positions, count):
-    x = np.array(positions, dtype=float)
-    assert base_reversals(x) == count
-    assert base_reversals(-x) == count
-
-
 def test_turning_angles():
     corners = np.array([[0, 0], [1, 0], [2, 0], [2, 3], [2, 1], [2, 1], [5, 5.0]])
     angles = turning_angles(corners)
     np.testing.assert_allclose(angles[:3], [0, math.pi / 2, math.pi], atol=1e-12)
     assert np.isnan(angles[3:]).all()
-
-
-def minimum_jerk(rows):
-    time = np.linspace(0, 1, rows)
-    return np.stack([10 * time**3 - 15 * time**4 + 6 * time**5, np.zeros(rows)], axis=1)
-
-
-def test_dimensionless_jerk_of_the_minimum_jerk_reach():
-    """720 over the squared peak speed of 15/8, at any size and duration."""
-    exact = 720 / (15 / 8) ** 2
-    assert dimensionless_jerk(minimum_jerk(2001)) == pytest.approx(exact, rel=2e-2)
-    assert dimensionless_jerk(7 * minimum_jerk(4001)) == pytest.approx(exact, rel=1e-2)
-    straight = np.stack([np.linspace(0, 5, 300), np.linspace(1, 2, 300)], axis=1)
-    assert dimensionless_jerk(straight) == 0.0
-    assert dimensionless_jerk(np.repeat(straight, 2, axis=0)) > exact
-    assert math.isnan(dimensionless_jerk(straight[:3]))
-    assert math.isnan(dimensionless_jerk(np.ones((50, 2))))
-
-
-def test_spectral_arc_length_of_a_gaussian_speed():
-    """Its spectrum is a Gaussian as well, whose arc length is an integral."""
-    sd, rate = 0.1, 100.0
-    time = np.arange(-200, 200) / rate
-    density = np.e ** (-(time**2) / (2 * sd**2))
-    path = np.stack([np.zeros(401), np.concatenate([[0], np.cumsum(density) / rate])], axis=1)
-    top = math.sqrt(-2 * math.log(0.05)) / (2 * math.pi * sd)  # amplitude falls to 5 % here
-
-    def slope(share):
-        u = 2 * math.pi * sd * top
-        return -(u**2) * share * math.e ** (-((u * share) ** 2) / 2)
-
-    exact = -integrate.quad(lambda share: math.hypot(1, slope(share)), 0, 1)[0]
-    assert spectral_arc_length(path) == pytest.approx(exact, rel=5e-3)
-    assert spectral_arc_length(9 * path) == pytest.approx(exact, rel=5e-3)
-    halting = np.concatenate([path, path[-1] + path])  # two bursts are less smooth
-    assert spectral_arc_length(halting) < exact - 1
-    assert math.isnan(spectral_arc_length(np.ones((50, 2))))
-
-
-def test_smoothness_leaves_out_what_does_not_move():
-    task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
-    path = trajectory(task, planned(posture(1.0), posture(1.0), hands="RR"))
-    way = path.hand_path("right")[:91]
-    assert smoothness(path) == (pytest.approx(spectral_arc_length(way)), math.inf)
 
 
 # Locus
@@ -558,9 +449,8 @@ def test_frame_of_two_contexts():
     )
     assert one("corrective", "context distance").value == 0
     assert one("corrective", "context dependence").why_not.startswith("one run a context")
-    assert one("learner", "first subtask sacrificed").value == 1
     assert one("learner", "total against the same hands").high < 0
-    assert one("learner", "hand entropy").why_not == "the task has one hand"
+    assert one("learner", "hand as in isolation").why_not == "the task has one hand"
     assert one("failed", "total against the same hands").why_not == "no run has a solution"
     assert one("learner", "locus slope").why_not.startswith("fewer than 3 tasks")
     assert list(frame.signature.unique()) == list(REGISTER)
