@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any, Self
-
-from pydantic import model_validator
+from typing import Any
 
 from coartic.analysis.statistics.estimates import Interval
 from coartic.analysis.words import read_beside
@@ -44,12 +42,6 @@ class Signature(FileData):
     share: bool = False
     meaning: str
     sources: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _says_its_range(self) -> Self:
-        if self.share == ("range" in self.model_fields_set):
-            raise ValueError(f"signature {self.name}: it has a range, or is a share of runs")
-        return self
 
     @property
     def extent(self) -> str:
