@@ -65,12 +65,6 @@ class Judged:
         chosen = self.claim.chosen and verdict == "supported"
         return "used to choose the goals" if chosen else verdict
 
-    @property
-    def methods(self) -> str:
-        """Its tests, in words, each once."""
-        every = (*self.finding.tests, *(self.finding.against or ()))
-        return "; ".join(dict.fromkeys(test.method for test in every))
-
 
 def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
     """The verdict of the tests alone, by their p-values and those of the opposite."""
