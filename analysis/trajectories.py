@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,12 +45,6 @@ class Trajectories:
     def sequences(self) -> list[str]:
         """Hand sequence of each run."""
         return [run.execution.hands for run in self.runs]
-
-    @cached_property
-    def typical(self) -> tuple[Trajectory, ...]:
-        """Runs with the most frequent hand sequence, so that postures compare."""
-        commonest = dict(Counter(self.sequences).most_common(1))
-        return tuple(run for run in self.runs if run.execution.hands in commonest)
 
     def with_hand(self, hand: Hand, goal: int) -> tuple[Trajectory, ...]:
         """Runs that hit a goal with ``hand``; ``goal`` counts from 1."""

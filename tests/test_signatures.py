@@ -6,8 +6,6 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
@@ -19,7 +17,7 @@ from coartic.analysis.signatures.context import (
     permutation_p,
 )
 from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm
-from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces, synergy
+from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.other_arm import (
     preshaping,
     travel,
@@ -30,7 +28,7 @@ from coartic.analysis.signatures.subtasks import (
     isolated_reach,
     turning_angles,
 )
-from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
+from coartic.analysis.trajectories import best_sequences, change_from
 from tests.support.made_up import MadeUp, study_of
 from tests.support.strategies import as_released, changed, tiny_task
 
@@ -166,63 +164,6 @@ def test_self_motion_of_the_robot_is_motor_equivalent():
     parts = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
     assert parts[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
     assert parts[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
-
-
-def test_synergy_by_hand():
-    """Two runs a coordinate: variances are known exactly."""
-    rows = np.diag([1.0, 1.0, 3.0, 3.0])
-    q = np.concatenate([rows, -rows])
-    planted = synergy(q, JACOBIAN)
-    within, orthogonal = 2 * (9 + 9) / 7 / 2, 2 * (1 + 1) / 7 / 2
-    total = (within + orthogonal) / 2
-    assert planted.within == pytest.approx(within)
-    assert planted.orthogonal == pytest.approx(orthogonal)
-    assert planted.delta == pytest.approx((within - orthogonal) / total)
-    n, d = 4, 2  # the printed transform
-    assert planted.z.value == pytest.approx(
-        0.5 * math.log((n / d + planted.delta) / (n / d - planted.delta))
-    )
-    assert planted.neutral == 0.0
-    assert planted.z.low < planted.z.value < planted.z.high
-
-
-@given(st.integers(3, 8), st.integers(3, 30), st.integers(0, 10**6))
-def test_delta_stays_in_its_range_and_z_is_its_transform(joints, runs, seed):
-    draw = rng(seed)
-    jacobian, q = draw.standard_normal((2, joints)), draw.standard_normal((runs, joints))
-    drawn = synergy(q, jacobian)
-    assert -joints / 2 <= drawn.delta <= joints / (joints - 2)
-    ratio = (joints / 2 + drawn.delta) / (joints / (joints - 2) - drawn.delta)
-    assert drawn.z.value == pytest.approx(0.5 * math.log(ratio), rel=1e-6, abs=1e-9)
-    turned = synergy(q @ np.linalg.qr(draw.standard_normal((joints, joints)))[0], jacobian)
-    assert turned.within * (joints - 2) + turned.orthogonal * 2 == pytest.approx(
-        drawn.within * (joints - 2) + drawn.orthogonal * 2  # the total does not turn
-    )
-
-
-def test_jackknife_is_the_loop_over_runs():
-    q = rng(6).standard_normal((9, 4)) * [1, 1, 2, 3]
-    every = synergy(q, JACOBIAN)
-    without = [synergy(np.delete(q, k, axis=0), JACOBIAN).z.value for k in range(9)]
-    pseudo = 9 * every.z.value - 8 * np.array(without)
-    half = 2.3060041 * pseudo.std(ddof=1) / 3  # Student's t, 8 degrees of freedom
-    z, low, high, _ = every.z
-    assert (low, high) == pytest.approx((z - half, z + half))
-
-
-def test_synergy_finds_what_is_planted():
-    task = load_task("ascending")
-    jacobian = task.robot.jacobian(task.q0, "right")[:, movable(task, "right")]
-    null, complement = subspaces(jacobian)
-    runs = 0.05 * rng(7).standard_normal((20, 6))
-    quiet = synergy(runs, jacobian)
-    assert quiet.z.p > 0.05
-    assert quiet.z.low < quiet.neutral < quiet.z.high
-    squeezed = runs @ (null @ null.T + 0.2 * complement @ complement.T)
-    assert synergy(squeezed, jacobian).z.p < 1e-6
-    assert synergy(squeezed, jacobian).delta > 1.2
-    assert math.isnan(synergy(runs[:1], jacobian).delta)
-    assert math.isnan(synergy(runs[[0, 0, 0]], jacobian).delta)
 
 
 # Subtasks and hands
@@ -488,16 +429,3 @@ def test_frame_of_a_family():
     assert slopes.value[1, "right", "base_y"] > 0.001
     contexts = frame[frame.signature == "context distance"]
     assert contexts.why_not.str.contains("locus slopes").all()
-
-
-def test_trajectories_put_like_sequences_together():
-    task = load_task("two-armed-2")
-    runs = tuple(
-        trajectory(task, corrective_trial(task, hands).movements)
-        for hands in ("RRRR", "RLRR", "RLRR")
-    )
-    cell = Trajectories(task, "m", "", runs)
-    assert cell.sequences == ["RRRR", "RLRR", "RLRR"]
-    assert [run.execution.hands for run in cell.typical] == ["RLRR", "RLRR"]
-    assert len(cell.with_hand("left", 2)) == 2
-    assert cell.initial.hands == "RRRR"

@@ -1,13 +1,10 @@
-"""Signatures of one method on one task: means, shares and synergies over its runs."""
+"""Signatures of one method on one task: means and shares over its runs."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.signatures.manifold import jacobian_of, synergy
 from coartic.analysis.signatures.other_arm import preshaping, travel
 from coartic.analysis.signatures.rows import (
     REGISTER,
@@ -20,7 +17,7 @@ from coartic.analysis.signatures.rows import (
 )
 from coartic.analysis.signatures.subtasks import isolated_agreement, turning_angles
 from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
-from coartic.analysis.trajectories import Trajectories, postures
+from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
 
@@ -40,7 +37,6 @@ def measured_within(cell: Trajectories) -> Rows:
         yield from without(two_hands, "the task has one hand")
     paths = [np.vstack([run.task.q0, run.execution.configurations]) for run in runs]
     yield from over_runs("turning angle", list(map(turning_angles, paths)))
-    yield from synergies(cell)
 
 
 def with_two_hands(cell: Trajectories) -> Rows:
@@ -79,30 +75,3 @@ def over_some(signature: str, values: Array, place: Row) -> Row:
     if not len(finite):
         return row(signature, place, why_not=REGISTER[signature].missing)
     return estimated(signature, place, student_mean(finite), len(finite))
-
-
-def synergies(cell: Trajectories) -> Rows:
-    """Variance over runs by what it does to the hand, over runs with the commonest hands.
-
-    Within the uncontrolled manifold, across it, their ratio ΔV, and its transform z.
-    """
-    runs, n = cell.typical, len(cell.typical)
-    names = "V_ucm", "V_ort", "ΔV", "ΔV z"
-    if n < 2:
-        why = "one run: no variance across runs"
-        yield from without([REGISTER[name] for name in names], why, n=n)
-        return
-    for number in range(1, len(cell.task.goals) + 1):
-        hand = runs[0].hands[number - 1]
-        q = postures(runs, number)
-        joints, jacobian = jacobian_of(cell.task, hand, q)
-        *variances, neutral, z = synergy(q[:, joints], jacobian)
-        place: Row = {"goal": number, "hand": hand, "hands": runs[0].execution.hands}
-        why = "runs do not differ" if math.isnan(z.value) else ""
-        for name, value in zip(names[:3], variances, strict=True):
-            yield row(name, place, value=value, n=n, why_not=why)
-        if not why:
-            place["neutral"] = neutral
-            if math.isnan(z.p):
-                why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield estimated("ΔV z", place, z, n, why_not=why)
