@@ -41,7 +41,8 @@ def player_data(study: Study) -> dict[str, Any] | None:
     for name in (name for name in study.tasks if name in one_by_one(study)):
         task, unit = study.tasks[name], rounding_unit(study.tasks[name].robot)
         labels = [label for on, label in study.cells if on == name]
-        shown = in_order({*main_methods(labels), *(c for c in CONDITIONS if c in labels)})
+        both = [*main_methods(labels), *(c for c in CONDITIONS if c in labels)]
+        shown = in_order(list(dict.fromkeys(both)))
         on_task = []
         if (initial := initial_solution(task, study.model)) is not None:
             run = trajectory(task, initial.movements, study.model)
