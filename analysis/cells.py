@@ -41,28 +41,6 @@ class CellRuns:
         return self.good.reward.to_numpy(dtype=np.float64)
 
 
-COMMON = 0.2
-"""Share of a cell's runs from which on a hand sequence is common."""
-
-
-def common_sequences(cell: CellRuns) -> list[str]:
-    """Hand sequences that :data:`COMMON` of the solved runs have, commonest first; at least one.
-
-    Those that are as common stand in the order of the alphabet.
-    """
-    counts = cell.good.hands.value_counts()
-    ordered = sorted(counts.items(), key=lambda item: (-int(item[1]), str(item[0])))
-    least = COMMON * int(counts.sum())
-    return [str(hands) for hands, count in ordered if count >= least] or [str(ordered[0][0])]
-
-
-def typical_run(cell: CellRuns, hands: str | None = None) -> int:
-    """Index among the solved runs of the one whose reward is nearest to their median.
-
-    ``hands``: of the runs with this hand sequence.
-    """
-    chosen = np.arange(len(cell.good))
-    if hands is not None:
-        chosen = np.flatnonzero(cell.good.hands == hands)
-    rewards = cell.rewards[chosen]
-    return int(chosen[np.abs(rewards - np.median(rewards)).argmin()])
+def typical_run(cell: CellRuns) -> int:
+    """Index among the solved runs of the one whose reward is nearest to their median."""
+    return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())

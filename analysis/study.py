@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial, wraps
+from functools import cached_property, lru_cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -152,10 +152,7 @@ class Study:
                 for run_id in _executed_of(cell)
             )
             runs = tuple(trajectory(of, solution, self.model) for solution in solutions)
-            alone = partial(self.sequences, task)
-            self._trajectories[key] = Trajectories(
-                of, cell.method, cell.variant, runs, alone, self.model
-            )
+            self._trajectories[key] = Trajectories(of, cell.method, cell.variant, runs, self.model)
         return self._trajectories[key]
 
     @cached_property

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
 
 from coartic import (
     PAPER,
@@ -34,14 +31,7 @@ class Trajectories:
     method: str
     variant: str
     runs: tuple[Trajectory, ...]
-    alone: Callable[[], pd.DataFrame] | None = None
-    """The corrective process alone with every hand sequence (:meth:`Study.sequences`)."""
     model: MotionModel = PAPER
-
-    @cached_property
-    def best_hands(self) -> list[str]:
-        """Hand sequences that are best by the corrective process alone; empty if not known."""
-        return [] if self.alone is None else best_sequences(self.alone())
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -55,12 +45,6 @@ class Trajectories:
     def sequences(self) -> list[str]:
         """Hand sequence of each run."""
         return [run.execution.hands for run in self.runs]
-
-    @cached_property
-    def typical(self) -> tuple[Trajectory, ...]:
-        """Runs with the most frequent hand sequence, so that postures compare."""
-        commonest = dict(Counter(self.sequences).most_common(1))
-        return tuple(run for run in self.runs if run.execution.hands in commonest)
 
     def with_hand(self, hand: Hand, goal: int) -> tuple[Trajectory, ...]:
         """Runs that hit a goal with ``hand``; ``goal`` counts from 1."""
@@ -110,15 +94,6 @@ def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:
 def last_ticks(runs: tuple[Trajectory, ...], goal: int, count: int) -> Array:
     """The last control ticks of each run up to a hit, shape ``(runs, count, dof)``."""
     return np.array([run.configurations[: run.hits[goal - 1] + 1][-count:] for run in runs])
-
-
-def entropy(sequences: Iterable[str]) -> float:
-    """Shannon entropy of hand sequences over runs, bits.
-
-    The plug-in estimate, biased downwards for few runs. 0 (always the same sequence) to
-    log₂ of the number of runs, or G bits for G goals and two hands, whichever is less.
-    """
-    return float(stats.entropy(list(Counter(sequences).values()), base=2)) + 0.0
 
 
 def best_sequences(sequences: pd.DataFrame) -> list[str]:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from coartic import CoarticError, corrective_trial, load_task, trajectory
+from coartic import corrective_trial, load_task, trajectory
 from coartic.analysis import tables
 from coartic.analysis.claims import judge, single
 from coartic.analysis.claims.data import MissingError
@@ -22,7 +22,6 @@ from coartic.analysis.claims.register import (
     MARGINS,
     Claim,
     Finding,
-    claim_of,
     side,
 )
 from coartic.analysis.claims.single import shortest_reach
@@ -797,21 +796,3 @@ def test_what_goals_were_admitted_by_has_no_count_over_them():
         for held in held_by(name):
             assert held.members >= 200
             assert 0 <= held.supported <= held.members - held.refuted
-
-
-@pytest.mark.parametrize(
-    ("row", "words"),
-    [
-        (
-            {"pairs": {"a": ["EC4 >> EC3"]}},
-            "pairs.a[0] is 'EC4 >> EC3'; it should be 'SIDE > SIDE'",
-        ),
-        ({"pairs": {"a": ["EC4 > 0 by foot"]}}, "margins are few, most, "),
-        ({"runs": {"a": ["most EC9 LR"]}}, "it should be 'HOW MANY CONDITION WHAT', such as"),
-    ],
-)
-def test_a_wrong_comparison_says_what_would_be_right(row, words):
-    with pytest.raises(CoarticError, match=re.escape(words)) as caught:
-        claim_of("mine", "Mine", {"statement": "More pays.", "rule": "higher", **row})
-    assert "claim 'mine'" in str(caught.value)
-    assert "?:" not in str(caught.value)

@@ -1,14 +1,13 @@
 """Figures: what they show is what the runs say."""
 
-from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, corrective_trial, execute, load_task
-from coartic.analysis.cells import common_sequences, typical_run
+from coartic import CoarticError, load_task
+from coartic.analysis.cells import typical_run
 from coartic.analysis.figures import FIGURES, save
 from coartic.analysis.figures.style import looks, stars
 from coartic.analysis.figures.tasks import draw_tasks
@@ -18,11 +17,8 @@ from coartic.analysis.signatures.register import signatures
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.learner.rows import movements_from
 from tests.support import made_up
 from tests.support.suites import KNOWN, run_and_write
-
-CONFIGURATIONS = [name for name in FIGURES if name.startswith("configurations")]
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +34,7 @@ def figures(study):
 
 
 def test_every_figure_of_the_papers_cells(figures):
-    assert {"tasks", *CONFIGURATIONS, "recruitment", "context"} <= set(figures)
+    assert {"tasks", "recruitment", "context"} <= set(figures)
     assert "published" not in figures  # printed means are of 10,000 trials, these runs of 120
     for name, plot in figures.items():
         assert plot.id == name
@@ -47,50 +43,11 @@ def test_every_figure_of_the_papers_cells(figures):
         assert len(plot.data)
 
 
-def test_configurations_are_those_of_the_stored_run(study, figures):
-    movements, waypoints = study.movements
-    for name in CONFIGURATIONS:
-        for (task_name, run_id), rows in figures[name].data.groupby(["task", "run_id"]):
-            task = load_task(task_name)
-            if run_id:
-                stored = movements_from(task, movements[run_id], waypoints.get(run_id))
-                execution = execute(task, stored)
-            else:
-                execution = corrective_trial(task, "R" * len(task.goals))
-            q = rows[list(task.robot.joint_names)].to_numpy()
-            np.testing.assert_array_equal(q, [task.q0, *execution.configurations])
-            assert rows.reward.sum() == execution.reward == rows.total.iloc[0]
-            assert rows.goal.tolist() == list(range(len(task.goals) + 1))
-    # The chosen hand touches the goal's disc in what is drawn.
-    axes = figures["configurations-one-armed"].figure.axes[0]
-    marked = [line for line in axes.lines if line.get_marker() == "o"]
-    tip = np.array(marked[-1].get_xydata()[-1])
-    assert np.linalg.norm(tip - load_task("ascending").goals[0]) <= 0.1
-
-
-def test_the_typical_run_is_nearest_the_median_of_its_hand_sequence(study):
+def test_the_typical_run_is_nearest_the_median(study):
     cell = study.cells["two-armed-1", "dual-process/EC3"]
-    for hands in (None, common_sequences(cell)[0]):
-        alike = cell.good if hands is None else cell.good[cell.good.hands == hands]
-        row = cell.good.iloc[typical_run(cell, hands)]
-        rewards = alike.reward.astype(float)
-        assert row.run_id in set(alike.run_id)
-        assert abs(row.reward - rewards.median()) == (rewards - rewards.median()).abs().min()
-
-
-@pytest.mark.parametrize(
-    ("hands", "expected"),
-    [
-        (["LL"] * 5 + ["RR"] * 4 + ["RL"] * 3, ["LL", "RR", "RL"]),
-        (["RL"] * 2 + ["LL"] * 10, ["LL"]),
-        (["RL"] * 6 + ["LL"] * 6, ["LL", "RL"]),
-        ([f"{k}" for k in range(12)], ["0"]),
-    ],
-)
-def test_common_hand_sequences_are_a_fifth_of_the_runs(study, hands, expected):
-    cell = study.cells["two-armed-1", "dual-process/EC3"]
-    runs = pd.concat([cell.runs] * 3).assign(hands=hands)
-    assert common_sequences(replace(cell, runs=runs)) == expected
+    rewards = cell.good.reward.astype(float)
+    reward = cell.good.reward.iloc[typical_run(cell)]
+    assert abs(reward - rewards.median()) == (rewards - rewards.median()).abs().min()
 
 
 def test_learning_curves_against_a_loop(study, monkeypatch):

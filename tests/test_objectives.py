@@ -88,8 +88,8 @@ def test_regret_is_less_and_its_advantage_the_difference(study):
     assert table[0.0].mean() < table[300.0].mean()  # the more wrong the planner is
     assert not len(advantage(study, "cma-es", "ticks", "distinct"))
     table = crossings(study)
-    assert (table.weight_low <= table.weight).all()
-    assert (table.weight <= table.weight_high).all()
+    assert (table.crossing_low <= table.crossing).all()
+    assert (table.crossing <= table.crossing_high).all()
 
 
 def test_where_a_line_crosses_zero():

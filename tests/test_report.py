@@ -9,14 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
-from coartic.analysis.figures.plot import figure
-from coartic.analysis.report import numbers, render
-from coartic.analysis.report.build import SECTIONS, checked, report_files
-from coartic.analysis.report.text import answers
+from coartic import load_task
+from coartic.analysis.figures import FIGURES
+from coartic.analysis.report import facts, numbers, render
+from coartic.analysis.report.build import SECTIONS, report_files
+from coartic.analysis.report.text import answers, macros
 from coartic.analysis.report.trace import runs_of, tables_of
-from coartic.analysis.tables import TABLES, Column
-from coartic.analysis.tables.table import table as as_table
+from coartic.analysis.tables import TABLES
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
@@ -180,29 +179,11 @@ def test_few_runs_say_so(tmp_path):
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
 
 
-@pytest.mark.parametrize(
-    ("section", "words"),
-    [
-        ({"figure": "publishd"}, "there is no figure 'publishd'; did you mean 'published'?"),
-        ({"table": "nothing"}, "there is no table 'nothing'; there are contexts, "),
-        ({"capton": "Rewards"}, "capton is an unknown key; did you mean 'caption'?"),
-    ],
-)
-def test_a_wrong_section_is_named(section, words):
-    with pytest.raises(CoarticError, match=f"section 'paper': {re.escape(words)}"):
-        checked({**SECTIONS, "paper": {**SECTIONS["paper"], **section}})
-
-
-def test_a_sentence_without_a_section_and_names_that_are_taken_are_named():
-    without = {name: section for name, section in SECTIONS.items() if name != "hands"}
-    with pytest.raises(CoarticError, match="sections.toml has no section 'hands'"):
-        checked(without)
-    with pytest.raises(CoarticError, match="there are two figures 'ranking'"):
-        figure("ranking", "", "")(lambda study: None)
-
-    def more(study):
-        return iter(())
-
-    with pytest.raises(CoarticError, match="'more' and an earlier one .* column 'reached'"):
-        as_table("reached", reached=Column())(more)
-    assert TABLES.pop("more", None) is None
+def test_sections_name_figures_tables_and_facts():
+    keys = {"short", "title", "figure", "table", "caption", "note", "single"}
+    for name, section in SECTIONS.items():
+        assert keys >= section.keys() >= {"short", "title"}
+        assert section.get("figure") in {None, *FIGURES}
+        assert section.get("table") in {None, *TABLES}
+        assert ("caption" in section) == ("table" in section)
+        assert callable(getattr(macros(), name, None)) <= hasattr(facts, name)

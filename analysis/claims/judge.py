@@ -29,7 +29,6 @@ from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Gr
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
-from coartic.errors import CoarticError
 
 RULES: dict[str, Callable[[Data, Claim], Finding]] = {
     rule.__name__: rule
@@ -65,12 +64,6 @@ class Judged:
         verdict = by_tests(self.finding, self.adjusted_p, self.adjusted_opposite_p)
         chosen = self.claim.chosen and verdict == "supported"
         return "used to choose the goals" if chosen else verdict
-
-    @property
-    def methods(self) -> str:
-        """Its tests, in words, each once."""
-        every = (*self.finding.tests, *(self.finding.against or ()))
-        return "; ".join(dict.fromkeys(test.method for test in every))
 
 
 def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
@@ -137,11 +130,6 @@ def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
 def see(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     """What a claim's rule finds, and the ids of the runs that it read."""
     try:
-        if claim.rule not in RULES:
-            raise CoarticError(
-                f"claims.toml, claim {claim.id!r}: {claim.rule!r} is no rule; rules are "
-                f"{', '.join(RULES)}"
-            )
         finding = RULES[claim.rule](data, claim)
     except MissingError as missing:
         return Finding(None, f"Not judged: {missing}."), ()

@@ -5,16 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, NamedTuple, Self
-
-from pydantic import AfterValidator, ValidationError, model_validator
+from typing import Any, Literal, NamedTuple
 
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import read_beside
-from coartic.errors import CoarticError
-from coartic.inputs import FileData, problems
+from coartic.inputs import FileData
 
 _FILE = read_beside(__file__, "claims")
 HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
@@ -40,52 +37,6 @@ _WHAT = "|".join(QUANTITIES)
 _METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
 _WHO = rf"EC\S*|initial|best|\S+/.+?|{_METHODS}"
 _SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>{_WHO})(?: (?P<hands>{_HANDS}))?"
-_SHOWN = re.sub(r"\?P<\w+>", "?:", _SIDE)
-_NUMBER = r"-?\d+(\.\d+)?"
-_PAIR = rf"{_SHOWN} > ({_SHOWN}|{_NUMBER})( by ({'|'.join(MARGINS)}))?"
-
-
-def written_as(pattern: str, words: str) -> AfterValidator:
-    """A check that a text is written so, which says in words what would be right."""
-
-    def check(text: str) -> str:
-        if not re.fullmatch(pattern, text):
-            raise ValueError(words)
-        return text
-
-    return AfterValidator(check)
-
-
-Shown = Annotated[
-    str,
-    written_as(
-        _SHOWN,
-        "should be a SIDE, such as 'EC4', 'EC2 RRLR', 'replay EC1', 'initial' or the id of a "
-        "built-in method",
-    ),
-]
-"""What is measured of whom: ``EC2 RRLR``, ``replay EC1``, ``initial``, ``arm posture-based/x``."""
-Pair = Annotated[
-    str,
-    written_as(
-        rf"{_PAIR}|{_HANDS} > ({_HANDS}|others)",
-        "should be 'SIDE > SIDE' or 'SIDE > NUMBER', with 'by MARGIN' if it has a margin. A side "
-        "is such as 'EC4', 'EC2 RRLR', 'replay EC1', 'initial' or the id of a built-in method; "
-        "margins are "
-        f"{', '.join(MARGINS)}",
-    ),
-]
-"""Two things that are compared, the first of which is said to be higher, by more than a margin if
-there is one. Or hand sequences of the corrective process alone."""
-Counted = Annotated[
-    str,
-    written_as(
-        r"(most|not most|half|majority|some) EC[1-4] (not )?"
-        rf"({_HANDS}( rightward)?|commonest|best|initial|slower-hand)",
-        "should be 'HOW MANY CONDITION WHAT', such as 'most EC3 LRLR' or 'some EC3 not best'",
-    ),
-]
-"""How many runs do something."""
 
 
 class Side(NamedTuple):
@@ -121,7 +72,7 @@ def sides(pair: str) -> tuple[Side, Side, float]:
     """Both sides of a comparison such as ``arm EC4 > 0 by ticks``, and its margin."""
     first, second = pair.split(" > ")
     second, _, margin = second.partition(" by ")
-    return side(first), side(second), MARGINS.get(margin, 0.0)
+    return side(first), side(second), MARGINS[margin] if margin else 0.0
 
 
 @dataclass(frozen=True)
@@ -149,12 +100,12 @@ class Claim(FileData):
     fitted: bool = False
     chosen: bool = False
     beside: bool = False
-    pairs: Mapping[str, Sequence[Pair]] = {}
-    shown: Mapping[str, Sequence[Shown]] = {}
-    runs: Mapping[str, Sequence[Counted]] = {}
+    pairs: Mapping[str, Sequence[str]] = {}
+    shown: Mapping[str, Sequence[str]] = {}
+    runs: Mapping[str, Sequence[str]] = {}
     cells: Mapping[str, Sequence[str]] = {}
     families: Sequence[str] = ()
-    compared: Sequence[Pair] = ()
+    compared: Sequence[str] = ()
     suite: str = ""
     power: str = ""
     place: str = ""
@@ -172,23 +123,9 @@ class Claim(FileData):
             return "families"
         return "beside" if self.beside else "paper"
 
-    @model_validator(mode="after")
-    def _rests_on_what_was_chosen(self) -> Self:
-        if self.chosen and not self.fitted:
-            raise ValueError(f"{self.id}: goals are chosen for fitted claims alone")
-        return self
-
-
-def claim_of(name: str, section: str, row: Mapping[str, Any]) -> Claim:
-    """A row of ``claims.toml``; raises CoarticError that names the claim and the key."""
-    try:
-        return Claim(id=name, section=section, **row)
-    except ValidationError as error:
-        raise CoarticError(problems(f"claims.toml, claim {name!r}", error)) from None
-
 
 CLAIMS: Mapping[str, Claim] = {
-    name: claim_of(name, section, row)
+    name: Claim(id=name, section=section, **row)
     for section, rows in _FILE.items()
     for name, row in rows.items()
 }

@@ -147,7 +147,7 @@ def price(study: Study) -> pd.DataFrame:
     """
     by_method = targets(study)
     over = next(iter(by_method), ("",))[0]
-    labels = in_order({method for task, method, _ in by_method if task == over})
+    labels = in_order(list(dict.fromkeys(name for task, name, _ in by_method if task == over)))
     rows = {}
     for label in labels:
         if (over, label, "trials") in by_method:

@@ -75,10 +75,6 @@ def figure(
             return Plot(name, title, caption + dagger(tasks), alt, drawing, data)
 
         plot.__doc__ = draw.__doc__
-        if name in FIGURES:
-            raise CoarticError(
-                f"there are two figures {name!r}; the second is in {draw.__module__}"
-            )
         FIGURES[name] = plot
         return plot
 

@@ -15,7 +15,7 @@ from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.figures.robot import MARKERS, box
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.shared_goal import shared_goal
+from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study
 
 _LETTERS = 9  # points: the page shows it small

@@ -27,21 +27,17 @@ MARKERS: dict[Hand, dict[str, Any]] = {
 MARGIN = 0.45  # length unit around what is drawn
 
 
-def draw_robot(
-    axes: Axes, task: Task, q: Array, *, marked: Iterable[Hand] = (), color: str = INK
-) -> None:
-    """Draw base and arms in configuration ``q`` (dof,), joints of ``marked`` arms marked.
+def draw_robot(axes: Axes, task: Task, q: Array) -> None:
+    """Draw base and arms in configuration ``q`` (dof,), their joints marked.
 
     The limits of ``axes`` are set by whoever draws: patches do not widen them, which takes long.
     """
-    marked = tuple(marked)
     outline = task.robot.base_outline(q)
     axes.add_artist(Polygon(outline, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5))
-    axes.add_artist(Polygon(outline, fill=False, edgecolor=color, linewidth=0.6, zorder=1.6))
+    axes.add_artist(Polygon(outline, fill=False, edgecolor=INK, linewidth=0.6, zorder=1.6))
     for hand in task.hands:
-        style = MARKERS[hand] if hand in marked else {}
         joints = task.robot.joint_positions(q, hand).T
-        axes.plot(*joints, color=color, linewidth=0.9, markeredgewidth=0.7, **style)
+        axes.plot(*joints, color=INK, linewidth=0.9, markeredgewidth=0.7, **MARKERS[hand])
 
 
 _CROWDED = 0.6  # length unit: a goal that near above another has its number
@@ -55,21 +51,17 @@ def numbered_below(task: Task) -> list[bool]:
     return [bool(near) for near in close.any(axis=1)]
 
 
-def draw_goals(axes: Axes, task: Task, *, current: int | None = None) -> None:
-    """Draw every goal as an open circle of its radius with its number above, or below.
-
-    With ``current``, a goal's number from 1, the others are grey.
-    """
+def draw_goals(axes: Axes, task: Task) -> None:
+    """Draw every goal as an open circle of its radius with its number above, or below."""
     for index, (x, y) in enumerate(task.goals, 1):
         side = -1 if numbered_below(task)[index - 1] else 1
-        color = INK if current in (None, index) else GREY
         axes.add_artist(
-            Circle((x, y), task.radius, fill=False, edgecolor=color, linewidth=0.7, zorder=3)
+            Circle((x, y), task.radius, fill=False, edgecolor=INK, linewidth=0.7, zorder=3)
         )
         axes.annotate(
             str(index), (x, y + side * task.radius), (0, 1.5 * side),
             textcoords="offset points", ha="center", va="bottom" if side > 0 else "top",
-            color=color, zorder=4,
+            color=INK, zorder=4,
             bbox={"boxstyle": "square,pad=0", "facecolor": PAPER, "alpha": 0.8, "linewidth": 0},
         )  # fmt: skip
 

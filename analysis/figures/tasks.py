@@ -57,7 +57,7 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
     )
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
-        draw_robot(axes, task, task.q0, marked=task.hands)
+        draw_robot(axes, task, task.q0)
         draw_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)

@@ -26,45 +26,19 @@ from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
-from coartic.analysis.report.text import answers, environment, sentence, sentences
+from coartic.analysis.report.text import answers, environment, sentence
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import NONE, number, read_beside
 from coartic.files import check_folder, publish
-from coartic.text import did_you_mean
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
-KEYS = ("short", "title", "figure", "table", "caption", "note", "single")
-"""What ``sections.toml`` may say of a section."""
 SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
 _MAGNIFIED = 1.3  # figures on the page
 _PHONE = 320 / 72  # inches: a phone scrolls what is wider
 
 
-def checked(content: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """The content of ``sections.toml``; raises CoarticError for a name that is none."""
-    ids = {"figure": list(FIGURES), "table": list(tables.TABLES)}
-    for name, section in content.items():
-        where = f"sections.toml, section {name!r}"
-        wanted = ("short", "title", *["caption"] * ("table" in section))
-        for key in (key for key in wanted if key not in section):
-            raise CoarticError(f"{where}: {key} is missing")
-        for key in (key for key in section if key not in KEYS):
-            raise CoarticError(f"{where}: {key} is an unknown key{did_you_mean(key, KEYS)}")
-        for kind in ids.keys() & section.keys():
-            if section[kind] not in ids[kind]:
-                hint = (
-                    did_you_mean(section[kind], ids[kind]) or f"; there are {', '.join(ids[kind])}"
-                )
-                raise CoarticError(f"{where}: there is no {kind} {section[kind]!r}{hint}")
-    for name in (name for name in sentences() if name not in content):
-        raise CoarticError(
-            f"sections.toml has no section {name!r}, for which sentences.jinja has a sentence"
-        )
-    return content
-
-
-SECTIONS = checked(read_beside(__file__, "sections"))
+SECTIONS: dict[str, dict[str, Any]] = read_beside(__file__, "sections")
 """The sections of the page by id, in its order."""
 
 

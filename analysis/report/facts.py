@@ -27,7 +27,7 @@ from coartic.analysis.methods import (
     name_of,
 )
 from coartic.analysis.published import RUNS, TRIALS
-from coartic.analysis.signatures.shared_goal import shared_goal
+from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.paper import best_condition

@@ -21,7 +21,7 @@ from coartic.analysis.figures.robot import numbered_below
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
 from coartic.analysis.report.facts import gain
-from coartic.analysis.signatures.shared_goal import shared_goal
+from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import initial_solution
 from coartic.robot import HANDS
@@ -41,7 +41,8 @@ def player_data(study: Study) -> dict[str, Any] | None:
     for name in (name for name in study.tasks if name in one_by_one(study)):
         task, unit = study.tasks[name], rounding_unit(study.tasks[name].robot)
         labels = [label for on, label in study.cells if on == name]
-        shown = in_order({*main_methods(labels), *(c for c in CONDITIONS if c in labels)})
+        both = [*main_methods(labels), *(c for c in CONDITIONS if c in labels)]
+        shown = in_order(list(dict.fromkeys(both)))
         on_task = []
         if (initial := initial_solution(task, study.model)) is not None:
             run = trajectory(task, initial.movements, study.model)

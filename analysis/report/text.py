@@ -57,11 +57,6 @@ def macros() -> Any:
     return environment(escape=False).get_template("sentences.jinja").module
 
 
-def sentences() -> list[str]:
-    """Names of the facts that a macro puts into words: those of sections."""
-    return [name for name in vars(facts) if callable(getattr(macros(), name, None))]
-
-
 def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
     text = str(getattr(macros(), name)(of)).replace("\n", " ")

@@ -10,16 +10,17 @@ distribution; they take runs as exchangeable if the context did nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import combinations, takewhile
 
 import numpy as np
 
 from coartic import Task
 from coartic.analysis.optima import KEPT
-from coartic.analysis.signatures.permutation import divisions, p_values
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred
 from coartic.robot import Array
+
+AT_ONCE = 500  # divisions or resamples in memory
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -75,8 +76,8 @@ def dependence_below(
     means, squares = [], np.zeros(RESAMPLES)
     for group in (first, second):
         means.append(np.empty((RESAMPLES, group.shape[1])))
-        for start in range(0, RESAMPLES, 500):  # thousands of runs would fill the memory
-            rows = slice(start, min(start + 500, RESAMPLES))
+        for start in range(0, RESAMPLES, AT_ONCE):  # thousands of runs would fill the memory
+            rows = slice(start, min(start + AT_ONCE, RESAMPLES))
             drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
@@ -120,6 +121,45 @@ def permutation_p(
 
     null = np.concatenate([distances(block) for block in weights])
     return p_values(null, distances(observed), exact=exact)
+
+
+def divisions(
+    first: int, second: int, rng: np.random.Generator, resamples: int = RESAMPLES
+) -> tuple[Iterator[Array], bool]:
+    """Ways to divide runs into two groups, and whether these are all there are.
+
+    Blocks of shape ``(m, first + second)``: weights that give the first group's mean less the
+    second's. All where they are no more than ``resamples``, else as many drawn at random.
+    Together they would fill the memory with thousands of runs.
+    """
+    runs = first + second
+    exact = math.comb(runs, first) <= resamples
+    every = np.array(list(combinations(range(runs), first))) if exact else None
+
+    def blocks() -> Iterator[Array]:
+        count = resamples if every is None else len(every)
+        for start in range(0, count, AT_ONCE):
+            size = min(AT_ONCE, count - start)
+            if every is None:
+                chosen = rng.random((size, runs)).argpartition(first - 1, axis=1)[:, :first]
+            else:
+                chosen = every[start : start + size]
+            weights = np.full((size, runs), -1 / second)
+            np.put_along_axis(weights, chosen, 1 / first, axis=1)
+            yield weights
+
+    return blocks(), exact
+
+
+def p_values(null: Array, observed: Array, *, exact: bool) -> Array:
+    """Share of permutations with so large a statistic or a larger one, 0 < p ≤ 1.
+
+    ``null`` has shape ``(m, ...)``, ``observed`` the rest of it. Where permutations are
+    drawn, the observed one counts as one more (Davison & Hinkley 1997).
+    """
+    reached = (null >= observed * (1 - 1e-9)).sum(axis=0)
+    share: Array = reached / len(null) if exact else (1 + reached) / (1 + len(null))
+    return share
 
 
 def lead_time(

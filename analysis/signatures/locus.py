@@ -12,7 +12,9 @@ independent evidence of the slope.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 
 import numpy as np
 from scipy import stats
@@ -20,8 +22,8 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from coartic import Task
 from coartic.analysis.optima import KEPT
-from coartic.analysis.signatures.permutation import orders, p_values
-from coartic.analysis.statistics.estimates import Interval, centred, student, varies
+from coartic.analysis.signatures.context import p_values
+from coartic.analysis.statistics.estimates import RESAMPLES, Interval, centred, student, varies
 from coartic.robot import Array
 
 LEAST = 3
@@ -78,7 +80,7 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
     run once or often, and take what departs from the line as independent and of equal variance
     between positions: curvature widens the interval. Joints that do not change have slope 0 and
-    p 1. Raises ValueError for fewer than three positions.
+    p 1.
     """
     x, means = _by_position(configurations, positions)
     slopes = []
@@ -100,12 +102,16 @@ def slope_norm(
     Length unit and rad mixed, per length unit; ≥ 0 and so biased upwards. Permutation test: the
     mean postures are put in every order along the line (up to seven positions, else 9999 orders
     drawn), so that with k positions p is at least 2/k!. It takes the means as exchangeable where
-    nothing depends on the position. Raises ValueError for fewer than three positions.
+    nothing depends on the position.
     """
     x, means = _by_position(configurations, positions)
     means, x = centred(means), centred(x)
     weights = x / (x**2).sum()
-    ways, exact = orders(len(x), rng)
+    exact = math.factorial(len(x)) <= RESAMPLES
+    if exact:
+        ways = np.array(list(permutations(range(len(x)))))
+    else:
+        ways = rng.permuted(np.tile(np.arange(len(x)), (RESAMPLES, 1)), axis=1)
     observed = np.asarray(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
     return Interval(float(observed), p=float(p_values(null, observed, exact=exact)))
@@ -114,6 +120,4 @@ def slope_norm(
 def _by_position(configurations: Array, positions: Sequence[float] | Array) -> tuple[Array, Array]:
     """Positions, each once, shape ``(k,)``, and the mean configuration at each."""
     places, of_run = np.unique(np.asarray(positions, dtype=np.float64), return_inverse=True)
-    if len(places) < LEAST:
-        raise ValueError(f"a slope needs {LEAST} positions of a goal that moves")
     return places, np.array([configurations[of_run == k].mean(axis=0) for k in range(len(places))])

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any, Self
-
-from pydantic import model_validator
+from typing import Any
 
 from coartic.analysis.statistics.estimates import Interval
 from coartic.analysis.words import read_beside
@@ -20,13 +18,11 @@ COLUMNS = {
 at 95 %, ``p`` without correction, ``n`` runs that went into it; ``why_not`` says why there is no
 value, interval or test."""
 PLACE: dict[str, Any] = {
-    "goal": None, "hand": "", "hands": "", "against": "", "moving": None, "joint": "",
-    "neutral": None, "longest": None,
+    "goal": None, "hand": "", "against": "", "moving": None, "joint": "", "longest": None,
 }  # fmt: skip
-"""Where in a solution, and between which tasks, a value belongs: number of the goal (from 1); hand
-(``chosen``: the one chosen in each subtask); hand sequences of the runs; task that is the other
-context; number of the goal that moves between tasks; joint; value that says nothing, where that is
-not 0; ticks that a lead can have at most. What does not apply is None, or empty."""
+"""Where in a solution, and between which tasks, a value belongs: number of the goal (from 1); hand;
+task that is the other context; number of the goal that moves between tasks; joint; ticks that a
+lead can have at most. What does not apply is None, or empty."""
 Row = dict[str, Any]
 """A value by :data:`COLUMNS` and :data:`PLACE`."""
 Rows = Iterator[Row]
@@ -44,12 +40,6 @@ class Signature(FileData):
     share: bool = False
     meaning: str
     sources: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _says_its_range(self) -> Self:
-        if self.share == ("range" in self.model_fields_set):
-            raise ValueError(f"signature {self.name}: it has a range, or is a share of runs")
-        return self
 
     @property
     def extent(self) -> str:
@@ -70,16 +60,14 @@ REGISTER = {signature.name: signature for signature in (*WITHIN, *CONTEXTS, *FAM
 
 def where(place: Row) -> str:
     """A place in words: ``goal 1, right hand, against descending, of at most 141``."""
-    goal, hand, hands, against, moving, joint, neutral, longest = {**PLACE, **place}.values()
+    goal, hand, against, moving, joint, longest = {**PLACE, **place}.values()
     parts = [] if goal is None else [f"goal {goal}"]
     if moving is not None:
         kind = "anticipatory" if goal is None or goal < moving else "carry-over"
         parts.append(f"{kind} of goal {moving}")
     parts += [f"{hand} hand"] if hand else []
-    parts += [hands] if hands else []
     parts += [f"against {against}"] if against else []
-    parts += [joint if moving is not None else joint.replace("_", " ")] if joint else []
-    parts += [] if neutral is None else [f"neutral at {neutral:.3f}"]
+    parts += [joint] if joint else []
     parts += [] if longest is None else [f"of at most {longest}"]
     return ", ".join(parts)
 

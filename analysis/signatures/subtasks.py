@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from coartic import Execution, Hand, Task, Trajectory, correct, move
 from coartic.robot import Array
 
 ROUNDING = 1
 """Ticks that a planned movement can lose to rounding alone."""
-
-
-def isolated_reaches(task: Task, q: Array, goal: int) -> dict[Hand, int]:
-    """Ticks in which each hand reaches a goal from ``q`` by the corrective process alone.
-
-    ``goal`` counts from 1. Hands that the corrective process brings to no hit are left out;
-    0 where the hand is there.
-    """
-    reaches = ((hand, isolated_reach(task, q, goal, hand)) for hand in task.hands)
-    return {hand: reach[0] for hand, reach in reaches if reach is not None}
+NO_LENGTH = 1e-9
+"""Of a displacement in joint space: shorter ones are rounding."""
 
 
 def isolated_reach(task: Task, q: Array, goal: int, hand: Hand) -> tuple[int, Array] | None:
@@ -71,28 +61,6 @@ def postures_before(execution: Execution, task: Task) -> list[Array]:
     return [np.array(task.q0), *execution.configurations[:-1]]
 
 
-def sacrifices(change: ArrayLike) -> bool:
-    """Whether the first subtask takes longer while the whole takes less.
-
-    ``change`` has shape ``(G,)``: :func:`change_from` of a solution to the corrective process
-    alone *with the same hands*, so that a choice of hand does not count as a sacrifice. Longer
-    is longer by more than :data:`ROUNDING`. Source: Shah, Barto & Fagg (2013), results of EC1.
-    """
-    ticks = np.asarray(change)
-    return bool(ticks[0] > ROUNDING and ticks.sum() < 0)
-
-
-def excess(path: Trajectory) -> Array:
-    """Ticks of each subtask less the best isolated reach from the same posture, ``(G,)``.
-
-    The isolated reach is the quickest hand's by the corrective process alone. Positive: the
-    subtask is done worse than by itself, for what comes after; negative: better than the
-    corrective process does it. NaN where no hand reaches the goal by itself.
-    """
-    pairs = zip(path.execution.ticks_by_goal(), _alone(path), strict=True)
-    return np.array([ticks - min(alone.values(), default=math.nan) for ticks, alone in pairs])
-
-
 def isolated_agreement(path: Trajectory) -> list[bool]:
     """Whether each goal is hit with the hand that would be chosen for it by itself.
 
@@ -100,11 +68,27 @@ def isolated_agreement(path: Trajectory) -> list[bool]:
     from the posture before; equally quick ones both agree. False for a goal that it reaches
     with neither. Where False, the choice of hand serves other goals than its own.
     """
-    pairs = zip(path.hands, _alone(path), strict=True)
-    return [hand in alone and alone[hand] == min(alone.values()) for hand, alone in pairs]
-
-
-def _alone(path: Trajectory) -> list[dict[Hand, int]]:
-    """:func:`isolated_reaches` of each subtask from the posture before it."""
+    agrees = []
     befores = postures_before(path.execution, path.task)
-    return [isolated_reaches(path.task, q, number) for number, q in enumerate(befores, 1)]
+    for goal, (hand, q) in enumerate(zip(path.hands, befores, strict=True), 1):
+        reaches = {each: isolated_reach(path.task, q, goal, each) for each in path.task.hands}
+        ticks = {each: reach[0] for each, reach in reaches.items() if reach is not None}
+        agrees.append(hand in ticks and ticks[hand] == min(ticks.values()))
+    return agrees
+
+
+def turning_angles(postures: Array) -> Array:
+    """Angles between successive displacements in joint space, rad, shape ``(G - 1,)``.
+
+    ``postures`` has shape ``(G + 1, dof)``: the start and the configuration at each hit. 0
+    goes straight on, π turns back. NaN next to a displacement of no length. The base's length
+    unit and the joints' rad count alike, as in the model's joint-space distance.
+    """
+    steps = np.diff(postures, axis=0)
+    lengths = np.linalg.norm(steps, axis=1, keepdims=True)
+    units = np.divide(steps, lengths, out=np.full_like(steps, np.nan), where=lengths > NO_LENGTH)
+    # Accurate near 0 and π, unlike the arc cosine.
+    apart = np.linalg.norm(units[1:] - units[:-1], axis=1)
+    along = np.linalg.norm(units[1:] + units[:-1], axis=1)
+    angles: Array = 2 * np.arctan2(apart, along)
+    return angles

@@ -1,18 +1,11 @@
-"""Signatures of one method on one task: means, shares and synergies over its runs."""
+"""Signatures of one method on one task: means and shares over its runs."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic import Execution, Trajectory
-from coartic.analysis.signatures.manifold import jacobian_of, synergy
-from coartic.analysis.signatures.other_arm import preshaping, readiness, readiness_from_base, travel
-from coartic.analysis.signatures.paths import base_reversals, smoothness, turning_angles
+from coartic.analysis.signatures.other_arm import preshaping, travel
 from coartic.analysis.signatures.rows import (
     REGISTER,
     WITHIN,
@@ -22,9 +15,9 @@ from coartic.analysis.signatures.rows import (
     row,
     without,
 )
-from coartic.analysis.signatures.subtasks import excess, isolated_agreement, sacrifices
+from coartic.analysis.signatures.subtasks import isolated_agreement, turning_angles
 from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
-from coartic.analysis.trajectories import Trajectories, entropy, postures
+from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
 
@@ -37,52 +30,22 @@ def measured_within(cell: Trajectories) -> Rows:
     changes = cell.against_same_hands
     yield from over_runs("first subtask against the same hands", changes[:, 0], {"goal": 1})
     yield from over_runs("total against the same hands", changes.sum(axis=1))
-    yield from over_runs("first subtask sacrificed", list(map(sacrifices, changes)))
-    yield from over_runs("subtask against isolated reach", list(map(excess, runs)))
     if len(cell.task.hands) > 1:
         yield from with_two_hands(cell)
     else:
         two_hands = (signature for signature in WITHIN if signature.two_hands)
         yield from without(two_hands, "the task has one hand")
-    for k, name in enumerate("xy"):
-        place = {"joint": f"base_{name}"}
-        if name in cell.task.locked_base:
-            yield from without([REGISTER["base reversals"]], "the coordinate is locked", place)
-        else:
-            reversals = [base_reversals(run.configurations[:, k]) for run in runs]
-            yield from over_runs("base reversals", reversals, place)
     paths = [np.vstack([run.task.q0, run.execution.configurations]) for run in runs]
     yield from over_runs("turning angle", list(map(turning_angles, paths)))
-    spectral, jerk = zip(*map(smoothness, runs), strict=True)
-    yield from over_runs("hand path SPARC", spectral, {"hand": "chosen"})
-    yield from over_runs("hand path log dimensionless jerk", jerk, {"hand": "chosen"})
-    yield from synergies(cell)
 
 
 def with_two_hands(cell: Trajectories) -> Rows:
     """Rows of the signatures of tasks with two hands."""
-    runs, sequences, best = cell.runs, cell.sequences, cell.best_hands
-    counts = pd.Series(sequences).value_counts()
-    tally = {"hands": ", ".join(f"{hands} {count}" for hands, count in counts.items())}
-    why = "" if len(runs) > 1 else "one run: no distribution"
-    yield row("hand entropy", tally, value=entropy(sequences), n=len(runs), why_not=why)
+    runs, initial = cell.runs, cell.initial
     yield from over_runs("hand as in isolation", list(map(isolated_agreement, runs)))
-    signature = "hands as the best corrective ones"
-    if best:
-        agrees = [hands in best for hands in sequences]
-        yield from over_runs(signature, agrees, {"hands": ", ".join(best)})
-    else:
-        why = "the folder's table of sequences has no reward"
-        yield from without([REGISTER[signature]], why)
-
-    def nearer(measure: Callable[[Trajectory, Execution], Array]) -> list[Array]:
-        """Against the initial solution, at every goal but the last; empty without that."""
-        initial = cell.initial
-        return [] if initial is None else [measure(run, initial)[:-1] for run in runs]
-
-    yield from over_runs("readiness of the other hand", nearer(readiness))
-    yield from over_runs("readiness seen from the base", nearer(readiness_from_base))
-    yield from over_runs("preshaping of the other arm", nearer(preshaping))
+    # At every goal but the last, against the initial solution; empty without that.
+    nearer = [] if initial is None else [preshaping(run, initial)[:-1] for run in runs]
+    yield from over_runs("preshaping of the other arm", nearer)
     yield from over_runs("travel of the other arm", list(map(travel, runs)))
 
 
@@ -112,30 +75,3 @@ def over_some(signature: str, values: Array, place: Row) -> Row:
     if not len(finite):
         return row(signature, place, why_not=REGISTER[signature].missing)
     return estimated(signature, place, student_mean(finite), len(finite))
-
-
-def synergies(cell: Trajectories) -> Rows:
-    """Variance over runs by what it does to the hand, over runs with the commonest hands.
-
-    Within the uncontrolled manifold, across it, their ratio ΔV, and its transform z.
-    """
-    runs, n = cell.typical, len(cell.typical)
-    names = "V_ucm", "V_ort", "ΔV", "ΔV z"
-    if n < 2:
-        why = "one run: no variance across runs"
-        yield from without([REGISTER[name] for name in names], why, n=n)
-        return
-    for number in range(1, len(cell.task.goals) + 1):
-        hand = runs[0].hands[number - 1]
-        q = postures(runs, number)
-        joints, jacobian = jacobian_of(cell.task, hand, q)
-        *variances, neutral, z = synergy(q[:, joints], jacobian)
-        place: Row = {"goal": number, "hand": hand, "hands": runs[0].execution.hands}
-        why = "runs do not differ" if math.isnan(z.value) else ""
-        for name, value in zip(names[:3], variances, strict=True):
-            yield row(name, place, value=value, n=n, why_not=why)
-        if not why:
-            place["neutral"] = neutral
-            if math.isnan(z.p):
-                why = "fewer than three runs" if n < 3 else "runs differ along one line"
-        yield estimated("ΔV z", place, z, n, why_not=why)

@@ -8,12 +8,14 @@ takes no run. The weight of a penalty, in ticks, says how wrong such a planner i
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 
 from coartic import Movement, Task, execute
 from coartic.analysis.cells import CellRuns
-from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED
 from coartic.analysis.study import Study, cached
 from coartic.learner.rows import movements_from
 from coartic.robot import Array
@@ -25,7 +27,8 @@ TERMS = ("joints", "region", "distinct")
 WHO = ("told", "ticks", "smooth", "learner", "from plan", "cma-es")
 """Planners that are told of the penalty, that believe that ticks count alone, that believe in
 smoothness; the learner, from the corrective process and from the plan of ticks; CMA-ES."""
-RESAMPLES = 9_999
+UNTOLD = ("learner", "cma-es")
+"""Who learns by trial and error, and from no plan."""
 _METHODS = {
     "believed-reward/plan": "told",
     "dual-process": "learner",
@@ -141,30 +144,26 @@ def crossing(weights: Array, means: Array) -> float:
 
 
 def crossings(study: Study) -> pd.DataFrame:
-    """Where trial and error overtakes planners, by term: the weight, with its interval.
+    """Where trial and error overtakes the planner of ticks, by term: the weight, with its interval.
 
     Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %. An
     infinite end: beyond the largest weight, if at all.
     """
     rows = []
-    for term in TERMS:
-        for first in ("learner", "from plan", "cma-es"):
-            for second in ("ticks", "smooth"):
-                table = advantage(study, first, second, term)
-                if len(table) < 3:
-                    continue
-                weights = np.array(table.columns, dtype=np.float64)
-                rng = np.random.default_rng(SEED)
-                by_family = [part.to_numpy() for _, part in table.groupby(level="family")]
-                drawn = [
-                    part[rng.integers(len(part), size=(RESAMPLES, len(part)))].mean(axis=1)
-                    for part in by_family
-                ]
-                means = np.mean(drawn, axis=0)
-                each = [crossing(weights, resample) for resample in means]
-                low, high = np.quantile(each, [0.025, 0.975], method="inverted_cdf")
-                centre = np.mean([part.mean(axis=0) for part in by_family], axis=0)
-                at = crossing(weights, centre)
-                rows.append((term, first, second, at, low, high, len(table)))
-    columns = ["term", "who", "planner", "weight", "weight_low", "weight_high", "instances"]
+    for term, who in itertools.product(TERMS, UNTOLD):
+        table = advantage(study, who, "ticks", term)
+        if len(table) < FEWEST:
+            continue
+        weights = np.array(table.columns, dtype=np.float64)
+        rng = np.random.default_rng(SEED)
+        by_family = [part.to_numpy() for _, part in table.groupby(level="family")]
+        drawn = [
+            part[rng.integers(len(part), size=(RESAMPLES, len(part)))].mean(axis=1)
+            for part in by_family
+        ]
+        each = [crossing(weights, resample) for resample in np.mean(drawn, axis=0)]
+        low, high = np.quantile(each, [0.025, 0.975], method="inverted_cdf")
+        centre = np.mean([part.mean(axis=0) for part in by_family], axis=0)
+        rows.append((term, who, len(table), crossing(weights, centre), low, high))
+    columns = ["term", "who", "tasks", "crossing", "crossing_low", "crossing_high"]
     return pd.DataFrame(rows, columns=columns)

@@ -1,4 +1,4 @@
-"""Tables of the methods beside each other: gaps, costs, learning, pairs."""
+"""Tables of the methods beside each other: gaps, costs, learning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.comparisons.methods import method_rows
-from coartic.analysis.comparisons.pairs import pairs_table
 from coartic.analysis.comparisons.progress import best_so_far
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.reached import targets
@@ -266,16 +265,3 @@ def methods(study: Study) -> Rows:
             values = {str(name): value for name, value in row.items()}
             values |= {"task": title, "method": label}
             yield f"{task} {label}", values | runs_of(study.cells[task, label])
-
-
-@table(
-    "task, kind, first, second, runs_first, runs_second, difference[], pairs, better[], p, p_holm, "
-    "note"
-)
-def pairs(study: Study) -> Rows:
-    """The learner against every other method of a task, and its conditions with each other."""
-    for row in pairs_table(study).to_dict("records"):
-        task, first, second = (str(row[name]) for name in ("task", "first", "second"))
-        cells = study.cells[task, first], study.cells[task, second]
-        named = {str(name): value for name, value in row.items()}
-        yield f"{task} {first} {second}", named | runs_of(*cells)

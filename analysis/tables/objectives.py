@@ -8,9 +8,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import mean_of
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
 
-UNTOLD = ("learner", "cma-es")
-"""Who learns by trial and error, and from no plan."""
-
 
 @table(
     "term, weight, who, tasks, regret[], helps[]",
@@ -49,10 +46,9 @@ def crossings(study: Study) -> Rows:
 
     Infinite: beyond the largest weight, if at all.
     """
-    frame, weights = on_random_tasks(study), regrets.crossings(study)
-    for at in weights[(weights.planner == "ticks") & weights.who.isin(UNTOLD)].itertuples():
-        row: Row = {"term": at.term, "who": at.who, "tasks": at.instances, "crossing": at.weight}
-        row |= {"crossing_low": at.weight_low, "crossing_high": at.weight_high}
-        of_both = frame[(frame.term == at.term) & frame.who.isin([at.who, "ticks"])]
+    frame = on_random_tasks(study)
+    for at in regrets.crossings(study).to_dict("records"):
+        row: Row = {str(name): value for name, value in at.items()}
+        of_both = frame[(frame.term == row["term"]) & frame.who.isin([row["who"], "ticks"])]
         cells = {id(cell): cell for cell in of_both.cell}
-        yield f"{at.term} {at.who}", row | runs_of(*cells.values())
+        yield f"{row['term']} {row['who']}", row | runs_of(*cells.values())

@@ -18,8 +18,8 @@ from coartic.analysis.claims.studies import (
     solved_cells,
 )
 from coartic.analysis.generality.sample import sample
-from coartic.analysis.signatures.paths import turning_angles
 from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.subtasks import turning_angles
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table

@@ -10,7 +10,6 @@ import pandas as pd
 
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.study import Study, cached
-from coartic.errors import CoarticError
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -61,16 +60,8 @@ def table(
         def frame(study: Study) -> pd.DataFrame:
             return frame_of(rows(study), f"{columns}, run_ids")
 
-        name = rows.__name__.replace("_", "-")
-        if name in TABLES:
-            raise CoarticError(f"there are two tables {name!r}; the second is in {rows.__module__}")
-        for column in words.keys() & COLUMNS.keys():
-            raise CoarticError(
-                f"table {name!r} and an earlier one both say how column {column!r} is shown; "
-                "let one of them say it, or give one of the columns another name"
-            )
         COLUMNS.update(words)
-        TABLES[name] = frame
+        TABLES[rows.__name__.replace("_", "-")] = frame
         return frame
 
     return as_table
