@@ -1,7 +1,6 @@
 """Methods in worker processes: whatever one does, it harms no other, and its runs are kept."""
 
 import contextlib
-import json
 import subprocess
 import sys
 import time
@@ -9,14 +8,12 @@ from pathlib import Path
 
 import pytest
 
-import coartic
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.pool import Local, landlock_version
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import job_of
-from coartic.runs.store import open_store
 from tests.support.suites import KNOWN, run_and_write
 
 METHODS = """
@@ -122,41 +119,6 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
 
 def test_other_methods_notice_nothing(runs):
     assert runs.reward["test/again"] == runs.reward["corrective-alone/given"] == HONEST
-
-
-NO_LANDLOCK = "the kernel has no Landlock {} to confine a process with"
-
-
-@pytest.mark.skipif(landlock_version() < 1, reason=NO_LANDLOCK.format("(Linux 5.13)"))
-def test_methods_of_others_write_into_a_folder_of_theirs_alone(tmp_path):
-    forbidden = [tmp_path, tmp_path / "out", Path(coartic.__file__).parent, Path.home()]
-    tries = f"""tempfile.NamedTemporaryFile().write(b"x")
-        open("here", "w").close()
-        refused = {{}}
-        for place in {list(map(str, forbidden))}:
-            try:
-                open(place + "/test_pool", "w").close()
-            except PermissionError:
-                refused[place] = "refused"
-        return Result(corrected(session), refused)"""
-    does, _ = entries(tmp_path, [("honest", tries)])
-    cells = [Cell(load_task("ascending"), does)]
-    study = run_and_write(tmp_path / "out", cells, executor=Local(1))
-    with open_store(study.folder) as store:
-        run = store.run(study.runs.run_id[0]).run
-    assert run.status == "ok", run.row["reason"]
-    assert json.loads(run.row["details"]) == dict.fromkeys(map(str, forbidden), "refused")
-
-
-@pytest.mark.skipif(landlock_version() < 3, reason=NO_LANDLOCK.format("version 3 (Linux 6.2)"))
-def test_methods_of_others_cut_no_file_short(tmp_path):
-    kept = tmp_path / "kept"
-    kept.write_text("results")
-    tries = f"""os.truncate({str(kept)!r}, 0)"""
-    does, _ = entries(tmp_path, [("honest", tries)])
-    study = run_and_write(tmp_path / "out", [Cell(load_task("ascending"), does)], executor=Local(1))
-    assert "PermissionError" in study.runs.reason[0]
-    assert kept.read_text() == "results"
 
 
 def test_workers_that_cannot_begin_get_a_sentence():

@@ -9,7 +9,6 @@ from __future__ import annotations
 import gc
 import io
 import os
-import signal
 import sys
 import warnings
 from typing import Annotated
@@ -60,11 +59,6 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
-    # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
-    # exception, in the middle of an import, it can get lost. Ignored (nohup, &), it stays so.
-    interrupted = signal.getsignal(signal.SIGINT)
-    if interrupted is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         _check_arguments()
         try:
@@ -82,8 +76,6 @@ def main() -> None:
         complain("Error", str(error.strerror or error))
         _flush_or_drop()
         sys.exit(1)
-    finally:
-        signal.signal(signal.SIGINT, interrupted)
 
 
 def _flush_or_drop() -> None:

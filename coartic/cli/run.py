@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import names_in
-from coartic.cli.terminal import performing, say, say_pairs
+from coartic.cli.terminal import Display, interruptible, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.text import counted, unknown
@@ -61,7 +61,13 @@ def run(
         trial_budget=trial_budget,
         readings=reading or (),
     )
-    with performing(chosen.name, out) as display:
+    display = Display(chosen.name)
+
+    def saved() -> str:
+        done = counted(display.done, "finished run")
+        return f"Saved in {out}: {done}; repeat the command to resume."
+
+    with interruptible(saved), display:
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = plan.perform(
             out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update

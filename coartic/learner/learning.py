@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.errors import LOADED, CoarticError, NotApplicableError, need
+from coartic.errors import CoarticError, NotApplicableError
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNT,
@@ -165,8 +165,8 @@ def learn(
     """Run the learner on a task under an exploration condition.
 
     The result depends on the arguments alone. Raises NotApplicableError where the
-    condition does not fit the task, CoarticError for an unknown condition, TypeError for what
-    is no task, model or seed, and ValueError for a negative seed, fewer than one trial, a model
+    condition does not fit the task, CoarticError for an unknown condition,
+    and ValueError for a negative seed, fewer than one trial, a model
     that no movement can be made with, or a task that was changed into none. Source: paper,
     Figure 3.
     """
@@ -190,7 +190,6 @@ def learn_many(
     ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
     :func:`learn` does, and SolutionError for such movements that break the rules.
     """
-    need(task, Task, LOADED)
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:
