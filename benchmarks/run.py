@@ -20,7 +20,7 @@ from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.suites import Cell, Suite, load_suite, select_cells
 from coartic.benchmarks.worker import Answer, Job, job_of
 from coartic.files import folder_named
-from coartic.inputs import MOST_PLANNED, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.runs.plan import (
     Plan,
     PlannedCell,
@@ -355,10 +355,6 @@ def plan_suite(
         # What is written in two ways is performed once.
         planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
     cells_once = tuple(planned.values())
-    if (count := sum(cell.runs for cell in cells_once)) > MOST_PLANNED:
-        raise CoarticError(
-            f"{count:_} runs are planned; at most {MOST_PLANNED:_} can be run at once"
-        )
     plan = Plan(
         suite=suite.name,
         seed=seed,

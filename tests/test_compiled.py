@@ -44,24 +44,6 @@ def lever(folder):
     return float(dy), sum(across.stats.cache_hits.values())
 
 
-def test_a_user_without_a_home(monkeypatch, tmp_path):
-    """Some containers run as one; then nothing is kept, and nothing is put in odd places."""
-
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    compiled.source_fingerprint()  # of the package where it is
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiled.Path, "home", homeless)
-    monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
-    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    monkeypatch.chdir(tmp_path)
-    assert compiled.cache_folder() is None
-    assert list(tmp_path.iterdir()) == []
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert compiled.cache_folder().parent == tmp_path / "cache" / "coartic"
-
-
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     """Another file than the cached function's changes; the result follows. A full disk, say, cuts
     the index short, the code, or both."""

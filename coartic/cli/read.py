@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import at_least
 from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -121,9 +120,7 @@ def compare(
 
 def verify(
     folder: given.Results,
-    again: Annotated[
-        int, typer.Option(parser=at_least(0), metavar="N", help="Also perform N runs again.")
-    ] = 0,
+    again: Annotated[int, typer.Option(min=0, metavar="N", help="Also perform N runs again.")] = 0,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""

@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -80,17 +79,11 @@ class LearningRun:
     """What it spent; the replay is not part of it."""
     wall_s: float
     """Its share of the time that it and the runs beside it took."""
-    cpu_s: float
 
     @property
     def completed(self) -> NDArray[np.bool_]:
         """Whether each trial hit every goal; the others failed and taught nothing."""
         return ~np.ma.getmaskarray(self.rewards)
-
-    @property
-    def method(self) -> str:
-        """Method id of the learner under this condition."""
-        return f"{METHOD_PREFIX}{self.condition.id}"
 
     @property
     def learned(self) -> tuple[Movement, ...]:
@@ -198,7 +191,7 @@ def learn_many(
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
-    ordered: Sequence[int] = list(map(checked_seed, seeds))
+    ordered: Sequence[int] = list(seeds)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
@@ -215,15 +208,6 @@ def learn_many(
 
 _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
-
-
-def checked_seed(seed: Any) -> int:
-    """A seed as a number. Raises TypeError for what is none, ValueError for a negative one."""
-    if not isinstance(seed, Integral) or isinstance(seed, bool):
-        raise TypeError(f"seed is {seed!r}; it must be a whole number, the same for the same run")
-    if seed < 0:
-        raise ValueError(f"seed is {seed}; it must not be negative")
-    return int(seed)
 
 
 def threads_for(jobs: int) -> int:
@@ -280,9 +264,9 @@ def learn_together(
         addresses(generators),
         work_for(runs, task),
     )
-    wall, cpu = time.perf_counter(), time.thread_time()
+    clock = time.perf_counter()
     learn_kernel(*arguments)
-    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    wall = time.perf_counter() - clock
     return [
         LearningRun(
             task=task,
@@ -309,7 +293,6 @@ def learn_together(
                 failed_trials=int(kept.counts[n, COUNT.failed]),
             ),
             wall_s=wall / runs,
-            cpu_s=cpu / runs,
         )
         for n, seed in enumerate(seeds)
     ]
