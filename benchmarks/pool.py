@@ -20,7 +20,7 @@ from copy import copy
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -36,7 +36,6 @@ _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
 
 
-@runtime_checkable
 class Executor(Protocol):
     """Performs jobs, somewhere."""
 

@@ -154,8 +154,6 @@ class SuitePlan:
         it goes on from there. Raises CoarticError where something else is in the way in the
         folder, another process is at work in it, or it cannot be written.
         """
-        if executor is not None and not isinstance(executor, Executor):
-            raise CoarticError(f"executor is {executor!r}; it must be one, as Local(jobs=2)")
         folder, clock = folder_named(folder), time.perf_counter()
         executor = executor or Local()
         with writing(folder) as store:
@@ -297,8 +295,6 @@ def plan_suite(
     ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
-    if not isinstance(select, Selection):
-        raise CoarticError(f"select is {select!r}; it must be a Selection")
     check_list("readings", readings)
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))

@@ -156,11 +156,6 @@ class Cell:
         return self.entry.name
 
     @property
-    def all_parameters(self) -> dict[str, Any]:
-        """All parameters, defaults included, as the method reads them; CoarticError for bad."""
-        return self.entry.complete(dict(self.parameters))
-
-    @property
     def variant(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
         return variant_of(dict(self.parameters), self.entry.defaults)

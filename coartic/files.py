@@ -85,11 +85,8 @@ def check_output(path: Path, *, replace: bool) -> None:
         )
 
 
-def folder_named(name: object, what: str = "the name of a folder") -> Path:
-    """A folder by its name. Raises CoarticError for an empty one, which is not the current one,
-    and for what is no name."""
-    if not isinstance(name, str | Path):
-        raise CoarticError(f"folder is {name!r}; it must be a path")
+def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
+    """A folder by its name. Raises CoarticError for an empty one, which is not the current one."""
     if isinstance(name, str) and not name.strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
     return Path(name)

@@ -149,10 +149,7 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"runs": True}, "runs is True; it must be from 1 to "),
         ({"seed": -1}, "seed is -1; it must be from 0 to "),
         ({"readings": ["tie=right"]}, "did you mean 'ties'?"),
-        ({"executor": 2}, "executor is 2; it must be one, as Local(jobs=2)"),
-        ({"select": {}}, "select is {}; it must be a Selection"),
         ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
-        ({"folder": None}, "folder is None; it must be a path"),
         ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
     ],
 )

@@ -80,21 +80,6 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
     assert twice.signatures == [(types.int64,)]
 
 
-def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(compiled.FunctionCache, "_save_overload", full)
-
-    @compiled.entry
-    def twice(number):
-        return 2 * number
-
-    assert twice(3) == 6
-    assert not list(tmp_path.rglob("*.nb?"))
-
-
 def slow_lever(folder):
     """How often the kernel was loaded, by a process that takes half a second to keep it."""
     forget("coartic")
