@@ -12,16 +12,13 @@ to inequality tasks, IEEE Transactions on Robotics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
+import daqp
 import numpy as np
-from scipy import sparse
 
 from coartic.errors import CoarticError
 from coartic.robot import Array
-
-SolverName = Literal["clarabel", "daqp"]
 
 DAMPING = 0.01
 """λ, length unit per unit of change: 1e-4 of what level 1 asks is given up where the singular
@@ -29,12 +26,6 @@ value is 1, and changes stay bounded where it is 0."""
 
 LIMIT = 2.0
 """Largest change of any joint; where it binds, level 1 falls short."""
-
-SETTINGS: dict[SolverName, dict[str, Any]] = {
-    # Tighter than their defaults, which are seen in the changes (up to 1e-5).
-    "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
-    "daqp": {},
-}
 
 SLACK = 1e-6
 """Length unit, added to level 1's shortfall: where limits bind, level 2 has more than a point."""
@@ -75,10 +66,6 @@ class Program(NamedTuple):
         self.upper[:task] = -least
 
 
-Solved = tuple[Array, int, str]
-"""What a solver says: variables, iterations, and why they are no optimum; empty where they are."""
-
-
 class Cascade:
     """Both levels for so many ``rows`` of a task and ``joints`` that may move, built once.
 
@@ -86,8 +73,7 @@ class Cascade:
     kept between solves.
     """
 
-    def __init__(self, rows: int, joints: int, solver: SolverName) -> None:
-        self.solver = solver
+    def __init__(self, rows: int, joints: int) -> None:
         self.iterations = self.solves = 0
         self._reach = Program.of(1, DAMPING**2, rows, joints)
         self._prefer = Program.of(0, 1.0, rows, joints)
@@ -106,57 +92,19 @@ class Cascade:
         return self.solve_level(2, self._prefer)
 
     def solve_level(self, level: Literal[1, 2], program: Program) -> Array:
-        """The variables of a level. Raises CascadeError where the solver fails."""
-        try:
-            x, iterations, failure = _SOLVERS[self.solver](program, SETTINGS[self.solver])
-        except ValueError as error:  # of what is no number
-            raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
+        """The variables of a level, by DAQP. Raises CascadeError where it fails."""
+        hessian, gradient, rows, upper = program
+        free = np.full(len(gradient), np.inf)
+        x, _, flag, info = daqp.solve(
+            hessian,
+            gradient,
+            rows,
+            np.concatenate([free, upper]),
+            np.full(len(free) + len(upper), -np.inf),
+            np.zeros(len(free) + len(upper), dtype=np.intc),
+        )
         self.solves += 1
-        self.iterations += iterations
-        if failure:
-            raise CascadeError(f"level {level}: {self.solver} ended {failure}")
+        self.iterations += info["iterations"]
+        if flag != 1:
+            raise CascadeError(f"level {level}: DAQP ended with exit flag {flag}")
         return np.array(x, dtype=np.float64)
-
-
-def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
-    """A program solved by DAQP."""
-    import daqp
-
-    hessian, gradient, rows, upper = program
-    free = np.full(len(gradient), np.inf)
-    x, _, flag, info = daqp.solve(
-        hessian,
-        gradient,
-        rows,
-        np.concatenate([free, upper]),
-        np.full(len(free) + len(upper), -np.inf),
-        np.zeros(len(free) + len(upper), dtype=np.intc),
-        **settings,
-    )
-    return x, info["iterations"], "" if flag == 1 else f"with exit flag {flag}"
-
-
-def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
-    """A program solved by Clarabel."""
-    import clarabel
-
-    hessian, gradient, rows, upper = program
-    chosen = clarabel.DefaultSettings()
-    for name, value in {"verbose": False, **settings}.items():
-        setattr(chosen, name, value)
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(hessian),
-        gradient,
-        sparse.csc_matrix(rows),
-        upper,
-        [clarabel.NonnegativeConeT(len(rows))],
-        chosen,
-    ).solve()
-    status = str(solution.status)
-    return np.array(solution.x), solution.iterations, "" if status == "Solved" else status
-
-
-_SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
-    "clarabel": solve_by_clarabel,
-    "daqp": solve_by_daqp,
-}

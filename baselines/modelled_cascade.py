@@ -15,11 +15,9 @@ import numpy as np
 from coartic.baselines.cascade import (
     DAMPING,
     LIMIT,
-    SETTINGS,
     SLACK,
     Cascade,
     CascadeError,
-    SolverName,
 )
 from coartic.robot import Array
 
@@ -27,8 +25,8 @@ from coartic.robot import Array
 class ModelledCascade(Cascade):
     """Both levels, parametrised under cvxpy's DPP rules and compiled once."""
 
-    def __init__(self, rows: int, joints: int, solver: SolverName) -> None:
-        super().__init__(rows, joints, solver)
+    def __init__(self, rows: int, joints: int) -> None:
+        super().__init__(rows, joints)
         self._rows = cp.Parameter((rows, joints))
         self._least = cp.Parameter(rows)
         self._preferred = cp.Parameter(joints)
@@ -67,13 +65,12 @@ class ModelledCascade(Cascade):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # of what the status says
                 problem.solve(
-                    solver=self.solver.upper(),
+                    solver=cp.DAQP,
                     warm_start=False,  # or earlier problems would leave their mark
-                    **SETTINGS[self.solver],
                 )
         except cp.SolverError as error:
-            raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
+            raise CascadeError(f"level {level}: DAQP failed: {error}") from None
         self.solves += 1
         self.iterations += problem.solver_stats.num_iters or 0
         if problem.status != cp.OPTIMAL:
-            raise CascadeError(f"level {level}: {self.solver} ended {problem.status}")
+            raise CascadeError(f"level {level}: DAQP ended {problem.status}")

@@ -51,7 +51,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from coartic import Task
-from coartic.baselines.cascade import Cascade, CascadeError, SolverName
+from coartic.baselines.cascade import Cascade, CascadeError
 from coartic.baselines.nullspace_control import (
     FACES,
     Aim,
@@ -86,11 +86,9 @@ class NullspaceParameters(Parameters):
     """``every``: all hand sequences are simulated and the shortest is kept; ``nearest``:
     at each goal the hand that is nearest when the last one is hit, without a secondary
     objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
-    solver: SolverName = "daqp"
-    """Of both levels."""
     modelling: Modelling = "none"
     """``cvxpy`` states the programs in its language, ``none`` fills in their numbers; the same
-    programs, and with DAQP the same rates to the last bit."""
+    programs, and the same rates to the last bit."""
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
     max_steps: Annotated[int, Field(ge=1)] = 5000
@@ -154,7 +152,7 @@ class NullspaceQP(Method):
 
     def cascade(self, joints: int) -> Cascade:
         """The solver of every control step."""
-        return cascade_for(FACES, joints, self.parameters.solver, self.parameters.modelling)
+        return cascade_for(FACES, joints, self.parameters.modelling)
 
     def solve(self, session: Session) -> Result:
         """Simulate the candidate hand sequences and hand over the best one's paths."""
@@ -311,12 +309,10 @@ METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, P
 
 
 @cache
-def cascade_for(
-    rows: int, joints: int, solver: SolverName, modelling: Modelling = "none"
-) -> Cascade:
-    """The one cascade of this process for such a task, this solver and statement."""
+def cascade_for(rows: int, joints: int, modelling: Modelling = "none") -> Cascade:
+    """The one cascade of this process for such a task and statement."""
     if modelling == "none":
-        return Cascade(rows, joints, solver)
+        return Cascade(rows, joints)
     from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
 
-    return ModelledCascade(rows, joints, solver)
+    return ModelledCascade(rows, joints)

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -34,9 +34,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import cheapest_chains
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.compiled import entry, inner, joint_lever
+from coartic.motion.initial import too_many_sequences
 from coartic.robot import BASE_DOF, Array, Hand, chain
 from coartic.tasks.task import hands_of
 
@@ -51,7 +51,6 @@ _RETRIEVED = 40  # steps for a stored posture, which may be far off
 _GENERATED = 3  # steps for a generated one, which is close by
 _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _FINEST = 0.01  # last SD of the diffusion, as a part of the first
-_BEAM_POSTURES = 60  # per goal and hand, to choose hand sequences by
 _TOGETHER = 16  # plans that are made side by side: more take memory, and no less time
 
 
@@ -79,10 +78,6 @@ class PostureBasedParameters(Parameters):
     hands: Literal["chosen", "given", "every"] = "chosen"
     """By cost of travel, goal by goal; the sequence that the task names; or every
     sequence, of which the one with the best reward expected is kept."""
-    most_sequences: Annotated[int, Field(ge=1)] = 64
-    """Hand sequences of ``every`` that are planned for: all where there are no more, with two
-    hands up to six goals; else those that a beam of this width over the goals of a posture
-    graph ends with, by the distance between sampled postures."""
     other_arm: Literal["still", "free"] = "still"
     """Whether the arm that is not to hit the goal may move as well."""
 
@@ -108,38 +103,27 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def why_not(self, task: Task) -> str | None:
-        """A policy names no hands."""
+        """A policy names no hands; or more sequences than can be planned one by one."""
         if self.parameters.hands == "given" and task.initial_is_policy:
             return f"task {task.name!r} names no hand sequence but {task.initial_hands!r}"
+        if self.parameters.hands == "every":
+            return too_many_sequences(task, len(task.hands))
         return None
 
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""
-        options: list[list[Hands]]
-        match self.parameters.hands:
-            case "chosen":
-                options = [[session.hands] * session.goals_count]
-            case "given":
-                options = [[(hand,) for hand in hands_of(session.initial_hands)]]
-            case _:
-                options = [[(hand,) for hand in hands] for hands in self.sequences(session)]
+        options: list[list[Hands]] = [[session.hands] * session.goals_count]
+        if self.parameters.hands == "given":
+            options = [[(hand,) for hand in hands_of(session.initial_hands)]]
+        elif self.parameters.hands == "every":
+            sequences = itertools.product(sorted(session.hands), repeat=session.goals_count)
+            options = [[(hand,) for hand in hands] for hands in sequences]
         with session.building():
             planner = Planner(session, self.parameters, self.horizon)
         with session.solving():
             plans = planner.plans(options)
         best = min(plans, key=lambda plan: sum(plan.ticks))
         return Result(tuple(best.movements), {"expected_ticks": best.ticks})
-
-    def sequences(self, session: Session) -> Iterable[Hands]:
-        """Every hand sequence, or the most promising of too many."""
-        most = self.parameters.most_sequences
-        if len(session.hands) ** session.goals_count <= most:
-            return itertools.product(sorted(session.hands), repeat=session.goals_count)
-        task = session.hand_over(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
-        chains = cheapest_chains(
-            session, task, session.rng, nodes=_BEAM_POSTURES, graphs=1, chains=1, most=most
-        )
-        return [hands for hands, _ in chains]
 
 
 class OneGoal(PostureBased):

@@ -1,14 +1,12 @@
 """Worker processes on this machine, with a time limit for each run.
 
-Methods of this project share workers; any other method has workers of its own. On Linux these may
-write to a temporary folder of theirs alone: that keeps a careless method out of the results, of
-other methods and of the kernels.
+Methods of this project share workers; any other method has workers of its own, which begin in a
+temporary folder: that keeps a careless method out of the results of others.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import multiprocessing
 import os
 import signal
@@ -22,7 +20,7 @@ from copy import copy
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -38,7 +36,6 @@ _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
 
 
-@runtime_checkable
 class Executor(Protocol):
     """Performs jobs, somewhere."""
 
@@ -155,7 +152,6 @@ def begin_job_worker(
     if foreign:
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
         os.chdir(tempfile.tempdir)
-        confine(Path(folder))
 
 
 def bound_memory(workers: int) -> None:
@@ -168,42 +164,6 @@ def bound_memory(workers: int) -> None:
         return
     share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
     resource.setrlimit(resource.RLIMIT_DATA, (share, share))
-
-
-def landlock_version() -> int:
-    """Version of the system's Landlock interface; 0 or less where there is none."""
-    if sys.platform != "linux":
-        return 0
-    return int(ctypes.CDLL(None).syscall(444, None, 0, 1))
-
-
-def confine(folder: Path) -> None:
-    """Let this process write below a folder alone, for good, where the system can (Linux 5.13 with
-    Landlock); nothing where it cannot."""
-    if landlock_version() < 1:
-        return
-    libc = ctypes.CDLL(None, use_errno=True)
-    create, add, restrict = 444, 445, 446  # of system calls
-    write_file, truncate = 1 << 1, 1 << 14
-    # Remove files and make them of all kinds; a right that a kernel does not know is an error.
-    writes = write_file | sum(1 << bit for bit in (4, 5, 6, 7, 8, 9, 10, 11, 12))
-    if landlock_version() >= 3:
-        writes |= truncate
-    rights = ctypes.c_uint64(writes)
-    rules = libc.syscall(create, ctypes.byref(rights), ctypes.sizeof(rights), 0)
-    if rules < 0:
-        return
-    for allowed in (folder, Path("/dev/null"), Path("/dev/shm")):
-        with contextlib.suppress(OSError):
-            place = os.open(allowed, os.O_PATH | os.O_CLOEXEC)
-            allowed_rights = writes if allowed.is_dir() else writes & (write_file | truncate)
-            rule = allowed_rights.to_bytes(8, "little") + place.to_bytes(4, "little", signed=True)
-            libc.syscall(add, rules, 1, rule, 0)
-            os.close(place)
-    no_new_privileges = 38
-    libc.prctl(no_new_privileges, 1, 0, 0, 0)
-    libc.syscall(restrict, rules, 0)
-    os.close(rules)
 
 
 _START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from coartic.benchmarks.code_identity import code_of
 from coartic.errors import CoarticError
@@ -293,15 +293,6 @@ def check_declaration(method: type[Method], origin: str) -> None:
     told = getattr(method, "told", None)
     if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
         raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
-    for attribute, kind, what in (
-        ("stochastic", bool, "True or False"),
-        ("secondary", tuple | list, "a tuple of texts"),
-        ("files", tuple | list, "a tuple of names"),
-    ):
-        if not isinstance(value := getattr(method, attribute), kind):
-            raise CoarticError(f"{where}: {attribute} must be {what}, not {value!r}")
-    if not inspect.isclass(method.Parameters) or not issubclass(method.Parameters, BaseModel):
-        raise CoarticError(f"{where}: Parameters must be a subclass of coartic.method.Parameters")
 
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

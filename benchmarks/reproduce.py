@@ -13,7 +13,6 @@ from coartic.benchmarks.worker import Job, job_of
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.method import Meter
-from coartic.model import MotionModel
 from coartic.motion.solution import Movement
 from coartic.motion.ticks import Trajectory, trajectory
 from coartic.runs.store import FILE, PARTS, Run, StoredRun, open_store
@@ -65,7 +64,7 @@ def performed(jobs: Sequence[Job], tasks: Sequence[Task]) -> Iterator[Run]:
             "run_id": "", "suite_seed": 0, "run": 0, "seed": job.seeds[0],
             "time_limit_s": job.time_limit_s,
         }  # fmt: skip
-        yield kept([name], answers[number], task, MotionModel(**job.model))[0]
+        yield kept([name], answers[number], task, job.model)[0]
 
 
 def performed_again(stored: StoredRun, registered: Registry) -> Run:

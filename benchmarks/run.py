@@ -20,7 +20,7 @@ from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.suites import Cell, Suite, load_suite, select_cells
 from coartic.benchmarks.worker import Answer, Job, job_of
 from coartic.files import folder_named
-from coartic.inputs import MOST_PLANNED, MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.runs.plan import (
     Plan,
     PlannedCell,
@@ -154,8 +154,6 @@ class SuitePlan:
         it goes on from there. Raises CoarticError where something else is in the way in the
         folder, another process is at work in it, or it cannot be written.
         """
-        if executor is not None and not isinstance(executor, Executor):
-            raise CoarticError(f"executor is {executor!r}; it must be one, as Local(jobs=2)")
         folder, clock = folder_named(folder), time.perf_counter()
         executor = executor or Local()
         with writing(folder) as store:
@@ -297,8 +295,6 @@ def plan_suite(
     ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """
-    if not isinstance(select, Selection):
-        raise CoarticError(f"select is {select!r}; it must be a Selection")
     check_list("readings", readings)
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
@@ -355,10 +351,6 @@ def plan_suite(
         # What is written in two ways is performed once.
         planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
     cells_once = tuple(planned.values())
-    if (count := sum(cell.runs for cell in cells_once)) > MOST_PLANNED:
-        raise CoarticError(
-            f"{count:_} runs are planned; at most {MOST_PLANNED:_} can be run at once"
-        )
     plan = Plan(
         suite=suite.name,
         seed=seed,

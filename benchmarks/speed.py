@@ -7,15 +7,15 @@ Times depend on the machine; compare ratios, and times of one call.
 
 from __future__ import annotations
 
-import importlib.util
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+import gymnasium
 import numpy as np
 
+import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
 from coartic.baselines.cma_es import Every
 from coartic.benchmarks.pool import Local
@@ -23,18 +23,16 @@ from coartic.benchmarks.run import plan_suite
 from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
 from coartic.method import Session
 from coartic.motion.lanes import LANES
-from coartic.motion.reach import reach_in_turn
-from coartic.motion.trials import hand_codes, movements_of
-from coartic.robot import Array
+from coartic.motion.trials import movements_of
 from coartic.runs.store import open_store
 
 
 def main() -> None:
     """Measure and print."""
     rates = trials_a_second()
-    print(f"{'way':32}{'trials a second':>18}{'of the kernel':>16}")
+    print(f"{'way':32}{'trials a second':>18}")
     for way, rate in rates.items():
-        print(f"{way:32}{rate:18,.0f}{rate / rates['kernel, 1000 at once']:16.4f}")
+        print(f"{way:32}{rate:18,.0f}")
     plan = plan_suite("paper")
     cells = [
         (load_task(cell.task), cell.method.removeprefix(METHOD_PREFIX)) for cell in plan.plan.cells
@@ -44,12 +42,6 @@ def main() -> None:
     for task, condition in cells:
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
-    runs = plan.plan.runs
-    for threads in (1, 2):
-        clock = time.perf_counter()
-        for task, condition in cells:
-            learn_many(task, CONDITIONS[condition], seeds=range(runs), jobs=threads)
-        print(f"{plan.plan.size} runs, {threads} threads: {time.perf_counter() - clock:.1f} s")
     with tempfile.TemporaryDirectory() as folder:
         clock = time.perf_counter()
         plan.perform(folder, executor=Local(2))
@@ -63,8 +55,7 @@ def main() -> None:
 def trials_a_second() -> dict[str, float]:
     """Trials a second on one core through each public way: the same trials, of ``two-armed-1``.
 
-    They are around what CMA-ES finds, so that few goals are missed. Those of Gymnasium are left
-    out where it is not installed.
+    They are around what CMA-ES finds, so that few goals are missed.
     """
     task = load_task("two-armed-1")
     session = Session(task, 0, Every.told)
@@ -74,27 +65,20 @@ def trials_a_second() -> dict[str, float]:
     cost = Objective(session, hands)
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
-    codes, ones = hand_codes(task, [hands] * 1000, 1000), np.ones((1000, len(hands)), np.bool_)
-    starts = np.tile(task.q0, (1000, 1))
     single = [movements_of(hands, target) for target in targets[:100]]
-
-    def kernel() -> None:
-        reach_in_turn(
-            task.robot,
-            starts,
-            codes,
-            task.goal_array[None],
-            task.radius,
-            targets.copy(),  # into which it writes
-            ones,
-            bounds=(0, 1000),
-            locked_base=task.locked_base,
-        )
-
-    rates = {
-        "kernel, 1000 at once": _rate(1000, kernel),
-        "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(codes, targets)),
+    many = gymnasium.make_vec("coartic/TwoArmed1-v0", num_envs=1000, around=best)
+    sides = np.where(np.array([*hands]) == "R", 1.0, -1.0)
+    choice = np.broadcast_to(sides[:, None], (1000, len(hands), 1))
+    free = noise[..., many.unwrapped.arms.free]
+    actions = np.concatenate([choice, free], axis=-1).swapaxes(0, 1)  # goals first
+    many.reset()
+    return {
+        "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(hands, targets)),
         "objective.many, 1000 at once": _rate(1000, lambda: cost.many(targets[:, cost.joints])),
+        "vector environment of 1000": _rate(
+            1000,
+            lambda: [many.step(action) for action in (*actions, actions[0])],  # all begin anew
+        ),
         "objective, one by one": _rate(
             100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
         ),
@@ -102,48 +86,6 @@ def trials_a_second() -> dict[str, float]:
             100, lambda: [session.trial(solution) for solution in single]
         ),
     }
-    if importlib.util.find_spec("gymnasium"):
-        rates |= _rates_of_environments(hands, best, noise)
-    return rates
-
-
-def _rates_of_environments(hands: str, best: Array, noise: Array) -> dict[str, float]:
-    import gymnasium
-
-    import coartic.gym  # noqa: F401 (registers the environments)
-
-    name, options = "coartic/TwoArmed1-v0", {"around": best}
-    env = gymnasium.make(name, **options)
-    sides = np.where(np.array([*hands]) == "R", 1.0, -1.0)
-    actions = np.concatenate(
-        [
-            np.broadcast_to(sides[:, None], (1000, len(hands), 1)),
-            noise[..., env.unwrapped.arms.free],
-        ],
-        axis=-1,
-    ).swapaxes(0, 1)  # goals first
-
-    def episodes() -> None:
-        for n in range(100):
-            env.reset()
-            for action in actions[:, n]:
-                env.step(action)
-
-    rates = {"environment, one by one": _rate(100, episodes)}
-    for vectors, count, mode in (
-        ("SyncVectorEnv of 16", 16, "sync"),
-        ("vector environment of 16", 16, "vector_entry_point"),
-        ("vector environment of 1000", 1000, "vector_entry_point"),
-    ):
-        many = gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **options)
-        many.reset()
-
-        def rounds(many: Any = many, count: int = count) -> None:
-            for action in [*actions, actions[0]]:  # in the last step all begin anew
-                many.step(action[:count])
-
-        rates[vectors] = _rate(count, rounds)
-    return rates
 
 
 def _rate(trials: int, make: Callable[[], object]) -> float:

@@ -156,11 +156,6 @@ class Cell:
         return self.entry.name
 
     @property
-    def all_parameters(self) -> dict[str, Any]:
-        """All parameters, defaults included, as the method reads them; CoarticError for bad."""
-        return self.entry.complete(dict(self.parameters))
-
-    @property
     def variant(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
         return variant_of(dict(self.parameters), self.entry.defaults)
@@ -317,7 +312,7 @@ def added_cells(
 def distinct(cells: Iterable[Cell]) -> list[Cell]:
     """Every cell once. Results are told apart by names, so one name is one thing only.
 
-    Raises CoarticError where different tasks or cells have the same name.
+    Raises CoarticError where different tasks have the same name.
     """
     tasks: dict[str, Task] = {}
     by_name: dict[tuple[str, str], Cell] = {}
@@ -327,15 +322,7 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
             raise CoarticError(
                 f"two different tasks are called {task.name!r}; give one of them another name"
             )
-        first = by_name.setdefault((task.name, cell.label), cell)
-        # As text, since -0.0 equals 0.0.
-        if repr(first.parameters) != repr(cell.parameters) and (
-            repr(first.all_parameters) != repr(cell.all_parameters)
-        ):
-            raise CoarticError(
-                f"two different cells are called {cell.label!r} on task {task.name!r}: "
-                f"{brief_value(dict(first.parameters))} and {brief_value(dict(cell.parameters))}"
-            )
+        by_name.setdefault((task.name, cell.label), cell)
     return list(by_name.values())
 
 
@@ -377,38 +364,42 @@ def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:
         raise CoarticError(
             f"suite {suite.name!r}: task {task.name!r} has no goal {move.goal} to move"
         )
-    variants: dict[Any, Task] = {}
+    variants = []
     for by in move.by:
         dx, dy = map(exact, by)
         goals = [list(goal) for goal in task.goals]
         goals[move.goal - 1][0] += by[0]
         goals[move.goal - 1][1] += by[1]
-        content = {
-            **task.model_dump(mode="json"),
-            "name": f"{task.name}.goal{move.goal}_{dx}_{dy}",
-            "description": f"{task.name} with goal {move.goal} moved by ({dx}, {dy})",
-            "goals": goals,
-        }
-        variant = parse_task(content, f"suite {suite.name!r}")
-        if variants.setdefault(variant.goals, variant) is not variant:
-            raise CoarticError(
-                f"suite {suite.name!r}: goal {move.goal} of task {task.name!r} is moved to the "
-                f"same place twice, by ({dx}, {dy}) again"
+        variants.append(
+            variant_task(
+                suite,
+                task,
+                f"goal{move.goal}_{dx}_{dy}",
+                f"goal {move.goal} moved by ({dx}, {dy})",
+                goals=goals,
             )
-    return list(variants.values())
+        )
+    return variants
+
+
+def variant_task(suite: Suite, task: Task, name: str, difference: str, **changes: Any) -> Task:
+    """A task with changes, by a name that ends in ``name``."""
+    content = {
+        **task.model_dump(mode="json"),
+        "name": f"{task.name}.{name}",
+        "description": f"{task.name} with {difference}",
+        **changes,
+    }
+    return parse_task(content, f"suite {suite.name!r}")
 
 
 def with_penalty(suite: Suite, task: Task, penalty: Penalty) -> Task:
     """The task with a penalty, by a name of its own, which says what is not the default."""
     given = penalty.model_dump(mode="json", exclude_defaults=True)
     words = "-".join(f"{key}-{in_name(value)}" for key, value in given.items()) or "no-penalty"
-    content = {
-        **task.model_dump(mode="json"),
-        "name": f"{task.name}.{words}",
-        "description": f"{task.name} with a penalty: {words}",
-        "penalty": penalty.model_dump(mode="json"),
-    }
-    return parse_task(content, f"suite {suite.name!r}")
+    return variant_task(
+        suite, task, words, f"a penalty: {words}", penalty=penalty.model_dump(mode="json")
+    )
 
 
 def with_free_base(suite: Suite, task: Task) -> Task:
@@ -417,16 +408,16 @@ def with_free_base(suite: Suite, task: Task) -> Task:
         raise CoarticError(
             f"suite {suite.name!r}: free_base: the base of task {task.name!r} is free"
         )
-    content = task.model_dump(mode="json")
     why = {"status": "chosen", "source": f"not that of {task.name}, to see what its lock does"}
-    content |= {
-        "name": f"{task.name}.free-base",
-        "title": f"{task.title}, base free",
-        "description": f"{task.name} with a base that moves in both directions",
-        "locked_base": [],
-        "provenance": {**content["provenance"], "locked_base": why},
-    }
-    return parse_task(content, f"suite {suite.name!r}")
+    return variant_task(
+        suite,
+        task,
+        "free-base",
+        "a base that moves in both directions",
+        title=f"{task.title}, base free",
+        locked_base=[],
+        provenance=task.provenance | {"locked_base": why},
+    )
 
 
 def in_name(value: Any) -> str:

@@ -47,11 +47,11 @@ class Job:
     code: str
     told: tuple[str, ...]
     parameters: dict[str, Any]
-    model: dict[str, Any]
-    trial_budget: int | None
-    time_limit_s: float | None
-    """For each run."""
     seeds: tuple[int, ...]
+    model: MotionModel = PAPER
+    trial_budget: int | None = None
+    time_limit_s: float | None = None
+    """For each run."""
     within_reach: bool = True
     """Whether goals out of reach are refused; how methods cope is checked with such."""
 
@@ -61,27 +61,11 @@ def job_of(
     task: dict[str, Any],
     parameters: dict[str, Any],
     seeds: tuple[int, ...],
-    *,
-    model: MotionModel = PAPER,
-    trial_budget: int | None = None,
-    time_limit_s: float | None = None,
-    within_reach: bool = True,
+    **how: Any,
 ) -> Job:
-    """Runs of a method with all its parameters on a task."""
-    return Job(
-        task=task,
-        method=entry.name,
-        where=entry.where,
-        is_ours=entry.is_ours,
-        code=entry.code,
-        told=entry.told,
-        parameters=parameters,
-        model=model._asdict(),
-        trial_budget=trial_budget,
-        time_limit_s=time_limit_s,
-        seeds=seeds,
-        within_reach=within_reach,
-    )
+    """Runs of a method with all its parameters on a task; ``how`` are further fields of a job."""
+    method = (entry.name, entry.where, entry.is_ours, entry.code, entry.told)
+    return Job(task, *method, parameters, seeds, **how)
 
 
 @dataclass
@@ -127,7 +111,7 @@ def perform(job: Job) -> Answer:
             task,
             seed,
             map(Information, job.told),  # as declared, whatever became of the class since
-            model=MotionModel(**job.model),
+            model=job.model,
             trial_budget=job.trial_budget,
             trusted=job.is_ours,
         )

@@ -19,12 +19,3 @@ class SolutionError(CoarticError):
 
 class NotApplicableError(CoarticError):
     """A method asked to run on a task it does not apply to."""
-
-
-def need(value: object, kind: type, hint: str = "") -> None:
-    """Raise a TypeError in words where a caller hands over something of another kind."""
-    if not isinstance(value, kind):
-        raise TypeError(f"{value!r:.80} is no {kind.__name__}{hint and f'; {hint}'}")
-
-
-LOADED = "load_task makes one of a name or a file"

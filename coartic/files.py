@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -17,15 +16,12 @@ LISTING = ".coartic-files"
 
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file so that it is there whole or not at all. Raises OSError."""
-    number, name = tempfile.mkstemp(prefix=".coartic-", dir=path.parent)
+    beside = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
-        with open(number, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o666 & ~current_umask())
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+        beside.write_bytes(data)
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -89,11 +85,8 @@ def check_output(path: Path, *, replace: bool) -> None:
         )
 
 
-def folder_named(name: object, what: str = "the name of a folder") -> Path:
-    """A folder by its name. Raises CoarticError for an empty one, which is not the current one,
-    and for what is no name."""
-    if not isinstance(name, str | Path):
-        raise CoarticError(f"folder is {name!r}; it must be a path")
+def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
+    """A folder by its name. Raises CoarticError for an empty one, which is not the current one."""
     if isinstance(name, str) and not name.strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
     return Path(name)
@@ -112,13 +105,6 @@ def write_listing(folder: Path, names: Iterable[str]) -> None:
     """Say which files in a folder are ours."""
     text = "".join(f"{name}\n" for name in sorted(names))
     write_atomically(folder / LISTING, text.encode())
-
-
-def current_umask() -> int:
-    """Permissions that new files of this process do not get."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 @contextlib.contextmanager

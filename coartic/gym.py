@@ -212,22 +212,19 @@ class TaskEnv(gymnasium.Env):
         from matplotlib.figure import Figure
 
         if self.render_mode == "rgb_array":
-            self._figure = self._figure or Figure(figsize=(6, 4))
-            canvas: Any = FigureCanvasAgg(self._figure)
-            draw(self._figure, self.arms)
+            figure = Figure(figsize=(6, 4))
+            canvas: Any = FigureCanvasAgg(figure)
+            draw(figure, self.arms)
             canvas.draw()
             return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        if self._figure is None:
-            with pyplot.ion():
-                self._figure = pyplot.figure(figsize=(6, 4))
+        self._figure = self._figure or pyplot.figure(figsize=(6, 4))
         draw(self._figure, self.arms)
-        self._figure.canvas.draw()
-        self._figure.canvas.start_event_loop(1 / self.metadata["render_fps"])
+        pyplot.pause(1 / self.metadata["render_fps"])
         return None
 
     def close(self) -> None:
         """Close the window."""
-        if self._figure is not None and self.render_mode == "human":
+        if self._figure is not None:
             from matplotlib import pyplot
 
             pyplot.close(self._figure)

@@ -23,8 +23,6 @@ MOST_CELLS = 10_000
 """Of a suite: sixty times the largest one shipped."""
 MOST_RUNS = 1_000_000
 """Of a cell."""
-MOST_PLANNED = 2_000_000
-"""Runs of a plan, which is held in memory."""
 MOST_TRIALS = 10_000_000
 """Of a run: a thousand times the paper's; their rewards are kept."""
 MOST_SECONDS = 1_000_000

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from numbers import Integral
 from typing import NamedTuple
-
-from coartic.errors import need
 
 
 class MotionModel(NamedTuple):
@@ -46,7 +43,6 @@ class MotionModel(NamedTuple):
 
 
 PAPER = MotionModel()
-_KINDS: dict[type, type | tuple[type, ...]] = {bool: bool, int: Integral, float: (float, int)}
 _BOUNDS = {
     "step": (1e-6, 1e6),
     "arrival_tolerance": (0.0, 1e6),
@@ -58,17 +54,11 @@ _BOUNDS = {
 
 
 def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """The model itself; ValueError for constants no movement can be made with, TypeError for
-    what is no model or holds something of another kind.
+    """The model itself; ValueError for constants no movement can be made with.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a
     goal's centre than that never hits it.
     """
-    need(model, MotionModel, "PAPER is the paper's")
-    for name, value in model._asdict().items():
-        kind = type(getattr(PAPER, name))
-        if not isinstance(value, _KINDS[kind]) or isinstance(value, bool) != (kind is bool):
-            raise TypeError(f"model.{name} is {value!r}; it must be of type {kind.__name__}")
     for name, (least, most) in _BOUNDS.items():
         value = getattr(model, name)
         if not least <= value <= most:

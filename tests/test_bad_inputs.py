@@ -68,13 +68,8 @@ TASKS = [
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
-    (family("[2, 3]", "[3, 2]"), "goals is [3, 2]; it should go from less to more"),
     (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be at most 8"),
-    ("apart = 0.1" + FAMILY, "apart lets goals overlap"),
-    ("radius = 0.01" + FAMILY, "radius is not larger than the accuracy"),
-    ("reach = 4.0001" + FAMILY, "reach is 4.0001; it should have at most three decimals"),
-    ("within = 1.5" + FAMILY, "within is 1.5; it should be above 0, at most 1"),
-    ("clear = true" + FAMILY, "clear is True; it should be a number up to 1000"),
+    ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
 SUITES = [
@@ -105,8 +100,6 @@ METHODS = [
     (method('"a"', '"cma-es/every"'), "'cma-es/every' is already taken"),
     (method("frozenset()", '"goals"'), "told must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
-    (METHOD + "    Parameters = dict", "Parameters must be a subclass of coartic.method"),
-    (METHOD + "    stochastic = 'no'", "stochastic must be"),
 ]
 
 
@@ -156,10 +149,7 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"runs": True}, "runs is True; it must be from 1 to "),
         ({"seed": -1}, "seed is -1; it must be from 0 to "),
         ({"readings": ["tie=right"]}, "did you mean 'ties'?"),
-        ({"executor": 2}, "executor is 2; it must be one, as Local(jobs=2)"),
-        ({"select": {}}, "select is {}; it must be a Selection"),
         ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
-        ({"folder": None}, "folder is None; it must be a path"),
         ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
     ],
 )

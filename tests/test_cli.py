@@ -181,7 +181,7 @@ def test_entry_points():
         (("run", "paper", "--tasks", "ascendin"), "ascending"),
         (("run", "paper", "--methods", "EC9"), "EC9"),
         (("run", "paper", "--runs", "0"), "runs"),
-        (("run", "paper", "--jobs", "0"), "jobs"),
+        (("run", "paper", "--jobs", "-2"), "jobs"),
         (("report", "nowhere"), "nowhere"),
         (("compare", "nowhere", "else"), "nowhere"),
         (("verify", "nowhere"), "nowhere"),

@@ -44,24 +44,6 @@ def lever(folder):
     return float(dy), sum(across.stats.cache_hits.values())
 
 
-def test_a_user_without_a_home(monkeypatch, tmp_path):
-    """Some containers run as one; then nothing is kept, and nothing is put in odd places."""
-
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    compiled.source_fingerprint()  # of the package where it is
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiled.Path, "home", homeless)
-    monkeypatch.setattr(compiled, "PACKAGE", Path("/dev/null"))
-    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    monkeypatch.chdir(tmp_path)
-    assert compiled.cache_folder() is None
-    assert list(tmp_path.iterdir()) == []
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert compiled.cache_folder().parent == tmp_path / "cache" / "coartic"
-
-
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     """Another file than the cached function's changes; the result follows. A full disk, say, cuts
     the index short, the code, or both."""
@@ -96,21 +78,6 @@ def test_a_kernel_is_compiled_once_for_all_numbers():
 
     assert of_some(4) == 14
     assert twice.signatures == [(types.int64,)]
-
-
-def test_nothing_is_said_where_machine_code_cannot_be_kept(monkeypatch, tmp_path):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(compiled.FunctionCache, "_save_overload", full)
-
-    @compiled.entry
-    def twice(number):
-        return 2 * number
-
-    assert twice(3) == 6
-    assert not list(tmp_path.rglob("*.nb?"))
 
 
 def slow_lever(folder):

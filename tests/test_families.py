@@ -11,14 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import coartic.tasks.families
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.run import Selection, plan_suite, run_suite
 from coartic.inputs import MOST_CELLS
 from coartic.tasks.families import (
     CORRECTIVE,
-    FAMILY_FOLDER,
     RULES,
     candidate_of,
     drawn,
@@ -99,17 +97,6 @@ def test_the_family_of_the_guide_is_one(tmp_path):
     path.write_text(guide.partition("# six-links.v1.toml\n")[2].partition("```")[0])
     family = read_family(path)
     assert (family.name, family.links, family.base) == ("six-links/v1", (6, 6), ("rail",))
-
-
-def test_a_family_is_there_whatever_another_file_holds(tmp_path, monkeypatch):
-    broken = tmp_path / "broken.v1.toml"
-    broken.write_text("x = [", encoding="utf-8")
-    shipped = read_family(FAMILY_FOLDER / "two-armed.v1.toml")
-    (tmp_path / "two-armed.v1.toml").write_bytes((FAMILY_FOLDER / "two-armed.v1.toml").read_bytes())
-    monkeypatch.setattr(coartic.tasks.families, "FAMILY_FOLDER", tmp_path)
-    assert load_family("two-armed/v1") == shipped
-    with pytest.raises(TaskError, match="broken.v1.toml: is not valid TOML"):
-        load_family("broken/v1")
 
 
 @pytest.mark.parametrize("name", RELEASED)

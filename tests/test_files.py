@@ -37,16 +37,6 @@ def test_what_is_not_ours_is_in_the_way_before_anything_is_written(tmp_path):
         publish(tmp_path / "b.txt", {"a.txt": b"1"})
 
 
-def test_a_list_that_was_tampered_with_leads_nowhere(tmp_path):
-    outside, folder = tmp_path / "outside.txt", tmp_path / "folder"
-    outside.write_text("mine")
-    publish(folder, {"a.txt": b"1"})
-    (folder / LISTING).write_text(f"../outside.txt\n{outside}\na.txt\n")
-    publish(folder, {"b.txt": b"2"})
-    assert outside.read_text() == "mine"
-    assert content(folder) == {"b.txt": b"2"}
-
-
 def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "a.txt"
     publish(tmp_path, {"a.txt": b"old"})

@@ -19,10 +19,10 @@ from coartic import (
 from coartic.analysis.comparisons.paper import paper_rows
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Entry, registry
-from coartic.benchmarks.suites import Cell, distinct, load_suite, select_cells
+from coartic.benchmarks.suites import Cell, load_suite, select_cells
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.learner.rows import movements_from
-from coartic.method import Information, Parameters, Session
+from coartic.method import Information, Session
 from coartic.motion.initial import ranked_sequences
 from coartic.runs.plan import BUILT_IN, run_seed
 from tests.support.bad_inputs import GOOD
@@ -321,34 +321,6 @@ def test_every_sequence_is_sorted_and_bounded():
     many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
     with pytest.raises(CoarticError, match="8192 hand sequences; at most 4096"):
         hand_sequences(many)
-
-
-def test_cells_that_only_print_alike_are_refused():
-    """-0.0 equals the default 0.0, and a text can hold a comma."""
-
-    class Odd(KNOWN["dual-process/EC1"].method):
-        name = "odd"
-
-        class Parameters(Parameters):
-            shift: float = 0.0
-            mode: str = "a"
-            kind: str = "b"
-
-    odd, task = Entry(Odd, "here", "here", "0"), load_task("ascending")
-    for first, second in (
-        ({}, {"shift": -0.0}),
-        ({"mode": "c, kind=d"}, {"mode": "c", "kind": "d"}),
-    ):
-        cells = [Cell(task, odd, tuple(parameters.items())) for parameters in (first, second)]
-        assert distinct([cells[0], cells[0]]) == [cells[0]]
-        with pytest.raises(CoarticError, match="two different cells are called"):
-            distinct(cells)
-
-
-def test_plans_are_bounded_before_they_are_made():
-    cells = paper_cells()[:3]
-    with pytest.raises(CoarticError, match="3_000_000 runs are planned"):
-        planned(cells, runs=1_000_000)
 
 
 def test_a_suite_can_move_one_goal(tmp_path):

@@ -5,16 +5,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.testing as npt
 import pytest
-from numba import config, njit
-from numba.core.codegen import get_host_cpu_features
 
-from coartic import PAPER, MotionModel, Robot, learn, learn_many, load_task
+from coartic import PAPER, MotionModel, learn, learn_many, load_task
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import failed
 from coartic.motion.compiled import entry
-from coartic.motion.corrective import find_fates
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
-from coartic.motion.movement import Goal
 from coartic.motion.trigonometry import LARGEST
 from coartic.runs.plan import run_seed
 from tests.support.strategies import UNEVEN
@@ -99,36 +95,6 @@ def test_lanes_do_not_mix(count, far):
         hand = "left" if arm.first == robot.arm("left").first else "right"
         expected = robot.forward_kinematics(starts[number], hand)
         npt.assert_allclose((xs[-1, number], ys[-1, number]), expected, atol=1e-9)
-
-
-@njit
-def _seen(at, count, goal, square):
-    """As corrections begin each of their steps; all of one takes seconds to compile."""
-    place(at, count, near(at, count))
-    find_fates(at, count, goal, square)
-
-
-def vectors():
-    """The widest registers with doubles that Numba may use, as a listing for x86 names them."""
-    has = (config.CPU_FEATURES or get_host_cpu_features()).split(",")
-    for feature, register in (("+avx512f", "zmm"), ("+avx", "ymm"), ("+sse2", "xmm")):
-        if feature in has:
-            return register
-    return None
-
-
-@pytest.mark.skipif(not vectors(), reason="the test reads the names of x86 vector registers alone")
-def test_the_listing_holds_vector_instructions():
-    """More links than four, where LLVM's own bound on unrolling would end it."""
-    robot, task = Robot(left_links=(0.8,) * 5, right_links=(0.8,) * 5), load_task("ascending")
-    lanes, goal = lanes_for(robot), Goal(*task.goal_array[0], task.radius)
-    for lane in range(2):
-        _board(lanes, lane, lane, np.zeros(robot.dof), robot.arm("right"))
-    _seen(lanes.at, 2, goal, np.inf)
-    listing = _seen.inspect_asm(_seen.signatures[-1])  # takes as long as compiling
-    on_vectors = [line.split()[0] for line in listing.splitlines() if vectors() in line]
-    assert sum(name.endswith("mulpd") for name in on_vectors) > 2 * 15 * 5  # two series a link
-    assert any("cmple" in name for name in on_vectors)  # of the error with the tolerance
 
 
 class Watched(InProcess):

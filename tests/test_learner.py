@@ -17,14 +17,12 @@ from coartic import (
     NotApplicableError,
     corrective_trial,
     execute,
-    hand_sequences,
     learn,
     learn_many,
     load_task,
     parse_task,
 )
 from coartic.method import Information, Session
-from coartic.model import PAPER
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
 from tests.support import reference
@@ -295,15 +293,6 @@ def test_errors():
     ]:  # fmt: skip
         with pytest.raises(ValueError, match=field):
             replace(CONDITIONS["EC1"], **{field: value})
-    for seed, kind in [(-1, ValueError), (None, TypeError), (True, TypeError), ([3], TypeError)]:
-        with pytest.raises(kind, match="seed is"):
-            learn(load_task("ascending"), "EC1", seed=seed, trials=1)
-    for field, value in [("max_iterations", 2.5), ("whole_last_step", 2), ("arrival_tick", True)]:
-        with pytest.raises(TypeError, match=f"model.{field} is {value}; it must be of type"):
-            learn(
-                load_task("ascending"), "EC1", seed=0, trials=1,
-                model=PAPER._replace(**{field: value}),
-            )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -402,18 +391,3 @@ def test_without_corrective_process_a_missed_goal_ends_the_trial():
     assert run.reward > run.initial_reward
     assert {movement.kind for movement in run.solution} == {"learned"}
     assert run.execute().corrections == 0
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: learn("ascending", "EC1", seed=0), "'ascending' is no Task; load_task makes"),
-        (lambda: learn(load_task("ascending"), 7, seed=0), "7 is no str; a condition goes by"),
-        (lambda: learn(load_task("ascending"), "EC1", seed=0, model=3), "3 is no MotionModel"),
-        (lambda: execute("ascending", []), "'ascending' is no Task"),
-        (lambda: hand_sequences("x"), "'x' is no Task"),
-    ],
-)
-def test_what_is_handed_over_is_said_where_it_is_of_another_kind(call, words):
-    with pytest.raises(TypeError, match=words):
-        call()

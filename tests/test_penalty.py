@@ -1,8 +1,6 @@
 """Penalties: what a task's reward loses beside its ticks, at every door, against a slow loop."""
 
 import json
-import math
-import re
 import sqlite3
 import tomllib
 
@@ -13,7 +11,6 @@ from coartic import (
     CONDITIONS,
     VARIANTS,
     Task,
-    TaskError,
     execute,
     learn,
     learn_many,
@@ -161,15 +158,6 @@ def test_files_say_them_and_nothing_that_cannot_be():
     for same in (task, with_penalty("two-armed-1", region=5.0)):
         assert parse_task(tomllib.loads(task_text(same)), "test") == same
     assert "penalty" not in task_text(load_task("two-armed-1"))
-    for wrong, words in (
-        ({"joints": -1.0}, "at least 0"),
-        ({"distinct": math.inf}, "finite"),
-        ({"radius": 0.0}, "greater than 0"),
-        ({"costly": "hands"}, "base"),
-        ({"weight": 1.0}, "unknown key"),
-    ):
-        with pytest.raises(TaskError, match=re.escape(words)):
-            with_penalty("two-armed-1", **wrong)
 
 
 SUITE = """

@@ -15,7 +15,7 @@ from coartic.analysis.study import load
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
-from tests.support.suites import ROOT, planned, run_and_write
+from tests.support.suites import ROOT, run_and_write
 
 EXAMPLE = ROOT / "tests" / "example_plugin"
 METHOD = EXAMPLE / "coartic_example" / "__init__.py"
@@ -133,25 +133,6 @@ def test_a_file_is_the_same_method_wherever_it_is(coartic, tmp_path, monkeypatch
     assert summaries == ["1 run", *["1 run (1 reused)"] * 3, "1 run"]
 
 
-def test_what_a_validator_makes_of_a_parameter_is_what_counts(tmp_path):
-    """A value that is clamped is the same run as the value it is clamped to."""
-    path = tmp_path / "mine.py"
-    text = TEXT.replace(
-        "reluctance: float = Field(default=0.0, ge=0)",
-        "reluctance: Annotated[float, AfterValidator(lambda x: min(x, 1.0))] = 0.0",
-    )
-    head = "from typing import Annotated\nfrom pydantic import AfterValidator\n"
-    path.write_text(head + text, encoding="utf-8")
-    entry = registry([path])["nearest-hand"]
-    assert entry.complete({"reluctance": 5.0}) == {"reluctance": 1.0}
-    task = load_task("ascending")
-    clamped, stated = (
-        planned([Cell(task, entry, (("reluctance", x),))], runs=1).plan for x in (5.0, 1.0)
-    )
-    assert clamped.cells[0].complete == {"reluctance": 1.0}
-    assert clamped.run_ids(0) == stated.run_ids(0)
-
-
 @pytest.mark.filterwarnings("always")
 def test_a_broken_plugin_is_a_warning(coartic, tmp_path, monkeypatch):
     """One bad package does not take the command line with it."""
@@ -164,22 +145,6 @@ def test_a_broken_plugin_is_a_warning(coartic, tmp_path, monkeypatch):
     assert code == 0
     assert "Warning: plug-in bad: entry point 'bad' cannot be used" in error
     assert "dual-process/" in listed
-
-
-def test_a_method_that_cannot_say_where_it_applies(coartic, tmp_path):
-    path = tmp_path / "mine.py"
-    path.write_text(
-        "from coartic.method import Method\nclass A(Method):\n    name = 'a'\n"
-        "    title = citation = 'x'\n    told = frozenset()\n"
-        "    def why_not(self, task): return 1 / 0\n"
-        "    def solve(self, session): ...",
-        encoding="utf-8",
-    )
-    assert coartic("list", "--method-file", path)[0] == 0
-    out = tmp_path / "out"
-    code, _, error = coartic("run", "paper", "--methods", "a", "--method-file", path, "--out", out)
-    assert code == 2
-    assert "cannot say whether it applies to task 'ascending': ZeroDivisionError" in error
 
 
 def test_the_pages_show_the_example_as_it_is():

@@ -202,30 +202,6 @@ def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch
     same_results(load(tmp_path), undisturbed)
 
 
-@pytest.mark.parametrize(
-    ("limit", "words"),
-    [("PRAGMA max_page_count = 40", "is full"), ("PRAGMA query_only = ON", "readonly")],
-)
-def test_a_disk_that_takes_no_more_loses_nothing(undisturbed, tmp_path, monkeypatch, limit, words):
-    first = run_and_write(tmp_path, ONE, runs=1, trials=20)
-    connect = store_module.connect
-
-    def limited(*arguments):
-        connection = connect(*arguments)
-        connection.execute(limit)
-        return connection
-
-    with monkeypatch.context() as patch:
-        patch.setattr(store_module, "connect", limited)
-        with pytest.raises(CoarticError, match=rf"{FILE}.*{words}"):
-            run_and_write(tmp_path, **FEW)
-    with open_store(tmp_path) as store:
-        assert store.run(first.runs.run_id[0]).run.row["reward"] == first.runs.reward[0]
-    same_results(run_and_write(tmp_path, ONE, **FEW), undisturbed)
-    with pytest.raises(CoarticError, match="cannot write"):
-        run_and_write(tmp_path / FILE / "below", ONE, **FEW)
-
-
 class TooSlow(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):

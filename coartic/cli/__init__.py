@@ -9,7 +9,6 @@ from __future__ import annotations
 import gc
 import io
 import os
-import signal
 import sys
 import warnings
 from typing import Annotated
@@ -60,19 +59,8 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
-    # Ctrl-C ends the process; where something is to be saved before, it is caught there. As an
-    # exception, in the middle of an import, it can get lost. Ignored (nohup, &), it stays so.
-    interrupted = signal.getsignal(signal.SIGINT)
-    if interrupted is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        _check_arguments()
-        try:
-            app(prog_name="coartic")
-        except SystemExit:
-            if sys.stdout is not None:
-                sys.stdout.flush()  # a full disk is noticed here, and said
-            raise
+        app(prog_name="coartic")
     except CoarticError as error:
         complain("Error", str(error))
         sys.exit(2)
@@ -80,23 +68,4 @@ def main() -> None:
         raise
     except OSError as error:
         complain("Error", str(error.strerror or error))
-        _flush_or_drop()
         sys.exit(1)
-    finally:
-        signal.signal(signal.SIGINT, interrupted)
-
-
-def _flush_or_drop() -> None:
-    """What cannot be written is dropped: Python would try, fail and complain as it ends."""
-    try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _check_arguments() -> None:
-    """They are kept in records, as text."""
-    for argument in sys.argv[1:]:
-        if any("\ud800" <= c <= "\udfff" for c in argument):
-            raise CoarticError(f"argument {argument!r} is not text in this system's encoding")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -12,38 +11,6 @@ import typer
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_SECONDS
-
-
-def at_least(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Reads a whole number; typer says what is wrong with one that is out of bounds."""
-
-    def parse(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            raise typer.BadParameter(f"{text!r} is not a whole number.") from None
-        if number < least:
-            raise typer.BadParameter(f"{number} is below {least}.")
-        if most is not None and number > most:
-            raise typer.BadParameter(f"{number} is above {most}.")
-        return number
-
-    return parse
-
-
-def processes(text: str) -> int:
-    """Reads a number of processes, which is -1 for one for each core."""
-    if (number := at_least(-1)(text)) == 0:
-        raise typer.BadParameter("give a number of processes, or -1 for one for each core.")
-    return number
-
-
-def seconds(text: str) -> float:
-    """Reads how long a run may take."""
-    with suppress(ValueError):
-        if 0 < float(text) <= MOST_SECONDS:
-            return float(text)
-    raise typer.BadParameter(f"{text} is not a number above 0 and up to {MOST_SECONDS:_}.")
 
 
 def _suites() -> Iterable[str]:
@@ -121,14 +88,10 @@ Readings = Annotated[
 ]
 Runs = Annotated[
     int | None,
-    typer.Option(parser=at_least(1), metavar="N", help="Runs of each cell."),
+    typer.Option(min=1, metavar="N", help="Runs of each cell."),
 ]
-Trials = Annotated[
-    int | None, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
-]
-Jobs = Annotated[
-    int, typer.Option(parser=processes, metavar="N", help="Processes; -1 is one for each core.")
-]
+Trials = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
+Jobs = Annotated[int, typer.Option(min=-1, metavar="N", help="Processes; -1 is one for each core.")]
 Tasks = Annotated[
     str | None,
     typer.Option(metavar="A,B", help="Only these tasks.", autocompletion=_completing(_tasks)),
@@ -155,14 +118,14 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
-Seed = Annotated[int, typer.Option(parser=at_least(0), metavar="N", help="Seed of the suite.")]
+Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the suite.")]
 TimeLimit = Annotated[
     float | None,
-    typer.Option(parser=seconds, metavar="SECONDS", help="Longest that a run may take."),
+    typer.Option(min=1e-3, max=MOST_SECONDS, metavar="SECONDS", help="Longest run."),
 ]
 TrialBudget = Annotated[
     int | None,
-    typer.Option(parser=at_least(1), metavar="N", help="Most trials that a run may make."),
+    typer.Option(min=1, metavar="N", help="Most trials that a run may make."),
 ]
 Scheduler = Annotated[
     str | None,

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import at_least
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
 from coartic.text import counted, one_line
@@ -65,7 +64,7 @@ def animate(
         typer.Option(metavar="N", help="Ticks per second."),
     ] = None,
     width: Annotated[
-        int, typer.Option(parser=at_least(200, 3840), metavar="N", help="Width in pixels.")
+        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
     ] = 800,
     replace: given.Replace = False,
 ) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import at_least
 from coartic.cli.terminal import say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import check_folder, folder_named, publish
@@ -21,9 +20,7 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Study what the paper leaves open.",
 )
-TrialsOfRun = Annotated[
-    int, typer.Option(parser=at_least(1), metavar="N", help="Trials of each run.")
-]
+TrialsOfRun = Annotated[int, typer.Option(min=1, metavar="N", help="Trials of each run.")]
 
 
 @app.command("readings")
@@ -34,7 +31,7 @@ def readings(
     ] = None,
     runs: Annotated[
         int,
-        typer.Option(parser=at_least(40), metavar="N", help="Runs of each reading and task."),
+        typer.Option(min=40, metavar="N", help="Runs of each reading and task."),
     ] = 1000,
     trials: TrialsOfRun = 10_000,
     pairs: Annotated[
@@ -73,11 +70,9 @@ def readings(
 def goals(
     task: Annotated[str, typer.Argument(metavar="TASK", help="Task whose goals are not printed.")],
     folder: given.OutFolder,
-    members: Annotated[
-        int, typer.Option(parser=at_least(2), metavar="N", help="Sets of goals to keep.")
-    ] = 240,
+    members: Annotated[int, typer.Option(min=2, metavar="N", help="Sets of goals to keep.")] = 240,
     runs: Annotated[
-        int, typer.Option(parser=at_least(2), metavar="N", help="Runs of each set and condition.")
+        int, typer.Option(min=2, metavar="N", help="Runs of each set and condition.")
     ] = 20,
     reading: given.Readings = None,
     jobs: given.Jobs = -1,

@@ -10,8 +10,7 @@ from typing import Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import at_least
-from coartic.cli.terminal import if_interrupted, say, say_pairs, show_frame, writing
+from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.text import counted, unknown
@@ -31,15 +30,14 @@ _ForPaper = Annotated[
 def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPaper = False) -> None:
     """Write the report of a results folder."""
     out = folder / "report" if out is None else out
-    if_interrupted(f"Nothing was written to {out}.")
     from coartic.analysis.report.build import write_report
     from coartic.analysis.report.text import answers
     from coartic.analysis.study import load
 
     started = time.monotonic()
     study = load(folder)
-    files = write_report(study, out, for_paper=for_paper, begin=lambda: writing(out))
-    if_interrupted(f"The report is written to {out}.")
+    with interruptible(lambda: f"{out} may be incomplete; repeat the command to finish it."):
+        files = write_report(study, out, for_paper=for_paper)
     tables = len({Path(name).stem for name in files if name.startswith("tables/")})
     figures = len({Path(name).stem for name in files if name.startswith("figures/")})
     what = "CSV and LaTeX" if for_paper else "CSV"
@@ -122,9 +120,7 @@ def compare(
 
 def verify(
     folder: given.Results,
-    again: Annotated[
-        int, typer.Option(parser=at_least(0), metavar="N", help="Also perform N runs again.")
-    ] = 0,
+    again: Annotated[int, typer.Option(min=0, metavar="N", help="Also perform N runs again.")] = 0,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""

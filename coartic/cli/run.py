@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import names_in
-from coartic.cli.terminal import performing, say, say_pairs
+from coartic.cli.terminal import Display, interruptible, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.text import counted, unknown
@@ -61,7 +60,13 @@ def run(
         trial_budget=trial_budget,
         readings=reading or (),
     )
-    with performing(chosen.name, out) as display:
+    display = Display(chosen.name)
+
+    def saved() -> str:
+        done = counted(display.done, "finished run")
+        return f"Saved in {out}: {done}; repeat the command to resume."
+
+    with interruptible(saved), display:
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = plan.perform(
             out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
@@ -196,34 +201,32 @@ def reproduce(
 
 def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:
     """Check a method or a task file against the rules."""
+    from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.suites import methods_named
 
-    broken = 0
-    for name, checked in checks_of(subject, registry(method_file or [])):
-        laws = checked()
-        for law in laws:
-            say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
-        passed = sum(law.passed for law in laws)
-        say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
-        broken += len(laws) - passed
+    registered = registry(method_file or [])
+    if subject.endswith(".toml"):
+        if not Path(subject).is_file():
+            raise CoarticError(f"{subject}: there is no such file.")
+        broken = show_laws(subject, check_task_file(Path(subject), registered))
+    else:
+        try:
+            names = methods_named(subject, registered)
+        except CoarticError as error:
+            raise CoarticError(f"{error} A task is checked by its file.") from None
+        broken = sum(show_laws(name, check_method(registered[name])) for name in names)
     if broken:
         sys.exit(1)
 
 
-def checks_of(subject: str, registered: Registry) -> Iterable[tuple[str, Callable[[], list[Law]]]]:
-    """What is checked: a task, or all methods that a name stands for."""
-    from coartic.benchmarks.conformance import check_method, check_task_file
-    from coartic.benchmarks.suites import methods_named
-
-    if subject.endswith(".toml"):
-        if not Path(subject).is_file():
-            raise CoarticError(f"{subject}: there is no such file.")
-        return [(subject, partial(check_task_file, Path(subject), registered))]
-    try:
-        names = methods_named(subject, registered)
-    except CoarticError as error:
-        raise CoarticError(f"{error} A task is checked by its file.") from None
-    return [(name, partial(check_method, registered[name])) for name in names]
+def show_laws(name: str, laws: Sequence[Law]) -> int:
+    """Print what was found; the number of laws that are broken."""
+    for law in laws:
+        say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+    passed = sum(law.passed for law in laws)
+    say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
+    return len(laws) - passed
 
 
 COMMANDS = (run, list_, check, reproduce)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import textwrap
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from coartic.text import counted, one_line
@@ -80,59 +77,17 @@ def show_frame(frame: pd.DataFrame) -> None:
 
 
 @contextmanager
-def performing(suite: str, folder: Path) -> Iterator[Display]:
-    """The display of a suite whose runs are performed; interrupted, it ends the process."""
-    with Display(suite) as display:
-        try:
-            yield display
-        except BaseException as error:
-            # Whatever else becomes of it, what comes after a Ctrl-C is its consequence.
-            if not (display.interrupted or isinstance(error, KeyboardInterrupt)):
-                raise
-            display.close()
-            done = f"{counted(display.done, 'finished run')} {'is' if display.done == 1 else 'are'}"
-            say(
-                f"Interrupted. {done} saved in {folder}; repeat the command to resume.",
-                stream=sys.stderr,
-            )
-            sys.exit(130)
-
-
-def _end_workers() -> None:
-    import multiprocessing
-
-    for child in multiprocessing.active_children():
-        child.kill()
-
-
-def if_interrupted(sentence: str) -> None:
-    """What Ctrl-C says from here on, before it ends the process as ever."""
-
-    def end(*_: object) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        say(f"Interrupted. {sentence}", stream=sys.stderr)
-        _end_workers()
-        signal.raise_signal(signal.SIGINT)
-
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is in the background
-        signal.signal(signal.SIGINT, end)
-
-
-def writing(folder: Path) -> None:
-    """From here on files are replaced in a folder: what Ctrl-C says of it."""
-    if_interrupted(f"{folder} may be incomplete; repeat the command to finish it.")
-
-
-_FROM_COMPILED = frozenset({"numba", "llvmlite", "pydantic"})
-"""Packages whose compiled code calls Python in the middle of its work: it drops an exception of a
-signal there, makes another one of it, or crashes."""
+def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
+    """Ctrl-C ends the process with a sentence, which is made when it comes."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"Interrupted. {sentence()}", stream=sys.stderr)
+        sys.exit(130)
 
 
 class Display:
-    """Runs done, failures and time left: live on a terminal, plain lines elsewhere.
-
-    While the runs are performed, Ctrl-C is a KeyboardInterrupt that does not get lost.
-    """
+    """Runs done, failures and time left: live on a terminal, plain lines elsewhere."""
 
     EVERY_S = 30.0  # between plain lines
 
@@ -141,7 +96,6 @@ class Display:
         from rich.console import Console
 
         self.done = 0
-        self.interrupted = False
         self._suite = suite
         self._console = Console(stderr=True, **_AS_IT_IS)
         self._bar = progress.Progress(
@@ -157,35 +111,14 @@ class Display:
         self._started = self._last = time.monotonic()  # set anew when work begins
 
     def __enter__(self) -> Display:
-        self._before = signal.getsignal(signal.SIGINT)
-        if self._before is not signal.SIG_IGN:  # as it is in the background
-            signal.signal(signal.SIGINT, self._interrupt)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-        signal.signal(signal.SIGINT, self._before)
-
-    def _interrupt(self, _: int, frame: FrameType | None) -> None:
-        self.interrupted = True
-        while frame is not None:
-            if frame.f_globals.get("__name__", "").partition(".")[0] in _FROM_COMPILED:
-                return  # until the next update
-            frame = frame.f_back
-        raise KeyboardInterrupt
-
-    def close(self) -> None:
-        """Leave the terminal as it was."""
         if self._task is not None:
             self._bar.stop()
 
     def update(self, progress: Progress, what: str) -> None:
         """Show how far the plan is, and what was run last."""
-        self._show(progress, what)
-        if self.interrupted:  # and the exception was lost, as in a destructor
-            raise KeyboardInterrupt
-
-    def _show(self, progress: Progress, what: str) -> None:
         self.done = progress.done
         if not what:
             if progress.stale:

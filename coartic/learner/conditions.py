@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-from coartic.errors import CoarticError, need
+from coartic.errors import CoarticError
 from coartic.robot import HANDS, Hand
 from coartic.text import unknown
 
@@ -123,11 +123,9 @@ VARIANTS = {
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or variant by its id; raises CoarticError for an unknown one, TypeError for
-    what is neither."""
+    """A condition or variant by its id; raises CoarticError for an unknown one."""
     if isinstance(condition, ExplorationCondition):
         return condition
-    need(condition, str, "a condition goes by its id, such as EC1")
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:

@@ -8,13 +8,12 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.errors import LOADED, CoarticError, NotApplicableError, need
+from coartic.errors import CoarticError, NotApplicableError
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNT,
@@ -80,17 +79,11 @@ class LearningRun:
     """What it spent; the replay is not part of it."""
     wall_s: float
     """Its share of the time that it and the runs beside it took."""
-    cpu_s: float
 
     @property
     def completed(self) -> NDArray[np.bool_]:
         """Whether each trial hit every goal; the others failed and taught nothing."""
         return ~np.ma.getmaskarray(self.rewards)
-
-    @property
-    def method(self) -> str:
-        """Method id of the learner under this condition."""
-        return f"{METHOD_PREFIX}{self.condition.id}"
 
     @property
     def learned(self) -> tuple[Movement, ...]:
@@ -165,8 +158,8 @@ def learn(
     """Run the learner on a task under an exploration condition.
 
     The result depends on the arguments alone. Raises NotApplicableError where the
-    condition does not fit the task, CoarticError for an unknown condition, TypeError for what
-    is no task, model or seed, and ValueError for a negative seed, fewer than one trial, a model
+    condition does not fit the task, CoarticError for an unknown condition,
+    and ValueError for a negative seed, fewer than one trial, a model
     that no movement can be made with, or a task that was changed into none. Source: paper,
     Figure 3.
     """
@@ -190,7 +183,6 @@ def learn_many(
     ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
     :func:`learn` does, and SolutionError for such movements that break the rules.
     """
-    need(task, Task, LOADED)
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:
@@ -199,7 +191,7 @@ def learn_many(
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
-    ordered: Sequence[int] = list(map(checked_seed, seeds))
+    ordered: Sequence[int] = list(seeds)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
@@ -216,15 +208,6 @@ def learn_many(
 
 _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
-
-
-def checked_seed(seed: Any) -> int:
-    """A seed as a number. Raises TypeError for what is none, ValueError for a negative one."""
-    if not isinstance(seed, Integral) or isinstance(seed, bool):
-        raise TypeError(f"seed is {seed!r}; it must be a whole number, the same for the same run")
-    if seed < 0:
-        raise ValueError(f"seed is {seed}; it must not be negative")
-    return int(seed)
 
 
 def threads_for(jobs: int) -> int:
@@ -281,9 +264,9 @@ def learn_together(
         addresses(generators),
         work_for(runs, task),
     )
-    wall, cpu = time.perf_counter(), time.thread_time()
+    clock = time.perf_counter()
     learn_kernel(*arguments)
-    wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
+    wall = time.perf_counter() - clock
     return [
         LearningRun(
             task=task,
@@ -310,7 +293,6 @@ def learn_together(
                 failed_trials=int(kept.counts[n, COUNT.failed]),
             ),
             wall_s=wall / runs,
-            cpu_s=cpu / runs,
         )
         for n, seed in enumerate(seeds)
     ]

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
-from coartic.errors import LOADED, NotApplicableError, need
+from coartic.errors import NotApplicableError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import Execution, Movement, execute, execute_many
 from coartic.robot import HANDS, Hand
@@ -34,9 +34,8 @@ def corrective_movements(hands: str) -> list[Movement]:
 def hand_sequences(task: Task, hands: Iterable[Hand] | None = None) -> list[str]:
     """All hand sequences of a task, left before right; 2^G of them for two hands.
 
-    Raises NotApplicableError above ``MOST_SEQUENCES``, TypeError for what is no task.
+    Raises NotApplicableError above ``MOST_SEQUENCES``.
     """
-    need(task, Task, LOADED)
     allowed = task.hands if hands is None else tuple(hands)
     ordered = [hand for hand in HANDS if hand in allowed]
     reason = too_many_sequences(task, len(ordered))

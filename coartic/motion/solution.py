@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from coartic.errors import LOADED, SolutionError, need
+from coartic.errors import SolutionError
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.movement import checked_goal, configuration, follow
 from coartic.motion.penalty import penalties
@@ -111,7 +111,7 @@ def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PA
     the execution ends there with a reason. Raises SolutionError for a solution that
     breaks the task's rules: goals missing or out of order, a hand the robot does not
     have, a target of the wrong shape or not finite, a locked base that moves. Raises
-    ValueError for a model that no movement can be made with, TypeError for what is no task.
+    ValueError for a model that no movement can be made with.
     """
     (execution,) = execute_many(task, [solution], model=model)
     if isinstance(execution, Exception):
@@ -126,9 +126,8 @@ def execute_many(
 
     In their order, each as if it were alone; in place of an execution, the error that
     :func:`execute` raises for such a solution. Raises ValueError for a model that no movement
-    can be made with, TypeError for what is no task.
+    can be made with.
     """
-    need(task, Task, LOADED)
     checked_model(model, radius=task.radius)
     runs: list[SolutionRun | Refused] = []
     for solution in solutions:

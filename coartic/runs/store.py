@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
+from coartic.learner.rows import movements_from
 from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Movement
@@ -363,12 +364,16 @@ class Store:
         assert environment is not None
         task = parse_task(json.loads(setting["definition"]), str(self.folder))
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-        parts = {part: self._movements(row["id"], part, task) for part in PARTS}
+        movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
+        paths = self._table("SELECT * FROM waypoints WHERE result_id = ?", row["id"])
+        parts = {
+            part: movements_from(task, movements[movements.part == part], paths) for part in PARTS
+        }
         rewards = [] if blob is None else unpacked(blob["rewards"]).tolist()
         run = Run(
             {name: row[name] for name in RESULTS if name not in ("setting", "environment")},
             json.loads(environment["content"]),
-            {part: movements for part, movements in parts.items() if movements},
+            {part: solution for part, solution in parts.items() if solution},
             [None if reward == FAILED else reward for reward in rewards],
         )
         return StoredRun(
@@ -474,28 +479,13 @@ class Store:
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (row["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
 
-    def _movements(self, result: int, part: str, task: Task) -> tuple[Movement, ...]:
-        joints = task.robot.joint_names
-        points: dict[int, list[list[float]]] = {}
-        if part == "solution":
-            for row in self._db.execute(
-                'SELECT * FROM waypoints WHERE result_id = ? ORDER BY "order", waypoint', (result,)
-            ):
-                points.setdefault(row["order"], []).append([row[joint] for joint in joints])
-        rows = self._db.execute(
-            'SELECT * FROM movements WHERE result_id = ? AND part = ? ORDER BY "order"',
-            (result, part),
-        )
-        return tuple(
-            Movement(
-                goal=row["goal"],
-                hand=row["hand"],
-                kind=row["kind"],
-                target=np.array([row[joint] for joint in joints]),
-                ticks=row["ticks"],
-                waypoints=np.array(points[row["order"]]) if row["order"] in points else None,
-            )
-            for row in rows
+    def _table(self, query: str, *values: object) -> pd.DataFrame:
+        """The rows of a query."""
+        import pandas as pd
+
+        rows = self._db.execute(query, values)
+        return pd.DataFrame(
+            list(map(tuple, rows)), columns=[column[0] for column in rows.description]
         )
 
 

@@ -26,14 +26,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    ValidationError,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from coartic.errors import NotApplicableError, TaskError
 from coartic.inputs import MOST_CELLS, FileData, problems, read_toml, sentence
@@ -69,38 +62,17 @@ _LEAST_GOALS, _MOST_GOALS = 2, 8
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
-def in_thousandths(value: Any) -> int:
+def in_thousandths(value: float) -> int:
     """A number of up to three decimals as a whole number of thousandths."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _PARTS:
-        problem = "should be a number up to 1000"
-    elif round(value * _PARTS) / _PARTS != value:
-        problem = "should have at most three decimals"
-    else:
-        return round(value * _PARTS)
-    raise PydanticCustomError("parts", "{text}", {"text": problem})
-
-
-def refuse(wrong: Callable[[Any], bool], problem: str) -> AfterValidator:
-    """A validator that refuses what is wrong, with the problem in words."""
-
-    def check(value: Any) -> Any:
-        if wrong(value):
-            raise PydanticCustomError("parts", "{text}", {"text": problem})
-        return value
-
-    return AfterValidator(check)
+    if round(value * _PARTS) / _PARTS != value:
+        raise sentence(f"{value} should have at most three decimals")
+    return round(value * _PARTS)
 
 
 Parts = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
-_Ordered = refuse(lambda span: span[0] > span[1], "should go from less to more")
-Span = Annotated[tuple[Parts, Parts], _Ordered]
+Span = tuple[Parts, Parts]
 """From, to; every thousandth between as likely."""
-_Positive = Annotated[Parts, refuse(lambda parts: parts <= 0, "should be greater than 0")]
-_Share = Annotated[
-    Parts, refuse(lambda parts: not 0 < parts <= _PARTS, "should be above 0, at most 1")
-]
-_Bend = Annotated[Parts, refuse(lambda parts: abs(parts) > 1570, "should be within -1.57 to 1.57")]
 _Goals = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=_MOST_GOALS)]
 _Links = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
 _Bases = tuple[Base, ...]
@@ -113,16 +85,16 @@ class Region(FileData):
     """From, to, length unit; at the start the base is at the origin."""
     y: Span
     """From, to, length unit."""
-    scale: Annotated[tuple[_Share, _Share], _Ordered] = (_PARTS, _PARTS)
+    scale: Span = (_PARTS, _PARTS)
     """Share of both sides that an instance's own box has, from, to."""
 
 
 class Alignment(FileData):
     """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
 
-    steps: Annotated[tuple[_Positive, _Positive], _Ordered]
+    steps: Span
     """From goal to goal along the line, length unit, from, to."""
-    off: Annotated[tuple[_Positive, _Positive], _Ordered]
+    off: Span
     """Distance of the one goal from the line, to either side, length unit, from, to."""
 
 
@@ -131,7 +103,7 @@ class Posture(FileData):
 
     first: Span
     """Angle of the first joint from +x, rad, from, to."""
-    others: Annotated[tuple[_Bend, _Bend], _Ordered]
+    others: Span
     """Angle of each other joint from the link before it, rad, from, to, within ±π/2: an arm whose
     bends are so small is straight, and thereby singular, where they are all 0."""
 
@@ -162,17 +134,17 @@ class Family(FileData):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: Annotated[tuple[_Goals, _Goals], _Ordered]
+    goals: tuple[_Goals, _Goals]
     """How many there are, from, to; each number as likely."""
-    links: Annotated[tuple[_Links, _Links], _Ordered]
+    links: tuple[_Links, _Links]
     """How many each of both arms has, from, to; they have one length (to a thousandth)."""
-    reach: _Positive = 4 * _PARTS
+    reach: Parts = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
     """One is drawn: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
     """Bases, beside its own, under which every instance can be done."""
-    radius: _Positive = 100
+    radius: Parts = 100
     """Of every goal, length unit."""
     region: Region
     """Where goals are: table ``[region]``."""
@@ -186,19 +158,10 @@ class Family(FileData):
     """Least distance between the centres of two goals, length unit."""
     clear: Parts = 200
     """Least distance of a hand at the start from a goal's rim, length unit."""
-    within: _Share = 950
+    within: Parts = 950
     """Share of the reach within which goals are, where the base cannot come nearer."""
     bent: Parts = 200
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
-
-    @model_validator(mode="after")
-    def has_fit_goals(self) -> Family:
-        """Refuses goals that overlap or are too small."""
-        if self.radius <= PAPER.correction_tolerance * _PARTS:
-            raise sentence("radius is not larger than the accuracy of the corrective process")
-        if self.apart < 2 * self.radius:
-            raise sentence("apart lets goals overlap")
-        return self
 
     def key(self, stream: str) -> tuple[int, int]:
         """Of the generator, for the instances of a stream."""
