@@ -157,32 +157,36 @@ def place(page):
 
 def centre(page):
     """Of the handle in the second picture."""
-    box = page.locator(".touch .handle").nth(1).bounding_box()
+    box = page.locator(".touch .handle:visible").nth(1).bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
-def test_the_next_goal_moves_by_keyboard_and_pointer_and_only_what_is_learned_follows(opened):
+@pytest.mark.parametrize(("moved", "least"), [(2, 0.05), (3, 0.3)])
+def test_the_next_goal_moves_by_keyboard_and_pointer_and_only_what_is_learned_follows(
+    opened, moved, least
+):
     page = opened()
+    page.select_option("#next-goal-moved", str(moved))
     page.locator("#next-goal-place").focus()
     page.keyboard.press("Home")
     seen = [place(page)]
     for _ in range(5):
         page.keyboard.press("ArrowRight")
         seen.append(place(page))
-        chosen = page.locator(".touch svg .shown")
+        chosen = page.locator(".touch svg:visible .shown")
         assert chosen.count() == 2
         for goal, arm in zip(
             chosen.locator(".moved").all(), chosen.locator(".arm").all(), strict=True
         ):
             assert goal.is_visible()
             x, y = map(float, arm.get_attribute("points").split()[-1].split(","))
-            aim = np.array(load_task("ascending").goals[1])
+            aim = np.array(load_task("ascending").goals[moved - 2])
             assert np.linalg.norm([x, -y] - aim) < 0.1 + 2e-3  # the page rounds
     places, alone, learned = zip(*seen, strict=True)
     assert places == (0, 1, 2, 3, 4, 5)
     assert len(set(alone)) == 1
     assert learned == tuple(sorted(learned))
-    assert learned[-1] > learned[0] + 0.3
+    assert learned[-1] > learned[0] + least
     # The pointer drags the goal down.
     page.mouse.move(*centre(page))
     page.mouse.down()
@@ -196,7 +200,7 @@ def test_the_next_goal_moves_by_keyboard_and_pointer_and_only_what_is_learned_fo
 def test_the_next_goal_is_dragged_by_a_finger(opened):
     page = opened(390, has_touch=True, is_mobile=True)
     page.locator("#next-goal-place").fill("0")
-    page.locator(".touch svg").nth(1).scroll_into_view_if_needed()
+    page.locator(".touch svg:visible").nth(1).scroll_into_view_if_needed()
     before = page.evaluate("scrollY")
     x, y = centre(page)
     finger = page.context.new_cdp_session(page)
@@ -217,6 +221,7 @@ def test_the_address_holds_the_view(opened, address):
     page = opened(reduced_motion="reduce")
     untouched = page.evaluate(STATE)
     assert page.url == address
+    page.select_option("#next-goal-moved", "2")
     page.locator("#next-goal-place").fill("5")
     page.select_option("#player-view", "own")
     page.select_option("#player-0", "ascending initial")
@@ -235,9 +240,10 @@ def test_the_address_holds_the_view(opened, address):
     # Back at the beginning nothing is left of it.
     page.evaluate("scrollTo(0, 0)")
     page.select_option("#claims-verdict", "")
-    page.locator("#next-goal-place").fill(untouched[0])
+    page.select_option("#next-goal-moved", untouched[0])
+    page.locator("#next-goal-place").fill(untouched[1])
     page.select_option("#player-view", "0")
-    page.locator("#player-tick").fill(untouched[4])
+    page.locator("#player-tick").fill(untouched[5])
     page.wait_for_url(address)
     # What an old link names and the page does not have is left out.
     odd = opened(link=f"{address}?player-0=nobody&player-tick=x&nothing=1", reduced_motion="reduce")
@@ -279,8 +285,8 @@ def test_without_scripts_all_is_there(browser, address):
     page.goto(address)
     assert page.locator(".without").is_visible()
     assert page.locator("#table-claims tbody tr").count() > 10
-    # Both ends of the way of the goal are drawn, for both methods.
+    # Both ends of the way of the goal are drawn, for both goals and methods.
     assert not page.locator("#next-goal-place").is_visible()
-    assert [goal.is_visible() for goal in page.locator(".touch .moved").all()].count(True) == 4
+    assert [goal.is_visible() for goal in page.locator(".touch .moved").all()].count(True) == 8
     assert not page.locator("#claims-search").is_visible()
     context.close()

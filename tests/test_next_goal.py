@@ -13,9 +13,10 @@ from tests.support.suites import KNOWN, InProcess
 
 @pytest.fixture(scope="module")
 def moved(tmp_path_factory):
-    """The first run of each cell of suite ``locus`` that the figure shows."""
+    """Both ends of the way of each goal in the figure, from suite ``locus``: the first runs."""
     cells = select_cells(load_suite("locus"), KNOWN, methods=list(next_goal.METHODS))
-    cells = [cell for cell in cells if f".goal{next_goal.MOVED}_" in cell.task.name]
+    ends = [f".goal{goal}_0_{by}" for goal in next_goal.MOVED for by in ("-1.5", "1")]
+    cells = [cell for cell in cells if cell.task.name.endswith(tuple(ends))]
     plan = plan_suite("locus", cells=cells, runs=1, trials=10_000)
     folder = tmp_path_factory.mktemp("locus")
     plan.perform(folder, executor=InProcess())
@@ -30,7 +31,7 @@ def test_the_stored_postures_are_those_of_the_suite(moved):
 
 
 def test_a_folder_shows_its_own_runs_or_else_the_stored_ones(moved, traced):
-    assert "6 runs of learner EC1" in next_goal.next_goal(moved)
-    assert "120 runs of learner EC1" in next_goal.next_goal(traced) == next_goal.next_goal()
-    with pytest.raises(CoarticError, match="goal 3 moved"):
+    assert "4 runs of learner EC1" in next_goal.next_goal(moved)
+    assert "240 runs of learner EC1" in next_goal.next_goal(traced) == next_goal.next_goal()
+    with pytest.raises(CoarticError, match="goals moved"):
         next_goal.store(traced)

@@ -1,19 +1,23 @@
 "use strict";
-/* Shows the postures for one position of the goal, which the slider chooses or a pointer drags. */
+/* Shows the postures for one position of a goal. The list chooses the goal, the slider or a pointer its position. */
 document.querySelectorAll(".touch").forEach((root) => {
-  const slider = root.querySelector("input");
-  const centres = [...root.querySelector("svg").querySelectorAll(".moved")]
-    .map((goal) => [Number(goal.getAttribute("cx")), Number(goal.getAttribute("cy"))]);
+  const [choice, slider] = [root.querySelector("select"), root.querySelector("input")];
+  const moves = [...root.querySelectorAll("[data-goal]")];
 
   const show = () => {
-    root.querySelectorAll("[data-place]").forEach((part) => {
+    moves.forEach((each) => { each.hidden = each.dataset.goal !== choice.value; });
+    const move = moves.find((each) => !each.hidden);
+    slider.max = move.querySelector("svg").querySelectorAll(".moved").length - 1;
+    move.querySelectorAll("[data-place]").forEach((part) => {
       part.classList.toggle("shown", part.dataset.place === slider.value);
     });
-    const [x, y] = centres[Number(slider.value)];
-    root.querySelectorAll(".handle").forEach((handle) => handle.setAttribute("transform", `translate(${x} ${y})`));
-    const words = [...root.querySelectorAll(".facts")].map((facts) => {
+    move.querySelectorAll("svg").forEach((svg) => {
+      const goal = svg.querySelector(".shown .moved");
+      ["cx", "cy"].forEach((at) => svg.querySelector(".handle").setAttribute(at, goal.getAttribute(at)));
+    });
+    const words = [...move.querySelectorAll(".facts")].map((facts) => {
       const [name, place] = [facts.querySelector("strong"), facts.querySelector(".shown")];
-      return `${name.textContent}: ${place.textContent}`;
+      return `${name.textContent} ${place.textContent}`;
     });
     slider.setAttribute("aria-valuetext", words.join(" "));
   };
@@ -22,7 +26,8 @@ document.querySelectorAll(".touch").forEach((root) => {
     const handle = svg.querySelector(".handle");
     const follow = (event) => {
       const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-      const distances = centres.map(([x, y]) => Math.hypot(x - at.x, y - at.y));
+      const distances = [...svg.querySelectorAll(".moved")]
+        .map((goal) => Math.hypot(goal.getAttribute("cx") - at.x, goal.getAttribute("cy") - at.y));
       slider.value = distances.indexOf(Math.min(...distances));
       slider.dispatchEvent(new Event("input", { bubbles: true }));
     };
@@ -36,6 +41,7 @@ document.querySelectorAll(".touch").forEach((root) => {
       if (handle.hasPointerCapture(event.pointerId)) follow(event);
     });
   });
+  choice.addEventListener("change", show);
   slider.addEventListener("input", show);
   slider.parentElement.hidden = false;
   root.classList.add("live");
