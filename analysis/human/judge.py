@@ -1,0 +1,137 @@
+"""Which models agree with which findings: :func:`judged` has a row for each pair and test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+
+from coartic.analysis.human.measures import MEASURES, MODELS, Values
+from coartic.analysis.statistics.estimates import LEVEL, SEED
+from coartic.analysis.study import Study, cached
+from coartic.analysis.words import read_beside
+from coartic.robot import Array
+
+SUITE = "human"
+FEWEST_TASKS = 10
+RESAMPLES = 1_999
+AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
+
+
+class Test(BaseModel):
+    """One inequality that a finding predicts."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    measure: str
+    above: float | None = None
+    below: float | None = None
+    disagree: float | None = None
+    """Beyond which, on the wrong side, it is a disagreement; the bound itself if not given."""
+
+    @model_validator(mode="after")
+    def is_one_inequality(self) -> Test:
+        """Check that the measure exists and that there is one bound."""
+        if self.measure not in MEASURES or (self.above is None) == (self.below is None):
+            raise ValueError("should have a measure of measures.py, and either above or below")
+        return self
+
+
+class Finding(BaseModel):
+    """A published finding; ``human.toml`` says what the fields are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    statement: str
+    population: str
+    statistic: str
+    quote: str
+    place: str
+    source: str
+    doi: str
+    read: str
+    predicts: str
+    tests: Sequence[Test]
+    where: str
+    silent: dict[str, str] = {}
+    built_in: dict[str, str] = {}
+    note: str = ""
+
+
+FINDINGS = TypeAdapter(dict[str, Finding]).validate_python(read_beside(__file__, "human"))
+"""The findings by id, in the order of the table."""
+
+
+@cached
+def judged(study: Study) -> pd.DataFrame:
+    """A row for each finding, test and model, in their order; none for folders of other suites.
+
+    Columns ``finding``, ``model``, ``measure``, ``value`` with the ``low`` and ``high`` end of its
+    interval, ``tasks``, ``verdict`` of the finding (the same for all tests of one), ``built_in``.
+    Intervals are of the bootstrap over tasks, 95 % for one test and wider for several
+    (Bonferroni).
+    """
+    columns = [
+        "finding",
+        "model",
+        "measure",
+        "value",
+        "low",
+        "high",
+        "tasks",
+        "verdict",
+        "built_in",
+    ]
+    rows = []
+    for name, finding in FINDINGS.items() if study.suite == SUITE else ():
+        for model in MODELS:
+            values = [MEASURES[test.measure](study, MODELS[model]) for test in finding.tests]
+            level = LEVEL / len(finding.tests)
+            ends = [(math.nan,) * 3 if of is None else bootstrapped(of, level) for of in values]
+            counts = [0 if of is None else len(of.by_task) for of in values]
+            verdict = verdict_of(finding, ends, counts)
+            for test, end, count in zip(finding.tests, ends, counts, strict=True):
+                built_in = finding.built_in.get(model, "")
+                rows.append((name, model, test.measure, *end, count, verdict, built_in))
+    return pd.DataFrame(rows, columns=columns)
+
+
+def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
+    """A statistic of all tasks, and its interval over tasks drawn with replacement.
+
+    Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread.
+    """
+    estimate = values.statistic(np.concatenate(values.by_task))
+    count = len(values.by_task)
+    if count < 2:
+        return estimate, math.nan, math.nan
+    rng = np.random.default_rng(SEED)
+    drawn = rng.integers(count, size=(RESAMPLES, count))
+    resampled = np.array(
+        [values.statistic(np.concatenate([values.by_task[k] for k in tasks])) for tasks in drawn]
+    )
+    away: Array = (resampled[np.isfinite(resampled)] - estimate) * math.sqrt(count / (count - 1))
+    low, high = estimate + np.quantile(away, [level / 2, 1 - level / 2])
+    return estimate, float(low), float(high)
+
+
+def verdict_of(
+    finding: Finding, ends: Sequence[tuple[float, float, float]], tasks: Sequence[int]
+) -> str:
+    """Of a model on a finding, from the value of each test with its interval."""
+    if not all(tasks):
+        return SILENT
+    agrees, disagrees = [], []
+    for test, (_, low, high) in zip(finding.tests, ends, strict=True):
+        sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
+        assert bound is not None
+        wrong = bound if test.disagree is None else test.disagree
+        near, far = sorted((sign * low, sign * high))
+        agrees.append(near >= sign * bound)
+        disagrees.append(far < sign * wrong)
+    if min(tasks) < FEWEST_TASKS:
+        return UNDECIDED
+    return AGREES if all(agrees) else DISAGREES if any(disagrees) else UNDECIDED
