@@ -105,10 +105,11 @@ def name_of(label: str) -> str:
     in is its label.
     """
     label = one_line(label)
-    if label.startswith(TOGETHER):
-        return label.replace(LEARNER.rstrip("/"), "learner", 1)
     method, _, variant = label.partition(" ")
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else method
+    if label.startswith(TOGETHER):
+        name, _, variant = label.replace(LEARNER.rstrip("/"), "learner", 1).partition(") ")
+        name = name.rstrip(")") + ")"
     for key, words in _PARAMETERS.items():
         variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
     return f"{name} ({variant.replace('_', ' ')})" if variant else name

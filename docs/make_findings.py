@@ -15,6 +15,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from coartic.analysis.methods import name_of
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
@@ -27,8 +28,12 @@ KEPT = {
     "ablations": ("methods signatures claims", ""),
     "locus": ("signatures", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
+    "agents": ("variants contexts signatures", ""),
+    "foreign": ("variants", ""),
+    "tuning": ("variants", ""),
 }
-"""Tables and figures that are kept of each suite's report."""
+"""Tables and figures that are kept of each suite's report. Suites that need other libraries are
+not run by ``make findings``."""
 
 
 class Row:
@@ -89,7 +94,7 @@ def filled_pages() -> dict[str, str]:
     )
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "expect": expect,
+        "expect": expect, "name_of": name_of,
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
     return {
@@ -99,9 +104,14 @@ def filled_pages() -> dict[str, str]:
 
 
 def store(results: Path) -> None:
-    """Copy tables and figures from the reports below ``results``; lists of run ids stay there."""
+    """Copy tables and figures from the reports below ``results``; lists of run ids stay there.
+
+    What is stored of a suite without a report there stays as it is.
+    """
     for suite, (tables, figures) in KEPT.items():
         report, kept = results / suite / "report", STORED / suite
+        if not report.is_dir():
+            continue
         shutil.rmtree(kept, ignore_errors=True)
         kept.mkdir(parents=True)
         for name in tables.split():

@@ -635,8 +635,8 @@ def study(tmp_path_factory):
     ]
     planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
-    study = run_and_write(folder, planned, runs=4, trials=1500, executor=FewStarts())
-    study.runs["trials"] = study.runs.trials.replace(1500, 10_000)  # as long as the paper's
+    study = run_and_write(folder, planned, runs=4, trials=600, executor=FewStarts())
+    study.runs["trials"] = study.runs.trials.replace(600, 10_000)  # as long as the paper's
     return study
 
 

@@ -26,7 +26,8 @@ def coartic(monkeypatch, capsys):
     return lambda *arguments: call(monkeypatch, capsys, *arguments)
 
 
-def test_run_resumes(coartic, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("in_this_process")
+def test_run_resumes(coartic, tmp_path):
     out = tmp_path / "results"
     command = ("run", "paper", "--out", out, "--runs", 2, "--trials", 60, "--jobs", 1)
     code, text, error = coartic(*command)
@@ -38,7 +39,6 @@ def test_run_resumes(coartic, tmp_path, monkeypatch):
     made_with = load(out).made_with
     assert made_with["packages"]["numba"]
     assert made_with["command"][1:3] == ["run", "paper"]
-    monkeypatch.setattr(pool, "Local", InProcess)
     assert coartic(*command)[1].startswith("14 runs (14 reused) in ")
     more = coartic("run", "paper", "--out", out, "--runs", 3, "--trials", 60)[1]
     assert more.startswith("21 runs (14 reused) in ")

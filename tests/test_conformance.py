@@ -1,6 +1,7 @@
 """The conformance kit: every built-in method passes, every broken one fails its law."""
 
 import re
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
@@ -8,7 +9,7 @@ from coartic import load_task
 from coartic.analysis.optima import entries
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.pool import Local
+from coartic.benchmarks.pool import context
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import job_of, perform
 from coartic.tasks.task import TASK_FOLDER
@@ -50,6 +51,7 @@ SHORT_TASKS = [load_task("ascending"), tiny_task(goals=[[4.5, 1.0]], initial_han
 """For searches that take seconds on two hands and four goals."""
 TASKS = {
     "optimum/": ONE_GOAL,
+    "receding-horizon": TWO_GOALS,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
     "nullspace-qp/": SHORT_TASKS,
     "posture-based/": SHORT_TASKS,
@@ -64,28 +66,21 @@ def methods():
     return registry([BROKEN])
 
 
-APART = (
-    *("dual-process/EC4", "corrective-alone/given", "random-search/climbing", "cma-es/every"),
-    *("nullspace-qp/next-goal", "posture-based/one-goal", "optimum/multistart"),
-    *("trajectory-optimisation/jerk", "test/local", "test/remembers"),
-)
-"""One method of each kind, and those that a process of their own gives away."""
-
-
-class HereAndThere:
-    """The first runs of some methods in a process of their own, which takes longest to begin,
-    where they are compared with the one that is performed in this."""
-
-    def __init__(self, jobs):
-        pass
-
-    def perform(self, jobs):
-        apart = jobs[0].method in APART and len(jobs) > 1
-        return (Local(1) if apart else InProcess()).perform(jobs)
+@pytest.fixture(scope="module")
+def another_process():
+    """One for all methods: each of them would take long to begin its."""
+    with ProcessPoolExecutor(1, mp_context=context()) as pool:
+        yield pool
 
 
 @pytest.fixture(autouse=True)
-def few_trials(monkeypatch):
+def quick_checks(monkeypatch, another_process):
+    """Of few trials; all runs of a check but the one that is to be in another process are there."""
+
+    class HereAndThere(InProcess):
+        def perform(self, jobs):
+            return enumerate((another_process.map if len(jobs) > 1 else map)(perform, jobs))
+
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)
 

@@ -19,7 +19,7 @@ from tests.support.strategies import UNEVEN, configurations
 ROBOT = Robot()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     robot=st.just(ROBOT) | st.just(UNEVEN),
     data=st.data(),
@@ -43,7 +43,7 @@ def _largest(length):
     return largest_square(length)
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(length=st.floats(1e-9, 1e5) | st.sampled_from([0.0, 1e-200, 0.001, 0.01, 0.1]))
 def test_a_square_within_the_largest_has_a_root_within_the_length(length):
     """Errors are compared by their squares: to the last bit as by themselves."""
@@ -68,7 +68,7 @@ def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
     return most
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     """Beyond what the kernels' own cosine knows, from the start or on the way."""
     rng = np.random.default_rng(seed)
@@ -116,7 +116,7 @@ def test_secondary_objective_equals_the_matrix_form(gain, locked):
     model = MotionModel(max_iterations=300)
     converged = 0
     for robot, hand in [(ROBOT, "left"), (ROBOT, "right"), (UNEVEN, "right")]:
-        for _ in range(4):
+        for _ in range(2):
             arguments = robot, rng.uniform(-2, 2, robot.dof), hand, tuple(rng.uniform(-2, 2, 2))
             options = {"locked_base": locked, "nullspace_gain": gain, "model": model}
             fast, slow = correct(*arguments, **options), reference.correct(*arguments, **options)
@@ -124,7 +124,7 @@ def test_secondary_objective_equals_the_matrix_form(gain, locked):
             converged += fast.converged
             if fast.converged:
                 np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
-    assert converged > 6
+    assert converged >= 3
 
 
 @pytest.mark.parametrize("locked", [(), ("y",)])

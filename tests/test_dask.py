@@ -5,12 +5,12 @@ import pytest
 from coartic import CoarticError
 from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
-from tests.support.suites import paper_cells, planned, run_and_write, same_results
+from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
 QUIET = {"dashboard_address": None, "silence_logs": 50}
-CELLS = paper_cells(tasks=["ascending", "two-armed-2"])
+CELLS = paper_cells(tasks=["ascending", "descending"])
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
 def test_nobody_at_an_address(tmp_path):
     import dask
 
-    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}):
+    with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
         for address in ("tcp://127.0.0.1:1", "nonsense://x"):
             with pytest.raises(CoarticError, match=f"no Dask scheduler at {address}.*8786"):
                 planned(CELLS).perform(tmp_path, executor=Dask(address))
@@ -50,12 +50,13 @@ def test_a_cluster_without_workers(tmp_path):
     assert len(messages) == 1
 
 
-def test_a_scheduler_that_is_lost(tmp_path):
+def test_a_scheduler_that_is_lost(tmp_path, monkeypatch):
     """What was finished before is kept."""
     import dask
 
+    monkeypatch.setattr(cluster_module, "Local", InProcess)
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
-    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), cluster:
+    with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}), cluster:
 
         def watch(progress, what):
             if progress.done == 2:

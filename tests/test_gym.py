@@ -28,8 +28,7 @@ def solutions(task):
     yield Bandit(Bandit.Parameters(trials=800)).solve(Session(task, 0, Bandit.told)).solution
 
 
-@pytest.mark.parametrize("around", [None, "alone"])
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(("name", "around"), [*zip(IDS, [None, "alone"] * 2, strict=True)])
 def test_a_replayed_solution_gets_its_reward(name, around):
     task = load_task(IDS[name])
     env = gymnasium.make(name, around=around and "R" * len(task.goals)).unwrapped

@@ -138,7 +138,7 @@ def test_arms_of_more_links_than_the_papers():
 @functools.cache
 def learnt(name, condition):
     """Runs of the paper's length; one of those that take longest."""
-    return learn_many(load_task(name), condition, seeds=range(4 if condition == "EC1" else 1))
+    return learn_many(load_task(name), condition, seeds=range(2 if condition == "EC1" else 1))
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def test_claims_are_judged_for_each_member():
     assert set(judged.index) == {"", *names[2:], "two-armed-1-m001"}
     assert judged.effect["two-armed-1-m002"] > 0 > judged.effect["two-armed-1-m003"]
     assert judged.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
-    twice = judged_specifications([study, study], claims=claims, jobs=2)
+    twice = judged_specifications([study, study], claims=claims)
     pd.testing.assert_frame_equal(twice, table)
     counts = shares(table).set_index(["claim", "kind"]).loc["ec4-beats-ec3"]
     assert counts.loc["two-armed-1", ["supported", "specifications"]].tolist() == [2, 3]

@@ -93,7 +93,7 @@ def random_movements(rng, robot, hand, count):
     return q, target, goals
 
 
-@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 2_000), (UNEVEN, 1_000)])
+@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 1_000), (UNEVEN, 500)])
 @pytest.mark.parametrize("hand", HANDS)
 def test_equals_every_step_many_times(robot, count, hand):
     rng = np.random.default_rng(15)
@@ -104,7 +104,7 @@ def test_equals_every_step_many_times(robot, count, hand):
         assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(
     q=configurations(ROBOT),
     target=configurations(ROBOT),

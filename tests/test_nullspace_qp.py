@@ -270,7 +270,7 @@ def test_an_unreachable_goal_is_infeasible(hands):
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(NextGoal, task, hands=hands, period=20, max_steps=500)
+        solve(NextGoal, task, hands=hands, period=20, max_steps=200)
     assert caught.value.outcome == "infeasible"
 
 

@@ -64,6 +64,7 @@ def test_a_package_brings_a_method(coartic, tmp_path):
     assert run["forward_kinematics"] > run["jacobians"] > 0
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_file_brings_a_method(coartic, tmp_path):
     code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", "--method-file", METHOD,
@@ -196,6 +197,6 @@ def test_the_agent_of_the_page_learns(tmp_path):
     (text,) = re.findall(r'```python\n("""REINFORCE.*?)```', page, re.DOTALL)
     (tmp_path / "agent.py").write_text(text, encoding="utf-8")
     cell = Cell(load_task("ascending"), registry([tmp_path / "agent.py"])["reinforce"])
-    runs = run_and_write(tmp_path / "out", [cell], runs=2, trials=400).runs
+    runs = run_and_write(tmp_path / "out", [cell], runs=1, trials=400).runs
     assert (runs.status == "ok").all()
     assert (runs.reward > -319).all()

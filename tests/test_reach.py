@@ -67,7 +67,7 @@ def one_by_one(robot, arm, stops, *, corrects, looks, locked, model, by=(move, c
     return q, hit, ticks, posture, corrections, iterations, evaluations
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     robot=st.sampled_from([Robot(), UNEVEN]),
     seed=st.integers(0, 10**6),

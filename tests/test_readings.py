@@ -142,14 +142,14 @@ def test_the_learner_is_the_slow_one_whatever_is_read_together():
     failed = 0
     for seed, fields in enumerate(TOGETHER):
         condition = replace(FORGETFUL, noise_sd=0.02, **fields)
-        fast = learn(task, condition, seed=seed, trials=4)
-        slow = reference.learn(task, condition, seed=seed, trials=4)
+        fast = learn(task, condition, seed=seed, trials=3)
+        slow = reference.learn(task, condition, seed=seed, trials=3)
         np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
         np.testing.assert_array_equal(fast.completed, slow.completed)
         assert fast.counters.corrections == slow.corrections
         assert np.isfinite(fast.values).sum() == len(slow.values)
         failed += fast.counters.failed_trials
-    assert failed > 30
+    assert failed > 20
 
 
 def test_a_learned_replay_is_the_replay():

@@ -88,7 +88,7 @@ MODELS = [
 ]
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     st.sampled_from(["ascending", "two-armed-1", "two-armed-2"]),
     st.integers(0, 10**6),

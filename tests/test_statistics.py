@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -149,7 +149,6 @@ def test_samples_are_vectors_of_finite_numbers(values):
         statistics.mean(values, seed=0)
 
 
-@settings(max_examples=30)
 @given(rewards, rewards)
 def test_probability_of_improvement_is_mann_whitneys(a, b):
     better = statistics.probability_of_improvement(a, b, seed=0, resamples=99)

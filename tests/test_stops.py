@@ -15,7 +15,7 @@ from coartic.tasks.task import hands_of
 BY_COST = {method.cost: method for method in METHODS}
 ORDERS = {"acceleration": 2, "jerk": 3}
 ONE_SEGMENT = {"acceleration": (12, 3), "jerk": (720, 5)}  # from rest to rest: factor · L² / Tᵏ
-QUICK = {"nodes": 40, "graphs": 1, "chains": 1, "noisy_starts": 2}
+QUICK = {"nodes": 20, "graphs": 1, "chains": 1, "noisy_starts": 0}
 TASK = Task(
     name="five",
     robot=Robot(left_links=(1.0,), right_links=(1.2, 0.8)),
@@ -74,7 +74,7 @@ def test_stops_are_at_multiples_alone(cost):
 
 @pytest.mark.parametrize("timing", ["free", "fixed"])
 def test_more_of_a_stop_costs_more(cost, timing):
-    costs = [planned(cost, timing=timing, stop=stop).cost for stop in (0.0, 0.25, 0.75, 1.0)]
+    costs = [planned(cost, timing=timing, stop=stop).cost for stop in (0.0, 0.5, 1.0)]
     assert costs == sorted(costs)
     assert costs[-1] > 2 * costs[0]
     fewer = [planned(cost, timing=timing, stop=1.0, stop_every=every).cost for every in (2, 5)]
@@ -82,10 +82,9 @@ def test_more_of_a_stop_costs_more(cost, timing):
     assert costs[0] < fewer[0] < costs[-1]
 
 
-@pytest.mark.parametrize("stop", [0.25, 0.75])
-def test_less_than_a_full_stop_leaves_its_share_of_every_rate(cost, stop):
-    passing, slowed = planned(cost), planned(cost, stop=stop)
-    share = np.abs(slowed.rates[:, 1:-1]) - (1 - stop) * np.abs(passing.rates[:, 1:-1])
+def test_half_a_stop_leaves_half_of_every_rate(cost):
+    passing, slowed = planned(cost), planned(cost, stop=0.5)
+    share = np.abs(slowed.rates[:, 1:-1]) - 0.5 * np.abs(passing.rates[:, 1:-1])
     assert share.max() < 1e-7
     assert np.abs(slowed.rates[0, 1:-1]).max() > 0.01
 

@@ -152,9 +152,12 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
     same_results(load(tmp_path), undisturbed)
 
 
+MANY = {"runs": 12, "trials": 30}
+
+
 def perform_until_killed(folder, progress):
     """Perform runs and say how many are kept."""
-    plan = planned(runs=30, trials=60)
+    plan = planned(**MANY)
     plan.perform(folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
@@ -165,13 +168,13 @@ def perform_until_killed(folder, progress):
 def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     fork = multiprocessing.get_context("fork")
-    for _ in range(5):
+    for _ in range(3):
         receive, send = fork.Pipe(duplex=False)
         process = fork.Process(target=perform_until_killed, args=(folder, send))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of threads, which a fork does not have
             process.start()
-        enough = chance.randrange(30)
+        enough = chance.randrange(24)
         while receive.recv() < enough:
             pass
         time.sleep(chance.uniform(0, 0.05))
@@ -181,12 +184,13 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
             assert plain_sql.execute("PRAGMA integrity_check").fetchone() == ("ok",)
             there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
     assert there == sorted(there)
-    assert 0 < there[-1] < 210
-    options = {"runs": 30, "trials": 60}
-    same_results(run_and_write(folder, **options), run_and_write(tmp_path / "whole", **options))
+    assert 0 < there[-1] < 84
+    same_results(run_and_write(folder, **MANY), run_and_write(tmp_path / "whole", **MANY))
 
 
-def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
+def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch):
+    connect = store_module.connect
+    monkeypatch.setattr(store_module, "connect", lambda where, _: connect(where, 0.01))
     plan = planned(ONE, **FEW)
     busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
     with writing(tmp_path):

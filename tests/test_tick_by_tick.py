@@ -74,7 +74,7 @@ def solutions(draw):
     return task, movements
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(solutions())
 def test_any_solution(drawn):
     task, movements = drawn

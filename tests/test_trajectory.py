@@ -205,8 +205,7 @@ def test_whole_ticks_are_what_is_executed():
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-@pytest.mark.parametrize("name", ["ascending", "two-armed-2"])
-@pytest.mark.parametrize("other_arm", ["free", "still"])
+@pytest.mark.parametrize(("name", "other_arm"), [("ascending", "free"), ("two-armed-2", "still")])
 def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, name, other_arm):
     task, hands = load_task(name), "given"
     if name == "two-armed-2":

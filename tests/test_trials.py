@@ -25,7 +25,7 @@ TASKS = [
 ]
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     st.sampled_from(TASKS),
     st.integers(0, 10**6),

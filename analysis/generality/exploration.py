@@ -100,7 +100,7 @@ def _contrast(
 
 def _by_hands(sample: Sample, name: str, label: str) -> Array:
     """Best known reward with the hands of each run (n,), as a share of the best known."""
-    best_by_hands, best = sample.by_hands(name), sample.references[name].reward
+    best_by_hands, best = sample.by_hands[name], sample.references[name].reward
     hands = sample.study.cells[name, label].good.hands
     return np.array([best_by_hands[str(sequence)] for sequence in hands]) / abs(best)
 

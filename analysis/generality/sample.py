@@ -113,19 +113,24 @@ class Sample:
         }
         return {family: names for family, names in by_family.items() if names}
 
-    def by_hands(self, name: str) -> dict[str, int]:
-        """Best reward of any run of the folder with each hand sequence on an instance.
+    @cached_property
+    def by_hands(self) -> dict[str, dict[str, int]]:
+        """By instance: best reward of any run of the folder with each hand sequence on it.
 
         The corrective process alone with every sequence counts as well. The best that a sequence
         can give is at least that.
         """
         runs = self.study.runs
-        solved = runs[(runs.status == "ok") & (runs.task == name)]
-        every = pd.concat(
-            [part[["hands", "reward"]] for part in (solved, self.study.sequences(name))]
-        )
-        best = every.dropna().groupby("hands").reward.max()
-        return {str(hands): int(reward) for hands, reward in best.items()}
+        columns = ["task", "hands", "reward"]
+        alone = [self.study.sequences(name).assign(task=name) for name in self.tasks]
+        every = pd.concat([part[columns] for part in (runs[runs.status == "ok"], *alone)]).dropna()
+        best: dict[str, dict[str, int]] = {name: {} for name in self.tasks}
+        of_instances = every[every.task.isin(best)]
+        for task, hands, reward in zip(
+            of_instances.task, of_instances.hands, of_instances.reward, strict=True
+        ):
+            best[task][hands] = max(int(reward), best[task].get(hands, int(reward)))
+        return best
 
 
 def one_by_one(study: Study) -> set[str]:

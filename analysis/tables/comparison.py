@@ -78,7 +78,7 @@ def ranking(study: Study) -> Rows:
     gap_in_general=Column("gap on random tasks (%)", 1, percent=True),
 )
 def variants(study: Study) -> Rows:
-    """Every method with each of its settings: gap over all tasks and over random ones, and cost.
+    """Every method with each of its settings: gap over single tasks and over random ones, and cost.
 
     The learner is one row: EC1 where a task has one arm, EC4 where it has two. What a run costs
     is the mean over tasks.
@@ -91,11 +91,13 @@ def variants(study: Study) -> Rows:
         if not is_search(label):
             labels_by_row.setdefault(f"{method} {variant}".strip(), {})[task] = label
     instances = sample(study)
+    single = [name for name in ends(study) if study.tasks[name].family is None]
     for name, labels in labels_by_row.items():
         rewards = gaps(study).merge(pd.DataFrame(labels.items(), columns=["task", "method"]))
+        rewards = rewards[rewards.task.isin(single)]
         by_task = {str(task): rows.gap.to_numpy() for task, rows in rewards.groupby("task")}
         row: Row = {"method": name}
-        if by_task and len(by_task) == len(ends(study)) and rewards.gap.notna().all():
+        if by_task and len(by_task) == len(single) and rewards.gap.notna().all():
             row |= interval("gap", task_mean(by_task))
         row |= {f"on {task}": of_task.mean() for task, of_task in by_task.items()}
         scores: dict[str, list[Runs]] = {}
