@@ -15,6 +15,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
@@ -31,6 +32,8 @@ KEPT = {
     "agents": ("variants contexts signatures", ""),
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),
+    "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
+    "stops": ("stops claims", "stops"),
 }
 """Tables and figures that are kept of each suite's report. Suites that need other libraries are
 not run by ``make findings``."""
@@ -84,7 +87,10 @@ def expect(holds: bool, what: str) -> str:
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its file name."""
+    """Every page that is made from a template, by its file name.
+
+    A page that has the name of a suite waits until something of that suite is stored.
+    """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(DOCS),
         undefined=jinja2.StrictUndefined,
@@ -94,12 +100,14 @@ def filled_pages() -> dict[str, str]:
     )
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "expect": expect, "name_of": name_of,
+        "expect": expect, "name_of": name_of, "register": CLAIMS,
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
+    waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
     return {
         path.stem: environment.get_template(path.name).render()
         for path in sorted(DOCS.glob("*.md.jinja"))
+        if path.stem not in waiting
     }
 
 

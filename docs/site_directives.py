@@ -218,7 +218,12 @@ def claims() -> Iterator[str]:
         for by_task in (claim.pairs, claim.runs, claim.cells):
             for task, names in by_task.items():
                 what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
-        return text[0].upper() + text[1:] + "." + (f" *{'; '.join(what)}.*" if what else "")
+        power = f" Power, stated before suite `{claim.suite}` was run: {claim.power}."
+        return (
+            f"{text[0].upper()}{text[1:]}."
+            + (f" *{'; '.join(what)}.*" if what else "")
+            + (power if claim.power else "")
+        )
 
     rows = (
         (f"[{c.statement}]{{#{c.id}}} <br>`{c.id}`", goals(c), source(c), rule(c))

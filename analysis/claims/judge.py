@@ -111,13 +111,11 @@ def opposite_p(claim: Claim, finding: Finding) -> float:
 
 @cached
 def judged(study: Study) -> list[Judged]:
-    """Every claim about such tasks as the folder has, judged and corrected.
-
-    A claim on one suite is judged on a folder of that suite alone.
-    """
+    """The claims on the folder's suite, judged and corrected; without any, those on its tasks."""
+    of_suite = [claim for claim in CLAIMS.values() if claim.suite == study.suite]
     drawn = {task.family is not None for task in study.tasks.values()} or {False}
-    claims = [c for c in CLAIMS.values() if bool(c.families) in drawn]
-    return judge(study, [c for c in claims if c.suite in ("", study.suite)])
+    of_tasks = [c for c in CLAIMS.values() if not c.suite and bool(c.families) in drawn]
+    return judge(study, of_suite or of_tasks)
 
 
 def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:

@@ -30,7 +30,7 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 def price(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
     data = price_curves(study)
-    spends = [spend for spend in PANELS if (data.spend == spend).any()]
+    spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)

@@ -11,7 +11,8 @@ from collections import Counter
 from typing import Any
 
 from coartic.analysis import tables
-from coartic.analysis.claims.judge import counts, judged
+from coartic.analysis.claims.judge import Judged, counts, judged
+from coartic.analysis.claims.register import MARGINS
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
 from coartic.analysis.comparisons.paper import paper_rows
 from coartic.analysis.comparisons.reached import price as price_by_method
@@ -100,10 +101,24 @@ def paper(study: Study) -> Facts | None:
     if not paper_rows(study) and not any(entry.run_ids for entry in entries):
         return None
     rewards = Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
+    return {
+        "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
+        **verdicts_of(entries),
+    }
+
+
+@cached
+def claims(study: Study) -> Facts | None:
+    """The verdicts on the paper's claims, or on ours where the folder is one of our studies."""
+    entries = judged(study)
+    return verdicts_of(entries) if entries and entries[0].claim.suite else paper(study)
+
+
+def verdicts_of(entries: list[Judged]) -> Facts:
+    """How many claims have each verdict, and whether most are decided."""
     by_verdict = counts(entries)
     total = len(entries) - by_verdict["used to choose the goals"]
     return {
-        "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
         "claims": by_verdict,
         "independent": counts(entry for entry in entries if not entry.claim.fitted),
         "general": all(entry.claim.families for entry in entries),
@@ -111,9 +126,6 @@ def paper(study: Study) -> Facts | None:
         # With few runs or trials most claims cannot be judged.
         "decided": 2 * by_verdict["undecided"] < total,
     }
-
-
-claims = paper
 
 
 @cached
@@ -245,6 +257,44 @@ def exploration(study: Study) -> list[Facts]:
     return [
         {str(k): v for k, v in row.items()} for row in rows.assign(**percent).to_dict("records")
     ]
+
+
+@cached
+def horizon(study: Study) -> Facts | None:
+    """Gaps of the planner by goals ahead over all random tasks, and the horizon of the learner.
+
+    ``enough``: the first horizon after which a further goal gains less than the margin.
+    """
+    rows = tables.TABLES["horizon"](study)
+    rows = rows[rows.group == "all"]
+    if not len(rows):
+        return None
+    percent = {name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high", "gain")}
+    each = rows.assign(**percent).to_dict("records")
+    little = [row["gain"] < MARGINS["gain"] for row in each]
+    beside = tables.TABLES["horizon-beside"](study)
+    return {
+        "tasks": each[0]["tasks"],
+        "by_h": {row["h"]: row for row in each},
+        "enough": next((each[k - 1]["h"] for k in range(1, len(each)) if all(little[k:])), ""),
+        "learner": next(iter(beside[beside.index == "learner all"].lies), ""),
+    }
+
+
+@cached
+def stops(study: Study) -> list[Facts] | None:
+    """What postures are worth to the next goal when passing and with a full stop, by times.
+
+    Of minimum-jerk plans on random tasks with one arm.
+    """
+    rows = tables.TABLES["stops"](study)
+    jerk = rows[(rows.group == "random, one arm") & rows.method.str.endswith("/jerk")]
+    both = []
+    for timing, words in (("free", "free"), ("fixed", "equal")):
+        at = jerk[jerk.timing == timing].set_index("stop")
+        if {0.0, 1.0} <= set(at.index):
+            both.append({"times": words, "passing": at.loc[0.0], "stopping": at.loc[1.0]})
+    return both or None
 
 
 @cached

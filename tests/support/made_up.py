@@ -51,7 +51,7 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
         "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
         "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
-        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0,
+        "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
         "solution_corrections": 0, "early_corrections": 30, "late_corrections": 20,
         "other_arm_travel": travel, "proven_bound": None, **more,

@@ -1,0 +1,292 @@
+"""Tables of our own studies: how far ahead a planner looks, and stops at goals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pandas as pd
+
+from coartic import Task, Trajectory
+from coartic.analysis.cells import CellRuns
+from coartic.analysis.claims.studies import (
+    ALL_GOALS,
+    HORIZONS,
+    PLANNER,
+    gaps_by_horizon,
+    solved_cells,
+)
+from coartic.analysis.generality.sample import sample
+from coartic.analysis.signatures.paths import turning_angles
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.robot import Array
+from coartic.tasks.task import MOST_GOALS
+
+BASES = ("free", "on a rail", "fixed")
+"""How the base can move, by the number of directions in which it is locked."""
+KINDS: dict[str, Callable[[Task], str]] = {
+    "family": lambda task: str(task.family).partition("/")[0],
+    "goals": lambda task: str(len(task.goals)),
+    "arms": lambda task: ("one", "two")[len(task.hands) - 1],
+    "links": lambda task: str(len(task.robot.right_links)),
+    "base": lambda task: BASES[len(task.locked_base)],
+}
+"""What tasks are told apart by."""
+ENOUGH = 0.9
+"""Share of the tasks of a group on which a horizon must have been run to be shown."""
+BESIDE = ("learner", "cma-es/bandit", "nullspace-qp/next-goal")
+"""What stands beside the planner: the learner is the one that explores most."""
+SMOOTH = "trajectory-optimisation/"
+NEAR = 3
+"""Ticks before and after a hit between which the path's turn at the goal is measured."""
+SHARED = ("ascending", "descending")
+"""The paper's tasks that differ after the first goal."""
+
+
+@cached
+def planner_cells(study: Study) -> dict[tuple[str, str, str, int], CellRuns]:
+    """Cells of the planner by task, hands, costs and horizon, at most the goals less one."""
+    cells = {}
+    for cell, parameters in solved_cells(study, PLANNER):
+        horizon = min(parameters["horizon"], len(study.tasks[cell.task].goals) - 1)
+        cells[cell.task, parameters["hands"], parameters["costs"], horizon] = cell
+    return cells
+
+
+def cells_at(study: Study, gaps: pd.DataFrame, horizon: int | str) -> list[CellRuns]:
+    """The planner's cells behind a column of gaps, whose rows are tasks, hands and costs.
+
+    Hands that are given with all goals in view are those that were planned.
+    """
+    ahead = MOST_GOALS if horizon == ALL_GOALS else int(horizon)
+    cells = planner_cells(study)
+    keys = ((*place, min(ahead, len(study.tasks[place[0]].goals) - 1)) for place in gaps.index)
+    there = (cells.get(key) or cells.get((key[0], "planned", *key[2:])) for key in keys)
+    return [cell for cell in there if cell is not None]
+
+
+def groups(study: Study) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Kinds of tasks and of planners, each with its gaps by horizon.
+
+    A planner that has its hands given, or dear joints, follows the plain one on the same tasks.
+    """
+    every = gaps_by_horizon(study)
+    parts = dict(list(every.groupby(["hands", "costs"], sort=False)))
+    plain = parts.pop(("planned", "none"), every[:0])
+    yield "all", "all", plain
+    names = plain.index.get_level_values("task")
+    for kind, value_of in KINDS.items():
+        for value, part in plain.groupby(np.array([value_of(study.tasks[n]) for n in names])):
+            yield kind, str(value), part
+    given = [("given", part) for (hands, _), part in parts.items() if hands == "optimal"]
+    dear = [(f"{costs} dear", part) for (_, costs), part in parts.items() if costs != "none"]
+    for kind, plainly, others in (("hands", "planned", given), ("costs", "equal", dear)):
+        tasks = {name for _, part in others for name in part.index.get_level_values("task")}
+        if others:
+            yield kind, plainly, plain[names.isin(tasks)]
+        for planner, part in others:
+            yield kind, planner, part
+
+
+@table(
+    "group, value, h, tasks, gap[], gain[], seconds",
+    group=Column("kind of tasks"),
+    value=Column("which"),
+    h=Column("goals ahead"),
+    seconds=Column("CPU seconds a task", 1),
+)
+def horizon(study: Study) -> Rows:
+    """Gap of the planner by goals ahead, and what the last of these goals gains, as shares."""
+    for group, value, every in groups(study):
+        columns = [h for h in HORIZONS if len(every) and every[h].notna().mean() > ENOUGH]
+        gaps = every[columns].dropna()
+        for place, h in enumerate(columns if len(gaps) else ()):
+            cells = cells_at(study, gaps, h)
+            row: Row = {"group": group, "value": value, "h": str(h), "tasks": len(gaps)}
+            row |= mean_of("gap", gaps[h] / 100)
+            before = columns[place - 1]
+            if place and HORIZONS.index(h) == HORIZONS.index(before) + 1:
+                row |= mean_of("gain", (gaps[before] - gaps[h]) / 100)
+            row["seconds"] = float(np.mean([cell.good.cpu_s.mean() for cell in cells]))
+            yield f"{group} {value} h={h}", row | runs_of(*cells)
+
+
+@table(
+    "method, arms, tasks, gap[], horizon[], lies",
+    horizon=Column("goals ahead of the planner with the same gap", 1),
+    lies=Column("as the planner with"),
+)
+def horizon_beside(study: Study) -> Rows:
+    """Gaps of other methods, as shares, and the horizon at which the planner has the same.
+
+    Between whole horizons by linear interpolation; 0 and 4 are the ends. Intervals are of
+    bootstrap samples of the tasks.
+    """
+    gaps, instances = gaps_by_horizon(study), sample(study)
+    if instances is None or not len(gaps):
+        return
+    curves = gaps.query("hands == 'planned' and costs == 'none'")
+    curves = curves.droplevel(["hands", "costs"])[list(HORIZONS[:-1])].dropna() / 100
+    for method in BESIDE:
+        shares = {name: instances.gap(name, method) for name in curves.index}
+        ends = {name: float(of.mean()) for name, of in shares.items() if of is not None}
+        for arms in ("one", "two", "all"):
+            names = [n for n in ends if arms in ("all", KINDS["arms"](study.tasks[n]))]
+            if not names:
+                continue
+            end, curve = np.array([ends[n] for n in names]), curves.loc[names].to_numpy(float)
+            labels = [instances.label_on(name, method) for name in names]
+            same = same_horizon(curve.mean(axis=0), end.mean())
+            row: Row = {"method": method, "arms": arms, "tasks": len(names)}
+            row |= interval("gap", mean(end))
+            drawn = np.random.default_rng(SEED).integers(len(end), size=(RESAMPLES, len(end)))
+            ways = [same_horizon(curve[k].mean(axis=0), end[k].mean()) for k in drawn]
+            row |= {"horizon": same, "lies": between(curve.mean(axis=0), end.mean())}
+            if len(end) > 2:
+                row["horizon_low"], row["horizon_high"] = np.quantile(ways, TAILS)
+            cells = [study.cells[key] for key in zip(names, labels, strict=True)]
+            yield f"{method} {arms}", row | runs_of(*cells)
+
+
+def same_horizon(curve: Array, gap: float) -> float:
+    """Where a curve of gaps by horizon, ``(k,)``, comes down to a gap; its ends beyond."""
+    falling = np.minimum.accumulate(curve)
+    return float(np.interp(-gap, -falling, np.arange(len(curve))))
+
+
+def between(curve: Array, gap: float) -> str:
+    """Between which horizons a gap lies, in words."""
+    if gap > curve[0]:
+        return "less than 0"
+    worse = int((np.minimum.accumulate(curve) >= gap).sum()) - 1
+    return f"{worse} to {worse + 1}" if worse < len(curve) - 1 else f"{worse} or more"
+
+
+@table(
+    "sign, words, h, tasks, mean[], to_come[]",
+    words=Column(page=False),
+    to_come=Column("more with all goals", 2),
+)
+def horizon_signs(study: Study) -> Rows:
+    """Signs of coarticulation of the planner by goals ahead, means over tasks."""
+    gaps = gaps_by_horizon(study)
+    if not len(gaps):
+        return
+    gaps = gaps.query("hands == 'planned' and costs == 'none'").dropna()
+    cells = {h: cells_at(study, gaps, h) for h in HORIZONS}
+    for name, sign in SIGNS.items():
+        values = pd.DataFrame(
+            {
+                str(h): {
+                    cell.task: mean_or_nan(sign.of(study.trajectories(cell.task, cell.label)))
+                    for cell in of
+                }
+                for h, of in cells.items()
+            }
+        ).dropna()
+        for h in cells if len(values) else ():
+            row: Row = {"sign": name, "words": sign.words, "h": str(h), "tasks": len(values)}
+            row |= mean_of("mean", values[str(h)])
+            row |= mean_of("to_come", values[ALL_GOALS] - values[str(h)])
+            of_tasks = [cell for cell in cells[h] if cell.task in values.index]
+            yield f"{name} h={h}", row | runs_of(*of_tasks)
+
+
+def mean_or_nan(values: Sequence[float] | Array) -> float:
+    """The mean of the values that there are; NaN without any."""
+    there = np.asarray(values, dtype=np.float64)
+    there = there[~np.isnan(there)]
+    return float(there.mean()) if len(there) else math.nan
+
+
+@cached
+def stop_values(study: Study) -> pd.DataFrame:
+    """What plans that stop at goals, and what stands beside them, show on each task.
+
+    Columns ``group`` (kind of task), ``method``, ``timing``, ``stop``, ``goals_per_stop``,
+    ``task``, ``cell``; ``nearer``, ``first``: signs of coarticulation in ticks; ``turn``: mean
+    turn of the path at goals that others follow, rad; ``posture`` at the first goal. Empty where
+    nothing stops.
+    """
+    rows: list[Row] = []
+    for method in dict.fromkeys(method for _, method in study.cells):
+        if not method.startswith((SMOOTH, PLANNER)):
+            continue
+        for cell, parameters in solved_cells(study, method.partition(" ")[0]):
+            if cell.label == method:
+                runs = study.trajectories(cell.task, cell.label)
+                rows.append(
+                    {
+                        "group": group_of(study.tasks[cell.task]),
+                        "method": cell.method,
+                        "timing": parameters.get("timing", ""),
+                        "stop": float(parameters.get("stop", math.nan)),
+                        "goals_per_stop": parameters.get("stop_every", 1),
+                        "task": cell.task,
+                        "cell": cell,
+                        "nearer": mean_or_nan(SIGNS["arm"].of(runs)),
+                        "first": mean_or_nan(SIGNS["first"].of(runs)),
+                        "turn": mean_or_nan(np.concatenate(list(map(turns, runs.runs)))),
+                        "posture": runs.runs[0].execution.configurations[0],
+                    }
+                )
+    frame = pd.DataFrame(rows)
+    return frame if len(frame) and (frame.stop > 0).any() else frame[:0]
+
+
+def group_of(task: Task) -> str:
+    """Kind of a task: random ones by their arms, the paper's one-armed ones together."""
+    if task.family is not None:
+        return f"random, {KINDS['arms'](task)} arm{'s' * (len(task.hands) - 1)}"
+    return "ascending, descending" if task.name in SHARED else task.name
+
+
+def turns(run: Trajectory) -> Array:
+    """Angles by which the path in joint space turns at goals that others follow, rad, (G - 1,).
+
+    0 passes smoothly, NaN beside a movement of no length. Movements have a constant speed in this
+    model, so that of a plan's velocities their direction alone is left.
+    """
+    last = len(run.configurations) - 1
+    around = ((max(hit - NEAR, 0), hit, min(hit + 1 + NEAR, last)) for hit in run.hits[:-1])
+    return np.array([turning_angles(run.configurations[list(rows)])[0] for rows in around])
+
+
+@table(
+    "group, method, timing, stop, goals_per_stop, tasks, nearer[], less[], first[], turn[], apart",
+    timing=Column("times"),
+    goals_per_stop=Column("goals a stop"),
+    nearer=Column("posture leaves the next goal nearer (ticks)", 1),
+    less=Column("less near than when passing (ticks)", 1),
+    turn=Column("turn of the path at goals (rad)", 2),
+    apart=Column("postures at goal 1 apart", 2),
+)
+def stops(study: Study) -> Rows:
+    """What of coarticulation is left where a smooth plan stops at goals: means over tasks."""
+    keys = ["group", "method", "timing", "stop", "goals_per_stop"]
+    frame = stop_values(study)
+    for at, rows in frame.groupby(keys, sort=False, dropna=False) if len(frame) else ():
+        row: Row = {**dict(zip(keys, at, strict=True)), "tasks": len(rows)}
+        for name in ("nearer", "first", "turn"):
+            row |= mean_of(name, rows[name])
+        by_task = rows.set_index("task")
+        if row["stop"] > 0:
+            passing = frame[(frame[keys[:3]] == list(at[:3])).all(axis=1) & (frame.stop == 0)]
+            row |= mean_of("less", passing.set_index("task").nearer - by_task.nearer)
+        if set(SHARED) <= set(by_task.index):
+            first, second = (by_task.posture[name] for name in SHARED)
+            row["apart"] = float(np.linalg.norm(first - second))
+        stop = "" if math.isnan(row["stop"]) else f" stop={row['stop']:g}"
+        every = f" every {row['goals_per_stop']}" if row["goals_per_stop"] > 1 else ""
+        name = f"{row['group']} {row['method']} {row['timing']}".strip() + stop + every
+        yield name, row | runs_of(*rows.cell)
+
+
+def mean_of(name: str, values: pd.Series) -> Row:
+    """The mean over tasks that have a value, with its interval, as columns of a table."""
+    there = values.dropna().to_numpy(dtype=np.float64)
+    return interval(name, mean(there)) if len(there) else {}

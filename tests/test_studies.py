@@ -1,0 +1,226 @@
+"""Our own studies, how far ahead and stops: planted results, and small versions of both suites."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import load_task
+from coartic.analysis import tables
+from coartic.analysis.claims import studies
+from coartic.analysis.claims.judge import judged
+from coartic.analysis.claims.studies import HORIZONS, gaps_by_horizon
+from coartic.analysis.report import build, facts
+from coartic.analysis.report.text import sentence
+from coartic.analysis.signatures.signs import Sign
+from coartic.analysis.tables.studies import between, same_horizon
+from coartic.motion.costs import joint_costs
+from tests.support.made_up import MadeUp, row, study_of
+from tests.support.suites import run_and_write, suite_of
+
+HORIZON, STOPS = tables.TABLES["horizon"], tables.TABLES["stops"]
+BEST = 100_000  # ticks: rounding of a reward is then a thousandth of a per cent
+FALLING = (30.0, 8.0, 2.0, 1.0, 0.5, 0.0)  # per cent by horizon
+CLAIMS = {
+    "first": "first-goal-ahead-gains-most",
+    "further": "further-goals-gain-little",
+    "posture": "most-of-the-loss-is-posture",
+    "dear": "dear-joints-keep-the-horizon",
+    "learner": "learner-behind-one-goal-ahead",
+}
+
+
+@cache
+def tasks_of(stream):
+    return [load_task(f"long/v1/{stream}{k:03d}") for k in range(8)]
+
+
+def planted(*, stream="i", plain=FALLING, given=FALLING, dear=FALLING, learner=20.0):
+    """A study in which gaps are planted: of eight tasks, a little different on each."""
+    rows, trajectories, tasks = [], {}, tasks_of(stream)
+    for number, task in enumerate(tasks):
+        factor, last = 0.8 + 0.4 * number / 7, len(task.goals) - 1
+
+        def add(method, variant, reward, name=task.name, **parameters):
+            words = {"task": name, "variant": variant, "parameters": json.dumps(parameters)}
+            rows.append(row(method, reward, run_id=f"{name} {method} {variant}", **words))
+
+        curves = {("planned", "none"): plain, ("optimal", "none"): given}
+        curves |= {("planned", costs): dear for costs in studies.DEAR}
+        for (hands, costs), curve in curves.items():
+            for h, gap in zip((0, 1, 2, 3, 4, last), curve, strict=True):
+                variant = f"hands={hands}, costs={costs}, horizon={h}"
+                ticks = BEST * (1 + factor * gap / 100)
+                add("receding-horizon", variant, -round(ticks), horizon=h, hands=hands,
+                    costs=costs, cost_factor=3.0)  # fmt: skip
+                # One straight movement of the first link of the dear part: so long by its cost.
+                if costs != "none":
+                    step = np.zeros((2, task.robot.dof))
+                    dearest = int(np.argmax(joint_costs(task.robot, costs, 3.0)))
+                    step[1, dearest] = ticks / 3
+                    runs = (SimpleNamespace(configurations=step),)
+                    trajectories[task.name, f"receding-horizon {variant}"] = SimpleNamespace(
+                        runs=runs
+                    )
+        add("dual-process/EC4", "", -round(BEST * (1 + factor * learner / 100)))
+    frame = pd.DataFrame(rows)
+    return MadeUp(study_of(frame, tasks, suite="horizon"), _trajectories=trajectories)
+
+
+def verdicts(study):
+    entries = judged(study)
+    assert {entry.claim.suite for entry in entries} == {study.suite}
+    return {entry.claim.id: entry.verdict for entry in entries}
+
+
+def test_gaps_are_those_that_were_planted():
+    gaps = gaps_by_horizon(planted(given=(20.0, *FALLING[1:])))
+    assert tuple(gaps.columns) == HORIZONS
+    means = gaps.groupby(["hands", "costs"]).mean()
+    for (hands, _), curve in means.iterrows():
+        expected = (20.0 if hands == "optimal" else 30.0, *FALLING[1:])
+        assert curve.to_numpy() == pytest.approx(expected, abs=0.01)
+    assert len(means) == 4
+
+
+def test_claims_hold_where_they_were_planted():
+    assert set(verdicts(planted()).values()) == {"supported"}
+
+
+@pytest.mark.parametrize(
+    ("claim", "other"),
+    [
+        ("first", {"plain": (30.0, 16.0, 8.0, 1.0, 0.5, 0.0)}),
+        ("further", {"plain": (30.0, 8.0, 7.5, 1.0, 0.5, 0.0)}),  # the second gains half a per cent
+        ("further", {"plain": (30.0, 8.0, 5.0, 4.5, 1.0, 0.0)}),  # the fourth three and a half
+        ("posture", {"given": (10.0, *FALLING[1:])}),
+        ("dear", {"dear": (30.0, 2.5, 2.0, 1.0, 0.5, 0.0)}),
+        ("dear", {"dear": (30.0, 20.0, 15.0, 10.0, 5.0, 0.0)}),  # 5 % beyond the fourth
+        ("learner", {"learner": 8.5}),  # half a per cent is less than the margin
+    ],
+)
+def test_a_claim_fails_alone_where_its_contrary_was_planted(claim, other):
+    result = verdicts(planted(**other))
+    assert result.pop(CLAIMS[claim]) == "not supported"
+    assert set(result.values()) == {"supported"}
+
+
+def test_without_a_difference_nothing_is_decided():
+    """Gaps that are high on one task and low on another by chance."""
+    tasks = tasks_of("i")
+    noisy = np.random.default_rng(1).permutation(np.repeat([5.0, 25.0], len(tasks) // 2))
+    study = planted()
+    ours = study.runs.method == "dual-process/EC4"
+    study.runs.loc[ours, "reward"] = (-BEST * (1 + noisy / 100)).round().astype(int)
+    assert verdicts(study)[CLAIMS["learner"]] == "undecided"
+
+
+def test_development_instances_are_not_judged():
+    assert set(verdicts(planted(stream="d")).values()) == {"undecided"}
+
+
+def test_the_table_of_horizons_has_means_and_gains():
+    study = planted(given=(20.0, *FALLING[1:]))
+    table = HORIZON(study)
+    assert 100 * table.gap["all all h=0"] == pytest.approx(30, abs=0.01)
+    assert 100 * table.gain["all all h=1"] == pytest.approx(22, abs=0.01)
+    assert 100 * table.gap["hands given h=0"] == pytest.approx(20, abs=0.01)
+    low, high = table.gap_low["all all h=0"], table.gap_high["all all h=0"]
+    assert 0.24 < low < 0.3 < high < 0.36  # 24 % to 36 % are the tasks' own
+    by_goals = table[(table.group == "goals") & (table.h == "0")]
+    assert by_goals.tasks.sum() == len(tasks_of("i"))
+    beside = tables.TABLES["horizon-beside"](study).loc["learner two"]
+    assert beside.horizon == pytest.approx(10 / 22, abs=0.01)  # 20 % is between 30 % and 8 %
+    assert beside.lies == "0 to 1"
+
+
+@pytest.mark.parametrize(
+    ("gap", "at", "words"),
+    [(25, 0, "less than 0"), (20, 0, "0 to 1"), (13, 0.5, "0 to 1"), (4, 1.5, "1 to 2"),
+     (1.5, 3.5, "3 to 4"), (0.5, 4, "4 or more")],
+)  # fmt: skip
+def test_the_horizon_of_a_gap(gap, at, words):
+    curve = np.array([20.0, 6.0, 2.0, 2.5, 1.0])  # a rise is no loss of what was reached before
+    assert same_horizon(curve, gap) == pytest.approx(at)
+    assert between(curve, gap) == words
+
+
+@pytest.mark.parametrize(
+    ("passing", "stopping", "expected"),
+    [
+        (50.0, 30.0, ["supported", "supported"]),
+        (50.0, 0.5, ["not supported", "supported"]),
+        (30.0, 50.0, ["supported", "not supported"]),
+    ],
+)
+def test_claims_on_stops(passing, stopping, expected, monkeypatch):
+    """Ticks that are planted in the place of solutions."""
+    rows, values, tasks = [], {}, tasks_of("i")
+    for number, task in enumerate(tasks):
+        for timing in ("free", "fixed"):
+            for stop, ticks in ((0, passing), (1, stopping)):
+                variant = f"timing={timing}, stop={stop}"
+                parameters = json.dumps({"timing": timing, "stop": stop, "stop_every": 1})
+                words = {"variant": variant, "parameters": parameters, "task": task.name}
+                rows.append(row(studies.STOPPING, -500, run_id=f"{task.name} {variant}", **words))
+                values[task.name, f"{studies.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
+    monkeypatch.setattr(studies, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
+    study = study_of(pd.DataFrame(rows), tasks, suite="stops")
+    assert list(verdicts(MadeUp(study, _trajectories=values)).values()) == expected
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Both suites with little search: three tasks with one arm, and one of the paper's."""
+    folder = tmp_path_factory.mktemp("studies")
+    quick = "nodes = 60, graphs = 1, chains = 4"
+    tasks = 'tasks = ["one-armed/v1/d001..d003"]'
+    planner = f"""{tasks}
+methods = ["receding-horizon"]
+parameters = {{ {quick} }}
+grid = {{ horizon = [0, 1, 2] }}
+"""
+    beside = f'{tasks}\ngoals = [2, 3]\nmethods = ["dual-process/EC1"]\nruns = 3\n'
+    smooth = f"""{tasks.replace("]", ', "ascending", "descending"]')}
+methods = ["trajectory-optimisation/jerk"]
+parameters = {{ {quick}, noisy_starts = 1 }}
+grid = {{ timing = ["free", "fixed"], stop = [0, 1] }}
+"""
+    studies_of = {}
+    for suite, blocks in (("horizon", (planner, beside)), ("stops", (smooth,))):
+        study = run_and_write(folder / suite, suite_of(folder, *blocks), runs=1)
+        object.__setattr__(study, "plan", replace(study.plan, suite=suite))
+        studies_of[suite] = study
+    return studies_of
+
+
+def test_a_small_study_of_horizons(small):
+    study = small["horizon"]
+    assert (study.runs.status == "ok").all()
+    planned = study.runs[study.runs.method == "receding-horizon"]
+    horizons = planned.parameters.map(lambda text: json.loads(text)["horizon"])
+    ticks = -planned.assign(h=horizons).pivot_table(index="task", columns="h", values="reward")
+    best = -study.runs.groupby("task").reward.max()
+    for h in (0, 1, 2):
+        mean = (ticks[h] / best - 1).mean()
+        assert HORIZON(study).gap[f"all all h={h}"] == pytest.approx(mean)
+    signs = tables.TABLES["horizon-signs"](study)
+    assert signs["mean"]["whole h=all"] > signs["mean"]["whole h=0"]
+    assert build.drawn(study, "horizon")
+    assert "looks no goal ahead ends" in sentence("horizon", facts.horizon(study))
+
+
+def test_a_small_study_of_stops(small):
+    study = small["stops"]
+    table = STOPS(study)
+    for group in ("random, one arm", "ascending, descending"):
+        for timing in ("free", "fixed"):
+            of = table[(table.group == group) & (table.timing == timing)].set_index("stop")
+            assert of.turn[0] < of.turn[1] / 3  # passing is smooth, a stop leaves a corner
+    assert table.apart.dropna().gt(0.1).all()  # postures depend on the next goal at any stop
+    assert build.drawn(study, "stops")
+    assert sentence("stops", facts.stops(study)).startswith("At free times")
