@@ -10,7 +10,7 @@ FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations locus optimum)
-STORED := comparison ablations locus families
+STORED := comparison ablations locus families horizon stops objectives
 
 .PHONY: benchmark test check format docs findings speed setup clean
 
@@ -45,7 +45,7 @@ docs: $(VENV)/.docs
 speed: $(READY)
 	$(BIN)/python -m coartic.benchmarks.speed
 
-# The suites behind docs/findings.md, their reports, and the pages made from them: half an hour.
+# The suites behind docs/findings.md, their reports, and the pages made from them: two hours.
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \

@@ -6,14 +6,15 @@ The works are the entries of ``references.bib``, which are printed as they stand
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 from coartic import CoarticError, __version__
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.words import slugs
+from coartic.runs.plan import BUILT_IN, DeclaredMethod
 from coartic.text import did_you_mean, one_line
 
 PAPER = "shah2013"
@@ -30,16 +31,6 @@ SPECIAL = {
     **{sign: f"\\{sign}" for sign in "%&#_$"},
 }
 """Signs that TeX reads otherwise, and how they are written."""
-
-
-class MethodSource(NamedTuple):
-    """A method as a results folder or the registry declares it."""
-
-    id: str
-    title: str
-    citation: str
-    """Empty where it is not known."""
-    built_in: bool
 
 
 @cache
@@ -79,7 +70,7 @@ def behind_analysis() -> tuple[str, ...]:
 
 
 def bibliography(
-    methods: Sequence[MethodSource],
+    methods: Mapping[str, DeclaredMethod],
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
@@ -95,34 +86,33 @@ def bibliography(
     works = {**references(), "coartic": software(environment)}
     reasons: dict[str, list[str]] = {"coartic": ["the software"], PAPER: ["the paper"]}
     others = []
-    for method in methods:
-        row = KNOWN_METHODS.get(method.id) if method.built_in else None
+    for name, method in methods.items():
+        row = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None
         if row is None:
-            others.append(method)
+            others.append(name)
             continue
         for key in (*row.works, *row.solvers):
             if key not in works:
                 hint = did_you_mean(key, works) or "; add it"
-                raise CoarticError(
-                    f"{method.id} in methods.toml: no {key!r} in references.bib{hint}"
-                )
-            reasons.setdefault(key, []).append(method.id)
+                raise CoarticError(f"{name} in methods.toml: no {key!r} in references.bib{hint}")
+            reasons.setdefault(key, []).append(name)
     for key in behind_analysis() if analysis else ():
         reasons.setdefault(key, []).append("the analysis")
     entries = [f"{comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
-    slug = slugs(method.id for method in others)
-    entries += [declared_entry(method, f"method-{slug[method.id]}") for method in others]
+    slug = slugs(others)
+    entries += [declared_entry(name, methods[name], f"method-{slug[name]}") for name in others]
     return "\n\n".join(entries) + "\n"
 
 
-def declared_entry(method: MethodSource, key: str) -> str:
+def declared_entry(name: str, method: DeclaredMethod, key: str) -> str:
     """A method with no more than what it declares, in BibTeX."""
     citation = " ".join(method.citation.split())
     if not citation:
-        return comment(f"{method.id}: it declares no citation; ask its authors what to cite")
-    whose = "built in, without a row in methods.toml" if method.built_in else "a method of others"
-    title = escaped(" ".join(method.title.split()) or method.id)
-    words = comment(f"{method.id}, {whose}, cites: {citation}")
+        return comment(f"{name}: it declares no citation; ask its authors what to cite")
+    ours = method.origin == BUILT_IN
+    whose = "built in, without a row in methods.toml" if ours else "a method of others"
+    title = escaped(" ".join(method.title.split()) or name)
+    words = comment(f"{name}, {whose}, cites: {citation}")
     return f"{words}\n{misc(key, title=title, note=escaped(citation))}"
 
 

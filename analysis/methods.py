@@ -9,10 +9,11 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import TypeAdapter
 
 from coartic import Task
 from coartic.analysis.words import read_beside
+from coartic.inputs import FileData
 from coartic.learner import conditions
 from coartic.learner.learning import METHOD_PREFIX
 from coartic.runs.plan import SEARCH
@@ -32,17 +33,15 @@ Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey"
 Dash = Literal["solid", "dashed", "dotted", "dash-dotted"]
 
 
-class KnownMethod(BaseModel):
+class KnownMethod(FileData):
     """A built-in method's row."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     """Its one name, in figures, tables and sentences."""
     algorithm: str
     """What it is a form of; a ranking counts algorithms."""
-    look: tuple[Color, Dash, str] | None = None
-    """Colour, dash and matplotlib's marker in all figures; None: one that is free."""
+    look: tuple[Color, Dash] | None = None
+    """Colour and dash in all figures; None: one that is free."""
     headline: bool = False
     """Whether it stands for its algorithm where no methods are named."""
     works: tuple[str, ...]

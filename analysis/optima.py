@@ -11,14 +11,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict
 
 from coartic import PAPER, MotionModel, Task
+from coartic.inputs import FileData
 from coartic.runs.plan import SEARCH
 
 BASE = "task"
@@ -26,16 +26,13 @@ BASE = "task"
 DATA = Path(__file__).with_name("optima.json")
 
 OtherArm = Literal["free", "still"]
-ARMS: tuple[OtherArm, ...] = ("free", "still")
 """Whether the arm that is not chosen may move, or is kept still."""
 KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
 
 
-class ShippedOptimum(BaseModel):
+class ShippedOptimum(FileData):
     """What is shipped of one task under one restriction: a reward, or why there is none."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     task: str
     essence: str
@@ -49,7 +46,7 @@ class ShippedOptimum(BaseModel):
     hands: str = ""
     bound: int | None = None
     """Reward that no solution exceeds; None where nothing is proven."""
-    searches: dict[str, int] = {}
+    searches: Mapping[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
     """Movements as :func:`coartic.learner.rows.movements_from` reads them, in full precision."""
@@ -64,7 +61,7 @@ class ShippedOptimum(BaseModel):
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """The best reward known for one task under one restriction."""
+    """The best reward known for one task."""
 
     reward: int
     bound: int | None
@@ -78,35 +75,35 @@ class KnownOptimum:
 
 def known_optima(
     runs: pd.DataFrame, tasks: Mapping[str, Task], model: MotionModel
-) -> dict[tuple[str, str], KnownOptimum]:
-    """Optimum by task and other arm (``"free"``, ``"still"``) for the tasks of a folder.
+) -> dict[str, KnownOptimum]:
+    """Optimum with all joints free by task, for the tasks of a folder.
 
     What the shipped data say where task and model are the same in all that matters, bettered by
     what the folder's own searches found. Searches of an instance of a family are short, and any
     run of the folder may better them.
     """
-    optima: dict[tuple[str, str], KnownOptimum] = {}
-    shipped = {(entry.essence, entry.other_arm): entry for entry in entries() if entry.base == BASE}
+    optima: dict[str, KnownOptimum] = {}
+    free = [entry for entry in entries() if (entry.base, entry.other_arm) == (BASE, "free")]
+    shipped = {entry.essence: entry for entry in free}
     solved = runs[runs.status == "ok"]
     asked = restrictions(solved)
     solved = solved[asked.base == BASE]
     searches = solved[solved.method.str.startswith(SEARCH)]
+    searches = searches[asked.other_arm[searches.index] == "free"]
     for name, task in tasks.items():
-        for arm in ARMS:
-            of_task = searches[(searches.task == name) & (asked.other_arm[searches.index] == arm)]
-            candidates = [from_runs(of_task)] if len(of_task) else []
-            entry = shipped.get((essence(task), arm)) if model == PAPER else None
-            if entry is not None and entry.reward is not None:
-                candidates.append(KnownOptimum(entry.reward, entry.bound))
-            if candidates:
-                bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
-                best = max(candidates, key=lambda optimum: optimum.reward)
-                optima[name, arm] = replace(best, bound=min(bounds, default=None))
+        of_task = searches[searches.task == name]
+        candidates = [from_runs(of_task)] if len(of_task) else []
+        entry = shipped.get(essence(task)) if model == PAPER else None
+        if entry is not None and entry.reward is not None:
+            candidates.append(KnownOptimum(entry.reward, entry.bound))
+        if not candidates:
+            continue
+        bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
+        reward = max(optimum.reward for optimum in candidates)
         of_task = solved[solved.task == name]
-        if task.family is not None and (name, "free") in optima and len(of_task):
-            optimum = optima[name, "free"]
-            reward = max(optimum.reward, from_runs(of_task).reward)
-            optima[name, "free"] = replace(optimum, reward=reward)
+        if task.family is not None and len(of_task):
+            reward = max(reward, from_runs(of_task).reward)
+        optima[name] = KnownOptimum(reward, min(bounds, default=None))
     return optima
 
 
@@ -127,7 +124,8 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 def essence(task: Task) -> str:
     """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
     content = task.model_dump(mode="json")
-    text = json.dumps({key: content[key] for key in ("goals", *KEPT)}, sort_keys=True)
+    keys = ("goals", *KEPT, *(["penalty"] if "penalty" in content else []))
+    text = json.dumps({key: content[key] for key in keys}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

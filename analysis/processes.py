@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
-import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from threading import Thread
 from typing import Any
 
 from coartic.learner.learning import threads_for
-from coartic.threads import one_thread_each
+from coartic.threads import begin_worker, one_thread_each
 
 
 @contextmanager
@@ -29,16 +26,3 @@ def processes(jobs: int, pieces: int) -> Iterator[Callable[..., Any]]:
         ProcessPoolExecutor(workers, mp_context=context, initializer=begin_worker) as pool,
     ):
         yield pool.map
-
-
-def begin_worker() -> None:
-    """A worker ends with the process that it works for, however that ends."""
-
-    def end_with_parent() -> None:
-        parent = multiprocessing.parent_process()
-        assert parent is not None
-        parent.join()
-        os._exit(1)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    Thread(target=end_with_parent, daemon=True).start()

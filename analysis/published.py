@@ -13,19 +13,19 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
+
+from coartic.inputs import FileData
 
 Hands = Annotated[str, Field(pattern="^[LR]+$")]
 Role = Literal["setting", "constraint", "test"]
 
 
-class Solved(BaseModel):
+class Solved(FileData):
     """Solutions of a task: all runs under a condition, or those with a hand sequence.
 
     Without a condition: what the corrective process alone does with the hands.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     condition: Literal["EC1", "EC2", "EC3", "EC4"] | None = None
     hands: Hands | None = None
@@ -200,32 +200,20 @@ class PublishedCell(NamedTuple):
     """By hand sequence, where they are told apart."""
 
 
-class CorrectiveSolution(NamedTuple):
-    """What the paper prints of a solution by the corrective process alone."""
-
-    hands: str
-    reward: float
-    derived: bool
-    """Whether the reward is computed from other printed numbers."""
-
-
-def published_initial(task: str) -> CorrectiveSolution | None:
-    """The initial solution of a task; None where the paper prints nothing of it."""
+def published_initial(task: str) -> Number | None:
+    """Reward of the initial solution of a task; None where the paper prints nothing of it."""
     return _corrective(task, "initial hands")
 
 
-def published_exhaustive(task: str) -> CorrectiveSolution | None:
+def published_exhaustive(task: str) -> Number | None:
     """The best over all hand sequences."""
     return _corrective(task, "best of all sequences")
 
 
-def _corrective(task: str, kind: str) -> CorrectiveSolution | None:
+def _corrective(task: str, kind: str) -> Number | None:
     for entry in ENTRIES.values():
         if (entry.kind, entry.task) == (kind, task):
-            reward = _number("reward", task, None, entry.hands)
-            assert entry.hands is not None
-            assert reward is not None
-            return CorrectiveSolution(entry.hands, reward.number, bool(reward.difference_of))
+            return _number("reward", task, None, entry.hands)
     return None
 
 

@@ -14,12 +14,13 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
-from coartic import MotionModel, NotApplicableError, Task, hand_sequences, parse_task
+from coartic import MotionModel, NotApplicableError, Task, hand_sequences, parse_task, trajectory
 from coartic.analysis.cells import CellKey, CellRuns
 from coartic.analysis.optima import KnownOptimum, known_optima
-from coartic.analysis.trajectories import Trajectories, trajectories_of
+from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.learner.rows import movements_from
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan
@@ -117,11 +118,6 @@ class Study:
         }
 
     @cached_property
-    def run_ids(self) -> dict[CellKey, tuple[str, ...]]:
-        """Ids of the runs of every cell."""
-        return {key: tuple(map(str, cell.runs.run_id)) for key, cell in self.cells.items()}
-
-    @cached_property
     def solutions(self) -> pd.DataFrame:
         """One row a movement of each run's solution."""
         return self._frame("solutions")
@@ -150,17 +146,15 @@ class Study:
         """
         key = task, label
         if key not in self._trajectories:
-            movements, waypoints = self.movements
-            solutions = {
-                run_id: (movements[run_id], waypoints.get(run_id))
-                for run_id in _executed_of(self.cells[key])
-            }
-            self._trajectories[key] = trajectories_of(
-                self.cells[key],
-                self.tasks[task],
-                self.model,
-                solutions,
-                partial(self.sequences, task),
+            (movements, waypoints), cell, of = self.movements, self.cells[key], self.tasks[task]
+            solutions = (
+                movements_from(of, movements[run_id], waypoints.get(run_id))
+                for run_id in _executed_of(cell)
+            )
+            runs = tuple(trajectory(of, solution, self.model) for solution in solutions)
+            alone = partial(self.sequences, task)
+            self._trajectories[key] = Trajectories(
+                of, cell.method, cell.variant, runs, alone, self.model
             )
         return self._trajectories[key]
 
@@ -169,8 +163,8 @@ class Study:
         return {}
 
     @cached_property
-    def optima(self) -> dict[tuple[str, str], KnownOptimum]:
-        """Best known reward by task and other arm (``"free"``, ``"still"``)."""
+    def optima(self) -> dict[str, KnownOptimum]:
+        """Best known reward by task, with all joints free."""
         return known_optima(self.runs, self.tasks, self.model)
 
     def _frame(self, view: str) -> pd.DataFrame:

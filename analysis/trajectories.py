@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,11 +21,8 @@ from coartic import (
     Trajectory,
     corrective_trial,
     initial_hands,
-    trajectory,
 )
-from coartic.analysis.cells import CellRuns
 from coartic.errors import NotApplicableError
-from coartic.learner.rows import movements_from
 from coartic.robot import Array
 
 
@@ -131,17 +128,3 @@ def best_sequences(sequences: pd.DataFrame) -> list[str]:
     """
     solved = sequences[sequences.reward.notna()]
     return [str(hands) for hands in solved.hands[solved.reward == solved.reward.max()]]
-
-
-def trajectories_of(
-    cell: CellRuns,
-    task: Task,
-    model: MotionModel,
-    solutions: Mapping[str, tuple[pd.DataFrame, pd.DataFrame | None]],
-    alone: Callable[[], pd.DataFrame],
-) -> Trajectories:
-    """Solved runs of a cell, executed; ``solutions`` has the movements and waypoints of each."""
-    runs = tuple(
-        trajectory(task, movements_from(task, *solution), model) for solution in solutions.values()
-    )
-    return Trajectories(task, cell.method, cell.variant, runs, alone, model)

@@ -7,8 +7,7 @@ short of it no more than that, the one nearest to the preferred: ``min |x - z|^2
 
 Inequality tasks in lexicographic quadratic programs: O. Kanoun, F. Lamiraux, P.-B. Wieber
 (2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
-to inequality tasks, IEEE Transactions on Robotics. With one row and no limit the answer is
-:func:`damped_projection`, which the tests check.
+to inequality tasks, IEEE Transactions on Robotics.
 """
 
 from __future__ import annotations
@@ -76,13 +75,8 @@ class Program(NamedTuple):
         self.upper[:task] = -least
 
 
-class Solved(NamedTuple):
-    """What a solver says."""
-
-    optimal: bool
-    status: str
-    variables: Array
-    iterations: int
+Solved = tuple[Array, int, str]
+"""What a solver says: variables, iterations, and why they are no optimum; empty where they are."""
 
 
 class Cascade:
@@ -114,14 +108,14 @@ class Cascade:
     def solve_level(self, level: Literal[1, 2], program: Program) -> Array:
         """The variables of a level. Raises CascadeError where the solver fails."""
         try:
-            solved = _SOLVERS[self.solver](program, SETTINGS[self.solver])
+            x, iterations, failure = _SOLVERS[self.solver](program, SETTINGS[self.solver])
         except ValueError as error:  # of what is no number
             raise CascadeError(f"level {level}: {self.solver} failed: {error}") from None
         self.solves += 1
-        self.iterations += solved.iterations
-        if not solved.optimal:
-            raise CascadeError(f"level {level}: {self.solver} ended {solved.status}")
-        return np.array(solved.variables, dtype=np.float64)
+        self.iterations += iterations
+        if failure:
+            raise CascadeError(f"level {level}: {self.solver} ended {failure}")
+        return np.array(x, dtype=np.float64)
 
 
 def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
@@ -139,7 +133,7 @@ def solve_by_daqp(program: Program, settings: dict[str, Any]) -> Solved:
         np.zeros(len(free) + len(upper), dtype=np.intc),
         **settings,
     )
-    return Solved(flag == 1, f"with exit flag {flag}", x, info["iterations"])
+    return x, info["iterations"], "" if flag == 1 else f"with exit flag {flag}"
 
 
 def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
@@ -159,26 +153,10 @@ def solve_by_clarabel(program: Program, settings: dict[str, Any]) -> Solved:
         chosen,
     ).solve()
     status = str(solution.status)
-    return Solved(status == "Solved", status, np.array(solution.x), solution.iterations)
+    return np.array(solution.x), solution.iterations, "" if status == "Solved" else status
 
 
 _SOLVERS: dict[SolverName, Callable[[Program, dict[str, Any]], Solved]] = {
     "clarabel": solve_by_clarabel,
     "daqp": solve_by_daqp,
 }
-
-
-def damped_projection(
-    row: Array, least: float, preferred: Array, damping: float = DAMPING
-) -> Array:
-    """What the cascade gives for a task of one row where no limit is active, in closed form.
-
-    ``z + a (b - a.z)_+ / |a|^2``, with ``a`` the row and ``b`` what the damping leaves of a
-    demand, ``least |a|^2 / (|a|^2 + λ^2)`` if that is positive; shapes ``(joints,)``. Sources:
-    Liegeois (1977) for the projection, Nakamura & Hanafusa (1986) for the damping.
-    """
-    square = float(row @ row)
-    left = least * square / (square + damping**2) if least > 0 else least
-    missing = max(0.0, left - float(row @ preferred))
-    rates: Array = preferred + row * (missing / square if missing else 0.0)
-    return rates

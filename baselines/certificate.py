@@ -57,8 +57,6 @@ class Certificate:
     """Cone programmes solved."""
     open_nodes: int
     """Of them, those that were neither split nor bounded when the search ended."""
-    root_length: float
-    """Bound on the path before any split, length unit and rad."""
     iterations: int
     """Iterations of the conic solver."""
 
@@ -143,7 +141,6 @@ def certify(
     """
     search = ProofSearch(task, ticks, still, model.step)
     search.begin()
-    root_length = search.heap[0].length if search.heap else search.longest(0)
     least = 0
     if too_many_sequences(task, len(task.hands)) is None:
         sequences = itertools.product(task.hands, repeat=len(task.goals))
@@ -156,7 +153,6 @@ def certify(
         proven=least >= ticks,
         nodes=search.solved,
         open_nodes=len(search.heap),
-        root_length=root_length,
         iterations=search.iterations,
     )
 

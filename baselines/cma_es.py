@@ -22,7 +22,6 @@ instead of the targets (Lamarckian) cost 6 to 9 after 2000 trials, so it is not 
 
 from __future__ import annotations
 
-import itertools
 import math
 from abc import abstractmethod
 from functools import cache
@@ -34,7 +33,7 @@ from pydantic import Field
 from coartic.baselines.uninformed import Practice, UninformedParameters
 from coartic.method import Method, Result, Session
 from coartic.motion.initial import too_many_sequences
-from coartic.optimisers import TOLD
+from coartic.optimisers import TOLD, sequences_of
 from coartic.robot import Array
 from coartic.tasks.task import Task
 
@@ -125,7 +124,7 @@ class _OverSequences(Method):
         practice = Practice(session, self.parameters)
         with session.solving():
             strategies = []
-            for hands in _sequences(session)[: practice.left]:
+            for hands in sequences_of(session)[: practice.left]:
                 strategies.append(Strategy(session, practice, hands, self.parameters.sigma))
             promising = [s for s in strategies if s.reward > -math.inf]
             if promising:
@@ -186,13 +185,6 @@ class Every(_OverSequences):
             strategies = strategies[: math.ceil(len(strategies) / 2)]
         while practice.left > 0:
             strategies[0].generation()
-
-
-def _sequences(session: Session) -> list[str]:
-    """All hand sequences, the task's own first: a small budget may not reach the others."""
-    letters = sorted(hand[0].upper() for hand in session.hands)
-    sequences = ["".join(s) for s in itertools.product(letters, repeat=session.goals_count)]
-    return sorted(sequences, key=lambda hands: hands != session.initial_hands)
 
 
 METHODS: tuple[type[Method], ...] = (Bandit, Every)

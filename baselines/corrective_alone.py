@@ -8,20 +8,15 @@ from __future__ import annotations
 
 import itertools
 
-from coartic import Execution, Movement, Task
+from coartic import Execution, Task
 from coartic.method import Information, Method, MethodError, Result, Session
-from coartic.motion.initial import changes_of_hand, too_many_sequences
-from coartic.robot import Hand
-from coartic.tasks.task import hands_of
+from coartic.motion.initial import changes_of_hand, corrective_movements, too_many_sequences
+from coartic.tasks.task import letters_of
 
 CITATION = (
     "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
     "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg (2013)."
 )
-
-
-def _corrective(hands: tuple[Hand, ...]) -> tuple[Movement, ...]:
-    return tuple(Movement(number, hand, "corrective") for number, hand in enumerate(hands, 1))
 
 
 class GivenHands(Method):
@@ -35,9 +30,9 @@ class GivenHands(Method):
 
     def solve(self, session: Session) -> Result:
         """One trial, the targets found by **A** as it goes."""
-        hands = hands_of(session.find_initial_hands())
+        hands = session.find_initial_hands()
         with session.solving():
-            execution = session.trial(_corrective(hands))
+            execution = session.trial(corrective_movements(hands))
         if not execution.completed:
             raise MethodError("infeasible", execution.reason)
         return Result(execution.movements)
@@ -59,12 +54,13 @@ class EverySequence(Method):
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""
         completed: list[tuple[int, int, Execution]] = []
-        ordered: list[Hand] = sorted(session.hands)
-        for hands in itertools.product(ordered, repeat=session.goals_count):
+        for hands in itertools.product(
+            letters_of(sorted(session.hands)), repeat=session.goals_count
+        ):
             if session.trials_left == 0:
                 break
             with session.solving():
-                execution = session.trial(_corrective(hands))
+                execution = session.trial(corrective_movements("".join(hands)))
             if execution.reward is not None:
                 changes = changes_of_hand(execution.hands)
                 completed.append((-execution.reward, changes, execution))

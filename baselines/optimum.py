@@ -19,10 +19,9 @@ from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
+from coartic.baselines.posture_graph import Start, cheapest_chains
 from coartic.baselines.shortest_paths import (
     TOLD,
-    Start,
-    chain_starts,
     check_ticks,
     fewest_ticks,
     shortest_plans,
@@ -137,7 +136,7 @@ class DynamicProgramming(Optimum):
     def starts(self, session: Session, task: Task) -> Iterator[Start]:
         """The chain of every sequence; with a free other arm also with that arm spread out."""
         parameters: GraphParameters = self.parameters
-        return chain_starts(
+        return cheapest_chains(
             session,
             task,
             np.random.default_rng(parameters.sampling_seed),

@@ -139,7 +139,7 @@ class PostureBased(Method):
         chains = cheapest_chains(
             session, task, session.rng, nodes=_BEAM_POSTURES, graphs=1, chains=1, most=most
         )
-        return [chain.hands for chain in chains]
+        return [hands for hands, _ in chains]
 
 
 class OneGoal(PostureBased):
@@ -228,14 +228,9 @@ class Search(NamedTuple):
     """Shape ``(rounds, batch, goals, dof)``."""
 
 
-class PostureChain(NamedTuple):
-    """Postures for successive goals."""
-
-    hands: Hands
-    postures: Array
-    """Shape ``(goals, dof)``."""
-    cost: float
-    """Joint-space distance through all of them."""
+PostureChain = tuple[float, Hands, Array]
+"""Postures for successive goals ``(goals, dof)`` after what they cost, the joint-space distance
+through all of them, and their hands."""
 
 
 class Planner:
@@ -306,7 +301,7 @@ class Planner:
                 self.generate([search for choices in searches for search in choices], ahead)
             )
             for plan, choices in zip(plans, filter(None, searches), strict=True):
-                chain = min(itertools.islice(chains, len(choices)), key=lambda chain: chain.cost)
+                chain = min(itertools.islice(chains, len(choices)), key=lambda chain: chain[0])
                 self.adopt(plan, chain)
         return plans
 
@@ -367,9 +362,9 @@ class Planner:
 
     def adopt(self, plan: GrowingPlan, chain: PostureChain) -> None:
         """Make the first movement of a chain, and store its postures."""
-        goal = len(plan.movements)
-        hand, target = chain.hands[0], chain.postures[0]
-        plan.store = np.vstack([plan.store, chain.postures])
+        goal, (_, hands, postures) = len(plan.movements), chain
+        hand, target = hands[0], postures[0]
+        plan.store = np.vstack([plan.store, postures])
         plan.movements.append(Movement(goal + 1, hand, "planned", target))
         plan.q, spent = self.simulate(plan.q, target, hand, goal)
         plan.ticks.append(spent)
@@ -416,7 +411,7 @@ class Planner:
                 if lengths[k, better[0]] < costs[k]:
                     best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
         return [
-            PostureChain(search.hands, postures_of_search, cost)
+            (cost, search.hands, postures_of_search)
             for search, postures_of_search, cost in zip(searches, best, costs.tolist(), strict=True)
         ]
 

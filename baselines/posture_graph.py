@@ -10,6 +10,7 @@ It is the global part of a search whose local part is :mod:`coartic.baselines.tr
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -17,20 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import MethodError, Session
+from coartic.model import PAPER
+from coartic.motion.penalty import disc_centre
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
-from coartic.tasks.task import Task
+from coartic.tasks.task import Penalty, Task
 
+Hands = tuple[Hand, ...]
+Start = tuple[Hands, Array]
+"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
-
-
-@dataclass
-class Spent:
-    """Kinematics evaluated while sampling."""
-
-    forward_kinematics: int = 0
-    jacobians: int = 0
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Chain:
 
 
 def sample_postures(
-    task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Spent
+    task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
     """Configurations with ``hand`` in the disc of goal ``goal`` (0-based), ``(n, dof)``.
 
@@ -67,18 +65,18 @@ def sample_postures(
     miss = aim - robot.forward_kinematics(q, hand)
     far = np.maximum(1.0 - _NEAR / np.maximum(np.hypot(*miss.T), _NEAR), 0.0)
     q[:, :BASE_DOF] += far[:, None] * miss * moving[:BASE_DOF]
-    spent.forward_kinematics += count
+    spent["forward_kinematics"] += count
     for _ in range(_PROJECTIONS):
         position, jacobian = robot.linearised(q, hand)
         miss, jacobian = aim - position, jacobian * moving
-        spent.forward_kinematics += count
-        spent.jacobians += count
+        spent["forward_kinematics"] += count
+        spent["jacobians"] += count
         square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-6 * np.eye(2)
         step = (jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, miss[..., None]))[..., 0]
         length = np.linalg.norm(step, axis=1, keepdims=True)
         q = q + step * np.minimum(1.0, 0.5 / np.maximum(length, 1e-12))
     miss = task.goal_array[goal] - robot.forward_kinematics(q, hand)
-    spent.forward_kinematics += count
+    spent["forward_kinematics"] += count
     return np.asarray(q[np.hypot(*miss.T) <= task.radius])
 
 
@@ -102,13 +100,21 @@ class PostureGraph:
     task: Task
     layers: dict[tuple[int, Hand], Array]
     """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
-    spent: Spent = field(default_factory=Spent)
+    spent: Counter[str] = field(default_factory=Counter)
+    """Kinematics evaluated while sampling."""
     costs: Array | float = 1.0
     """What the movement of each joint costs, shape ``(dof,)``, or of all of them."""
+    penalty: Penalty | None = None
+    """What goals cost beside the length of the path."""
 
     @classmethod
     def sampled(
-        cls, task: Task, count: int, rng: np.random.Generator, costs: Array | float = 1.0
+        cls,
+        task: Task,
+        count: int,
+        rng: np.random.Generator,
+        costs: Array | float = 1.0,
+        penalty: Penalty | None = None,
     ) -> PostureGraph:
         """A graph with at most ``count`` nodes per goal and hand.
 
@@ -116,7 +122,7 @@ class PostureGraph:
         40 one-armed random tasks the best path known was then found more often on 23, less
         often on 11.
         """
-        spent = Spent()
+        spent: Counter[str] = Counter()
         layers: dict[tuple[int, Hand], Array] = {}
         before = np.empty((0, task.robot.dof))
         for goal in range(len(task.goals)):
@@ -127,7 +133,7 @@ class PostureGraph:
                     starts[half] = before[rng.integers(len(before), size=count // 2)]
                 layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
-        return cls(task, layers, spent, costs)
+        return cls(task, layers, spent, costs, penalty)
 
     def chains(
         self, only: tuple[Hand, ...] | None = None, most: int | None = None
@@ -184,9 +190,10 @@ class PostureGraph:
             base = squared_distances(nodes[last] * self.costs, weighted, slice(0, BASE_DOF))
             joints = self.task.robot.joints(hand)
             arm = squared_distances(nodes[hand] * self.costs, weighted, joints)
+            by_base, by_arm = self.penalties(goal, hand, nodes[last], nodes[hand])
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
-                step = np.sqrt(base + arm)
+                step = np.sqrt(base + arm) + (by_base + by_arm)
                 came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for j in range(cost.shape[1]):
@@ -197,8 +204,32 @@ class PostureGraph:
                 reached = np.empty(came.shape)
                 for i in range(cost.shape[0]):
                     total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
+                    total += by_base[i] + by_arm
                     came[:, i], reached[:, i] = least_of_columns(total)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
+
+    def penalties(self, goal: int, hand: Hand, bases: Array, arms: Array) -> tuple[Array, Array]:
+        """What hitting a goal (0-based) in each of its nodes costs beside the way, as a length.
+
+        In two parts, by the node that the base comes from and by the one that the arm comes from,
+        with what the posture alone costs: shape ``(before, after)`` each.
+        """
+        layer, robot, penalty = self.layers[goal, hand], self.task.robot, self.penalty
+        by_base, by_arm = np.zeros((len(bases), len(layer))), np.zeros((len(arms), len(layer)))
+        if penalty is None:
+            return by_base, by_arm
+        way = np.sqrt(squared_distances(arms, layer, robot.joints(hand)))
+        if penalty.costly == "base":
+            by_base += penalty.joints * np.sqrt(squared_distances(bases, layer, slice(0, BASE_DOF)))
+        elif penalty.costly in ("arms", f"{hand}-arm"):
+            by_arm += penalty.joints * way
+        elbows = robot.joint_positions(layer, hand)[:, 1:-1]
+        centre = disc_centre(self.task.goals, penalty)
+        far = np.linalg.norm(elbows - centre, axis=-1).min(axis=1, initial=np.inf)
+        by_arm += penalty.region * np.maximum(1.0 - far / penalty.radius, 0.0)
+        if goal > 0:
+            by_arm += penalty.distinct * np.maximum(1.0 - way / penalty.apart, 0.0)
+        return by_base * PAPER.step, by_arm * PAPER.step
 
     def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
@@ -228,26 +259,31 @@ def cheapest_chains(
     graphs: int,
     chains: int,
     most: int,
-    only: tuple[Hand, ...] | None = None,
+    spread: bool = False,
+    only: Hands | None = None,
     costs: Array | float = 1.0,
-) -> Iterator[Chain]:
+    penalty: Penalty | None = None,
+) -> Iterator[Start]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
-    :meth:`PostureGraph.chains`, ``costs`` of joints as in :class:`PostureGraph`. The session
-    spends what it takes.
+    :meth:`PostureGraph.chains`, ``costs`` of joints and ``penalty`` as in
+    :class:`PostureGraph`. The session spends what it takes.
 
-    Raises MethodError where a goal has no posture.
+    With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
+    MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sampled(task, nodes, rng, costs)
-        session.spend(**vars(graph.spent))
+        graph = PostureGraph.sampled(task, nodes, rng, costs, penalty)
+        session.spend(**graph.spent)
         missing = graph.why_none(only)
         if missing:
             raise MethodError("infeasible", missing)
         for chain in graph.chains(only, most):
             yielded += 1
-            yield chain
+            yield chain.hands, chain.configurations
+            if spread and len(task.hands) > 1:
+                yield chain.hands, spread_out(task, chain)
         if number >= graphs and yielded >= chains:
             return
 

@@ -37,13 +37,11 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task, execute
+from coartic.baselines.posture_graph import Hands, Start, cheapest_chains
 from coartic.baselines.shortest_paths import (
     TOLD,
-    Hands,
     PlanInTicks,
     ShortestPlans,
-    Start,
-    chain_starts,
     check_ticks,
     fewest_ticks,
     shortest_plans,
@@ -172,7 +170,7 @@ class Planner:
 
     def shortest_starts(self, task: Task, only: Hands | None) -> list[Start]:
         """The starts that are polished."""
-        starts = chain_starts(
+        starts = cheapest_chains(
             self.session,
             task,
             self.rng,

@@ -8,17 +8,15 @@ turn comes because the other hand is already there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import NamedTuple
 
-import numpy as np
-
 from coartic import Execution, MotionModel, Movement, Task, execute
-from coartic.baselines.posture_graph import cheapest_chains, spread_out
+from coartic.baselines.posture_graph import Hands, Start
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
-from coartic.robot import Array, Hand
+from coartic.tasks.task import Penalty
 
 TOLD = frozenset(
     {
@@ -30,9 +28,6 @@ TOLD = frozenset(
     }
 )
 """What a method is told that starts from posture graphs and rounds to whole ticks."""
-Hands = tuple[Hand, ...]
-Start = tuple[Hands, Array]
-"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
 
 
 class ShortestPlans(NamedTuple):
@@ -65,32 +60,6 @@ def check_ticks(model: MotionModel) -> None:
                           "and a last step that ends at the target")  # fmt: skip
 
 
-def chain_starts(
-    session: Session,
-    task: Task,
-    rng: np.random.Generator,
-    *,
-    nodes: int,
-    graphs: int,
-    chains: int,
-    most: int,
-    spread: bool,
-    only: Hands | None = None,
-    costs: Array | float = 1.0,
-) -> Iterator[Start]:
-    """The chains of :func:`~coartic.baselines.posture_graph.cheapest_chains`.
-
-    With ``spread``, each of a robot with two hands also with its other arm spread out.
-    """
-    for chain in cheapest_chains(
-        session, task, rng,
-        nodes=nodes, graphs=graphs, chains=chains, most=most, only=only, costs=costs,
-    ):  # fmt: skip
-        yield chain.hands, chain.configurations
-        if spread and len(task.hands) > 1:
-            yield chain.hands, spread_out(task, chain)
-
-
 def shortest_plans(
     session: Session,
     task: Task,
@@ -99,17 +68,18 @@ def shortest_plans(
     *,
     still: bool,
     radius: float,
+    penalty: Penalty | None = None,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
-    solve finds a path.
+    Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
+    penalised problem. Raises MethodError where no solve finds a path.
     """
     best: dict[Hands, tuple[Instance, Plan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
-        plan = problem.solve(instance, start)
+        plan = problem.solve(instance, start, penalty=penalty)
         session.spend(**plan.spent)
         solves += 1
         failed += not plan.converged

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.shortest_paths import chain_starts
+from coartic.baselines.posture_graph import cheapest_chains
 from coartic.baselines.trajectory_problem import (
     Cost,
     Instance,
@@ -135,16 +135,15 @@ class TrajectoryOptimisation(Method):
             named = parameters.hands == "given"
             only = hands_of(task.initial_hands if named else parameters.hands)
         with session.building():
-            goals = len(task.goals)
-            problem = trajectory_problem(task.robot, task.hands, goals, self.cost)
+            self.problem(task)
         with session.solving():
-            plans, failed = self.plans(session, task, problem, only)
+            plans, failed = self.plans(session, task, only)
             if not plans:
                 raise MethodError(
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
             instance, plan = min(plans, key=lambda entry: entry[1].cost)
-            solution = self.movements_of(session, task, problem, instance, plan)
+            solution = self.movements_of(session, task, instance, plan)
         details = {
             "cost": plan.cost,
             "path_length": float(plan.lengths(task.q0).sum()),
@@ -153,12 +152,12 @@ class TrajectoryOptimisation(Method):
         }
         return Result(tuple(solution), details)
 
+    def problem(self, task: Task) -> TrajectoryProblem:
+        """The programme of tasks like this one, compiled once."""
+        return trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
+
     def plans(
-        self,
-        session: Session,
-        task: Task,
-        problem: TrajectoryProblem,
-        only: tuple[Hand, ...] | None,
+        self, session: Session, task: Task, only: tuple[Hand, ...] | None
     ) -> tuple[list[tuple[Instance, Plan]], dict[str, str]]:
         """The plan of each hand sequence, and the reason of each that has none."""
         plans, failed = [], {}
@@ -169,7 +168,7 @@ class TrajectoryOptimisation(Method):
                 still=self.parameters.other_arm == "still",
                 radius=self.target_radius(session, task),
             )
-            plan = self.cheapest(session, problem, instance, starts)
+            plan = self.cheapest(session, self.problem(task), instance, starts)
             if plan.converged:
                 plans.append((instance, plan))
             else:
@@ -177,11 +176,7 @@ class TrajectoryOptimisation(Method):
         return plans, failed
 
     def cheapest(
-        self,
-        session: Session,
-        problem: TrajectoryProblem,
-        instance: Instance,
-        starts: list[Array],
+        self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
     ) -> Plan:
         """The cheapest plan that starts lead to; where none converges the last one."""
         return cheapest_plan(session, problem, instance, starts)
@@ -197,7 +192,7 @@ class TrajectoryOptimisation(Method):
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(parameters.sampling_seed)
         starts: dict[tuple[Hand, ...], list[Array]] = {}
-        for hands, configurations in chain_starts(
+        for hands, configurations in cheapest_chains(
             session,
             task,
             rng,
@@ -221,12 +216,7 @@ class TrajectoryOptimisation(Method):
         return task.radius - session.model.arrival_tolerance
 
     def movements_of(
-        self,
-        session: Session,
-        task: Task,
-        problem: TrajectoryProblem,
-        instance: Instance,
-        plan: Plan,
+        self, session: Session, task: Task, instance: Instance, plan: Plan
     ) -> list[Movement]:
         """The movements of a plan; the session spends what they take."""
         planned, evaluations = movements(
@@ -249,16 +239,12 @@ class PathLength(TrajectoryOptimisation):
         return super().target_radius(session, task)
 
     def movements_of(
-        self,
-        session: Session,
-        task: Task,
-        problem: TrajectoryProblem,
-        instance: Instance,
-        plan: Plan,
+        self, session: Session, task: Task, instance: Instance, plan: Plan
     ) -> list[Movement]:
         """The movements of a plan; the session spends what they take."""
         if not self.parameters.whole_ticks:
-            return super().movements_of(session, task, problem, instance, plan)
+            return super().movements_of(session, task, instance, plan)
+        problem = self.problem(task)
         rounding = Rounding(problem, instance, session.model.step)
         rounded = rounding.nearest(plan)
         session.spend(**rounding.spent)
@@ -268,7 +254,7 @@ class PathLength(TrajectoryOptimisation):
             session.spend(**plan.spent)
             if not plan.converged:
                 raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
-            return super().movements_of(session, task, problem, inside, plan)
+            return super().movements_of(session, task, inside, plan)
         planned, evaluations = movements(
             task, rounded.hands, rounded.configurations, instance.held, session.model, rounded.steps
         )
@@ -282,11 +268,7 @@ class Smooth(TrajectoryOptimisation):
     Parameters = SmoothParameters
 
     def cheapest(
-        self,
-        session: Session,
-        problem: TrajectoryProblem,
-        instance: Instance,
-        starts: list[Array],
+        self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
     ) -> Plan:
         """The cheapest plan that passes the goals or, with stops, that one with its stops.
 
@@ -304,12 +286,7 @@ class Smooth(TrajectoryOptimisation):
         )
 
     def movements_of(
-        self,
-        session: Session,
-        task: Task,
-        problem: TrajectoryProblem,
-        instance: Instance,
-        plan: Plan,
+        self, session: Session, task: Task, instance: Instance, plan: Plan
     ) -> list[Movement]:
         """The movements of a plan; the session spends what they take."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))

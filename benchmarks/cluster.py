@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from coartic.benchmarks.pool import Failure, Local
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import environment
 from coartic.benchmarks.registry import current_code, error_line
-from coartic.benchmarks.worker import Answer, Job
+from coartic.benchmarks.worker import Answer, Job, failed
 from coartic.errors import CoarticError
 
 WORKERS_S = 600.0  # that runs wait while no worker is connected
@@ -28,7 +28,7 @@ class Dask:
         self.address, self.workers_s, self.say = address, workers_s, say
         self.workers = 1  # it may have any number: lots are as large as methods take them
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come; another worker takes over the
         jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, or it
         has no workers of this version."""
@@ -43,17 +43,18 @@ class Dask:
                 self._wait_for_workers(client)
                 time.sleep(0.0 if answers.has_ready() else _LOOK_S)
                 for future in answers.next_batch(block=False):
-                    yield numbers[future.key], self._answer(future)
+                    number = numbers[future.key]
+                    yield number, self._answer(future, jobs[number])
         finally:
             client.close(timeout=3)
 
-    def _answer(self, future: Any) -> Any:
+    def _answer(self, future: Any, job: Job) -> Any:
         from distributed import CancelledError, KilledWorker
 
         try:
             return future.result()
         except KilledWorker:
-            return Failure("crashed", "every worker that tried this run died", 0.0)
+            return failed(job, "crashed", "every worker that tried this run died", 0.0)
         except (Exception, CancelledError) as error:
             raise error if isinstance(error, CoarticError) else self._lost(error) from None
 
@@ -87,7 +88,7 @@ class Dask:
         return CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}")
 
 
-def _remote(job: Job) -> Answer | Failure:
+def _remote(job: Job) -> Answer:
     """Perform a job on a worker's machine, in a process that ends with its time limit."""
     here = current_code(job.where, job.method)
     if here != job.code:
@@ -95,6 +96,5 @@ def _remote(job: Job) -> Answer | Failure:
         raise CoarticError(f"{words}suite was started; install the same version everywhere")
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     ((_, answer),) = Local(1).perform([job])
-    if isinstance(answer, Answer):
-        answer.environment = environment()
+    answer.environment = environment()
     return answer

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from coartic.benchmarks.pool import Failure
 from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.worker import Answer, Outcome
 from coartic.errors import SolutionError
@@ -34,7 +33,7 @@ _EMPTY = dict.fromkeys(RESULTS)
 
 def kept(
     identities: Sequence[Mapping[str, Any]],
-    answer: Answer | Failure,
+    answer: Answer,
     task: Task,
     model: MotionModel,
 ) -> list[Run]:
@@ -42,13 +41,9 @@ def kept(
 
     ``identities`` say which each is: its id, number, seed and so on.
     """
-    if isinstance(answer, Failure):
-        times: dict[str, Any] = {"wall_s": answer.wall_s}
-        outcome = Outcome(answer.status, answer.reason)
-        return [run_of(identity, outcome, {}, times) for identity in identities]
     times = {
         "wall_s": answer.wall_s / len(identities),
-        "cpu_s": answer.cpu_s / len(identities),
+        "cpu_s": None if answer.cpu_s is None else answer.cpu_s / len(identities),
         "warm": answer.warm,
         "together": len(identities),
         "process_peak_mb": answer.process_peak_mb,
@@ -112,8 +107,8 @@ def run_of(
     outcome: Outcome,
     executions: Mapping[str, Execution],
     times: Mapping[str, Any],
-    task: Task | None = None,
-    made_with: dict[str, Any] | None = None,
+    task: Task,
+    made_with: dict[str, Any],
 ) -> Run:
     """A run as it is kept."""
     solution = executions.get("solution")
@@ -139,7 +134,6 @@ def run_of(
         if (execution := executions.get(part)) is not None:
             row |= {f"{prefix}reward": execution.reward, f"{prefix}hands": execution.hands}
     if solution is not None:
-        assert task is not None
         hands: Sequence[Hand] = hands_of(solution.hands)
         row |= {
             "best_trial": rewards.index(solution.reward) if solution.reward in rewards else None,
@@ -149,7 +143,7 @@ def run_of(
     movements = {part: execution.movements for part, execution in executions.items()}
     del row["setting"], row["environment"]
     row["result"] = result_of(row, movements, rewards)
-    return Run(row, made_with or environment(), movements, rewards)
+    return Run(row, made_with, movements, rewards)
 
 
 def result_of(

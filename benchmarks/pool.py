@@ -14,13 +14,11 @@ import os
 import signal
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from copy import copy
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
@@ -28,26 +26,16 @@ from typing import Any, Protocol, runtime_checkable
 
 from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.worker import Answer, Job, learns, perform, prepare
+from coartic.benchmarks.worker import Answer, Job, failed, learns, perform, prepare
 from coartic.errors import CoarticError
 from coartic.learner.learning import threads_for
 from coartic.text import plain
-from coartic.threads import one_thread_each
+from coartic.threads import begin_worker, one_thread_each
 
 _LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it
 _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a job has no answer."""
-
-    status: str
-    """``timeout`` or ``crashed``."""
-    reason: str
-    wall_s: float
 
 
 @runtime_checkable
@@ -59,7 +47,7 @@ class Executor(Protocol):
         """How many at once."""
         ...
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come, in any order."""
         ...
 
@@ -70,7 +58,7 @@ class Local:
     def __init__(self, jobs: int = -1) -> None:
         self.workers = threads_for(jobs)
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer | Failure]]:
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come."""
         numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
         for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
@@ -78,14 +66,14 @@ class Local:
 
     def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
-    ) -> Iterator[tuple[int, Answer | Failure]]:
+    ) -> Iterator[tuple[int, Answer]]:
         """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, learned) for (_, learned), task in kernels.items()]
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
-                workers, initializer=begin_worker, initargs=(folder, foreign, workers, tasks),
+                workers, initializer=begin_job_worker, initargs=(folder, foreign, workers, tasks),
                 context=context(),
             )  # fmt: skip
             running: dict[Future[Answer], tuple[int, float]] = {}
@@ -109,7 +97,7 @@ class Local:
                     for future in done:
                         number, started = running.pop(future)
                         seconds = time.monotonic() - started
-                        yield number, answer_of(future, jobs, number, seconds, Path(folder))
+                        yield number, answer_of(future, dict(jobs)[number], seconds, Path(folder))
             except RuntimeError:  # the pool's own
                 messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
@@ -125,26 +113,24 @@ def owner_of(job: Job) -> str:
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def answer_of(
-    future: Future[Answer], jobs: list[tuple[int, Job]], number: int, seconds: float, folder: Path
-) -> Answer | Failure:
-    """The answer to a job, or why there is none."""
+def answer_of(future: Future[Answer], job: Job, seconds: float, folder: Path) -> Answer:
+    """The answer to a job, or that it failed."""
     try:
         return future.result()
     except TimeoutError:
-        limit = dict(jobs)[number].time_limit_s or seconds
-        return Failure("timeout", f"time limit of {limit:g} s exceeded", limit)
+        limit = job.time_limit_s or seconds
+        return failed(job, "timeout", f"time limit of {limit:g} s exceeded", limit)
     except ProcessExpired as error:
         how = f"exit code {error.exitcode}"
         if error.exitcode is not None and error.exitcode < 0:
             with contextlib.suppress(ValueError):
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
         reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
-        return Failure("crashed", reason, seconds)
+        return failed(job, "crashed", reason, seconds)
     except BrokenProcessPool:
         raise
     except Exception as error:  # its answer cannot be read
-        return Failure("crashed", plain(f"{type(error).__name__}: {error}"), seconds)
+        return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"), seconds)
 
 
 def last_words(file: Path) -> str:
@@ -156,30 +142,20 @@ def last_words(file: Path) -> str:
     return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
 
 
-def begin_worker(
+def begin_job_worker(
     folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
 ) -> None:
     """What a worker does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
     os.dup2(printed, 1)
     os.dup2(printed, 2)
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    begin_worker()
     bound_memory(workers)
     prepare(tasks)
     if foreign:
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
         os.chdir(tempfile.tempdir)
         confine(Path(folder))
-
-
-def end_with_parent() -> None:
-    """End this process, whatever it does, when the one that it works for has ended. The server
-    that it was forked from lives as long as any worker."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def bound_memory(workers: int) -> None:

@@ -44,6 +44,7 @@ MODULES = (
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
+    "coartic.baselines.believed_reward",
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from coartic import CoarticError, Task
 from coartic.benchmarks.outcome import kept
-from coartic.benchmarks.pool import Executor, Failure, Local
+from coartic.benchmarks.pool import Executor, Local
 from coartic.benchmarks.provenance import command, environment, now
 from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.suites import Cell, Suite, load_suite, select_cells
@@ -240,7 +240,7 @@ class SuitePlan:
             time_limit_s=plan.time_limit_s,
         )
 
-    def runs_of(self, position: int, numbers: list[int], answer: Answer | Failure) -> list[Run]:
+    def runs_of(self, position: int, numbers: list[int], answer: Answer) -> list[Run]:
         """The runs of a job as they are kept."""
         cell, plan = self.plan.cells[position], self.plan
         asked, code = plan.asked[position], plan.methods[cell.method].code

@@ -45,7 +45,7 @@ from coartic.robot import Finite
 from coartic.runs.plan import label_of, variant_of
 from coartic.tasks.families import named_by
 from coartic.tasks.members import members, task_of
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
+from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, Penalty, address_of
 from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -86,6 +86,8 @@ class Block(FileData):
     """Whether the base moves in both directions, whatever the task locks."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
     """Only the tasks with so many goals; all where it is not given."""
+    penalties: tuple[Penalty, ...] = ()
+    """Penalties of variants of the tasks, one each; without any, the tasks as they are."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs per cell, where it is not the suite's number."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
@@ -194,7 +196,10 @@ def read_suite(path: Path) -> Suite:
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
-        keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
+        keys = [
+            *(*Suite.model_fields, *Block.model_fields),
+            *(*Move.model_fields, *Penalty.model_fields),
+        ]
         raise CoarticError(problems(str(path), error, keys)) from None
 
 
@@ -351,6 +356,8 @@ def cells_of_block(
         if block.free_base:
             task = with_free_base(suite, task)
         variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
+        if block.penalties:
+            variants = [with_penalty(suite, v, p) for v in variants for p in block.penalties]
         for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
             if reason is not None and ALL not in (*block.methods, *block.tasks):
@@ -391,6 +398,19 @@ def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:
     return list(variants.values())
 
 
+def with_penalty(suite: Suite, task: Task, penalty: Penalty) -> Task:
+    """The task with a penalty, by a name of its own, which says what is not the default."""
+    given = penalty.model_dump(mode="json", exclude_defaults=True)
+    words = "-".join(f"{key}-{in_name(value)}" for key, value in given.items()) or "no-penalty"
+    content = {
+        **task.model_dump(mode="json"),
+        "name": f"{task.name}.{words}",
+        "description": f"{task.name} with a penalty: {words}",
+        "penalty": penalty.model_dump(mode="json"),
+    }
+    return parse_task(content, f"suite {suite.name!r}")
+
+
 def with_free_base(suite: Suite, task: Task) -> Task:
     """The task without its lock, by a name of its own."""
     if not task.locked_base:
@@ -407,6 +427,13 @@ def with_free_base(suite: Suite, task: Task) -> Task:
         "provenance": {**content["provenance"], "locked_base": why},
     }
     return parse_task(content, f"suite {suite.name!r}")
+
+
+def in_name(value: Any) -> str:
+    """A value of a penalty as a part of a name."""
+    if isinstance(value, list):
+        return "_".join(map(exact, value))
+    return value if isinstance(value, str) else exact(value)
 
 
 def exact(value: float) -> str:

@@ -106,12 +106,17 @@ class Answer:
     outcomes: list[Outcome]
     wall_s: float
     """Of all runs together."""
-    cpu_s: float
-    warm: bool
+    cpu_s: float | None = None
+    warm: bool | None = None
     """Whether the process had run the method before."""
-    process_peak_mb: float | None
+    process_peak_mb: float | None = None
     environment: dict[str, Any] | None = None
     """Where this is not that of the parent process."""
+
+
+def failed(job: Job, status: str, reason: str, wall_s: float) -> Answer:
+    """The answer of a job whose worker gave none: ``timeout`` or ``crashed``."""
+    return Answer([Outcome(status, reason)] * len(job.seeds), wall_s)
 
 
 def perform(job: Job) -> Answer:
@@ -178,7 +183,7 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
-        "meter": session.meter.as_dict(),
+        "meter": vars(session.meter),
         "rewards": session.rewards,
     }
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
-    from coartic.learner.learning import Counters, LearningRun, learn, learn_many
+    from coartic.learner.learning import LearningRun, learn, learn_many
     from coartic.model import PAPER, MotionModel
     from coartic.motion.corrective import Correction, correct
     from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
@@ -32,7 +32,6 @@ __all__ = [
     "Arm",
     "CoarticError",
     "Correction",
-    "Counters",
     "Execution",
     "ExplorationCondition",
     "Hand",
@@ -67,7 +66,7 @@ __all__ = [
 _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
-    "learner.learning": ("Counters", "LearningRun", "learn", "learn_many"),
+    "learner.learning": ("LearningRun", "learn", "learn_many"),
     "model": ("PAPER", "MotionModel"),
     "motion.corrective": ("Correction", "correct"),
     "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),

@@ -142,7 +142,7 @@ class SessionEnvs(VecEnv):
             raise BudgetError("all trials are made")
         trials = self._session.trials(self._chosen[:count], self._targets[:count])
         self._trials_left -= count
-        costs = np.where(trials.completed, trials.ticks, np.inf)
+        costs = -trials.rewards
         best = int(costs.argmin())
         if costs[best] < self._best_cost:
             self._best_cost = float(costs[best])

@@ -64,31 +64,29 @@ def check_folder(folder: Path, names: Iterable[str] = ()) -> None:
         )
 
 
-def write_outputs(files: Mapping[Path, bytes], *, replace: bool) -> None:
-    """Write single files, each whole or not at all, none where one of them may not be.
+def write_output(path: Path, data: bytes, *, replace: bool) -> None:
+    """Write a single file, whole or not at all.
 
-    Raises CoarticError as :func:`check_outputs` does, and where the disk does not take one.
+    Raises CoarticError as :func:`check_output` does, and where the disk does not take it.
     """
-    check_outputs(files, replace=replace)
-    for path, data in files.items():
-        with errors_in_words(path):
-            write_atomically(path, data)
+    check_output(path, replace=replace)
+    with errors_in_words(path):
+        write_atomically(path, data)
 
 
-def check_outputs(paths: Iterable[Path], *, replace: bool) -> None:
+def check_output(path: Path, *, replace: bool) -> None:
     """Raises CoarticError where a file may not be written: its name has no folder, is that of
     a folder or a link, or, without ``replace``, is taken."""
-    for path in paths:
-        if not path.parent.is_dir():
-            raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
-        if path.is_symlink():
-            raise CoarticError(f"cannot write {path}: it is a link; name what it leads to")
-        if path.exists() and not path.is_file():
-            raise CoarticError(f"cannot write {path}: what is there is no file")
-        if path.exists() and not replace:
-            raise CoarticError(
-                f"{path} is there already; add --replace to write over it, or choose another name"
-            )
+    if not path.parent.is_dir():
+        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+    if path.is_symlink():
+        raise CoarticError(f"cannot write {path}: it is a link; name what it leads to")
+    if path.exists() and not path.is_file():
+        raise CoarticError(f"cannot write {path}: what is there is no file")
+    if path.exists() and not replace:
+        raise CoarticError(
+            f"{path} is there already; add --replace to write over it, or choose another name"
+        )
 
 
 def folder_named(name: object, what: str = "the name of a folder") -> Path:

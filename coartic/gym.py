@@ -1,4 +1,5 @@
-"""Tasks as environments of Gymnasium: a step is a subtask, its reward minus the ticks it took.
+"""Tasks as environments of Gymnasium: a step is a subtask, its reward minus the ticks it took
+(and minus its penalty, where the task has one).
 
 Importing this module registers ``coartic/Ascending-v0``, ``Descending``, ``TwoArmed1`` and
 ``TwoArmed2``, and ``coartic/Task-v0`` for any other task. Needs the extra ``coartic[gym]``.
@@ -100,6 +101,7 @@ class Arms:
 
         Raises ValueError for actions that are not finite.
         """
+        from coartic.motion.penalty import penalties_of_movements
         from coartic.motion.reach import reach_unchecked
         from coartic.optimisers import FAILED
 
@@ -122,6 +124,9 @@ class Arms:
             locked_base=self.task.locked_base,
             model=self.model,
         )
+        penalties = penalties_of_movements(
+            self.task, self.q[rows], reached.q, hands, self.goal[rows] == 0
+        )
         self.q[rows] = reached.q
         self.hands[rows, self.goal[rows]] = LETTERS[hands]
         self.goal[rows] += reached.hit
@@ -129,7 +134,7 @@ class Arms:
         completed = self.goal[rows] == len(self.task.goals)
         self.is_success[rows] = completed
         rewards, ended = np.zeros(len(which)), np.zeros(len(which), dtype=np.bool_)
-        rewards[rows] = np.where(reached.hit, -reached.ticks, -FAILED)
+        rewards[rows] = np.where(reached.hit, -(reached.ticks + penalties), -FAILED)
         ended[rows] = completed | ~reached.hit
         return rewards, ended
 

@@ -101,12 +101,14 @@ class Meter:
     """What a method spent."""
 
     trials: int = 0
-    """Physical trials."""
+    """Physical trials, those that failed included."""
     movement_ticks: int = 0
     """Control ticks of those trials."""
     forward_kinematics: int = 0
-    """Forward-kinematics evaluations, one per configuration."""
+    """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
+    cannot end a movement; a robot would sense its hand on every one of the ticks."""
     jacobians: int = 0
+    """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
     corrections: int = 0
     """Corrective movements made."""
@@ -121,18 +123,8 @@ class Meter:
     solve_s: float = 0.0
     """Wall time of solving them."""
 
-    COUNTS: ClassVar[tuple[str, ...]] = (
-        "trials",
-        "movement_ticks",
-        "forward_kinematics",
-        "jacobians",
-        "corrective_iterations",
-        "corrections",
-        "failed_trials",
-        "gradients",
-        "hessians",
-        "solver_iterations",
-    )
+    COUNTS: ClassVar[tuple[str, ...]]
+    """All of these but the times."""
     SOLVER: ClassVar[tuple[str, ...]] = (
         "forward_kinematics",
         "jacobians",
@@ -142,9 +134,8 @@ class Meter:
     )
     """Counters that a method states itself: what a solver evaluates."""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Counters and times."""
-        return dict(vars(self))
+
+Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 
 
 @dataclass(frozen=True)
@@ -347,7 +338,7 @@ class Session:
         self._meter.jacobians += int(trials.iterations.sum())
         self._meter.forward_kinematics += int(trials.evaluations.sum())
         self._meter.failed_trials += int((~trials.completed).sum())
-        rewards: list[int | None] = (-trials.ticks).tolist()
+        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
         for failed in np.flatnonzero(~trials.completed).tolist():
             rewards[failed] = None
         self._rewards.extend(rewards)
@@ -369,12 +360,9 @@ class Session:
         """
         self._use(Information.CORRECTIVE_PROCESS)
         self._use(Information.REWARD_BY_TRIAL)
-        search = search_initial_hands(self._task, hands, model=self.model)
-        for name, count in search._asdict().items():
-            if name != "hands":
-                setattr(self._meter, name, getattr(self._meter, name) + count)
-        self._meter.jacobians += search.corrective_iterations
-        return search.hands
+        chosen, spent = search_initial_hands(self._task, hands, model=self.model)
+        self._count(spent)
+        return chosen
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Corrective movements without a target are a use of the corrective process."""
@@ -424,7 +412,7 @@ class Session:
                 raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
             if count < 0:
                 raise ValueError(f"counter {name!r}: {count} is negative")
-            setattr(self._meter, name, getattr(self._meter, name) + int(count))
+        self._count(counts)
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Rewards of the trials of a compiled method of this project, and its time for them: of
@@ -463,6 +451,10 @@ class Session:
         for item in information:
             self._use(item)
         return self._task
+
+    def _count(self, counts: Mapping[str, int]) -> None:
+        for name, count in counts.items():
+            setattr(self._meter, name, getattr(self._meter, name) + int(count))
 
     def _needs_trust(self, name: str) -> None:
         if not self._trusted:

@@ -59,8 +59,15 @@ def explored_joints(
     return mask
 
 
+def sequences_of(session: Session) -> list[str]:
+    """All hand sequences, the task's own first: a small budget may not reach the others."""
+    letters = letters_of(sorted(session.hands))
+    sequences = map("".join, itertools.product(letters, repeat=session.goals_count))
+    return sorted(sequences, key=lambda hands: hands != session.initial_hands)
+
+
 class Objective:
-    """The cost of a trial in ticks, a function of its target configurations.
+    """The cost of a trial, ticks and penalty, a function of its target configurations.
 
     A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
     by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
@@ -79,13 +86,7 @@ class Objective:
     ) -> None:
         self._session = session
         self._end = None if trials is None else session.meter.trials + trials
-        if hands is None:
-            letters = letters_of(sorted(session.hands))
-            several = itertools.product(letters, repeat=session.goals_count)
-            sequences = ["".join(sequence) for sequence in several]
-            sequences.sort(key=lambda sequence: sequence != session.initial_hands)
-        else:
-            sequences = [hands]
+        sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
         alone = session.trials(sequences, np.full(shape, np.nan))
@@ -138,8 +139,7 @@ class Objective:
         targets = np.full((left, *self.joints.shape), np.nan)
         targets[:, self.joints] = array[:left]
         trials = self._session.trials(self.hands, targets)
-        in_time = trials.completed & (trials.ticks < FAILED)
-        costs = np.where(in_time, trials.ticks, FAILED).astype(np.float64)
+        costs = np.minimum(-trials.rewards, FAILED)
         self.evaluations += len(costs)
         if len(costs) and costs.min() < self.best_cost:
             best = int(costs.argmin())

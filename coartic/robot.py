@@ -183,6 +183,12 @@ class Robot:
         """Hand position as a CasADi expression, 2 x 1, for a CasADi ``q`` (dof x 1)."""
         import casadi
 
+        return casadi.vertcat(*self.symbolic_joints(q, hand)[-1])
+
+    def symbolic_joints(self, q: Any, hand: Hand) -> list[tuple[Any, Any]]:
+        """Positions of shoulder, joints and hand, as :meth:`symbolic_hand`, x and y of each."""
+        import casadi
+
         arm = self.arm(hand)
         if q.numel() != self.dof:
             raise ValueError(f"symbolic q has {q.numel()} entries; this robot needs {self.dof}")
@@ -191,7 +197,7 @@ class Robot:
         # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
         plain = arm._replace(links=[float(length) for length in arm.links])
         chain(q, plain, xs, ys, casadi.cos, casadi.sin)
-        return casadi.vertcat(xs[-1], ys[-1])
+        return list(zip(xs, ys, strict=True))
 
     def _configuration(self, q: ArrayLike) -> Array:
         array = np.asarray(q, dtype=np.float64)

@@ -1,9 +1,12 @@
-"""How many threads the libraries of a worker have."""
+"""What all worker processes have in common: one thread each, and an end with their parent."""
 
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Iterator
 
 ONE_THREAD = dict.fromkeys(
@@ -32,3 +35,18 @@ def one_thread_each() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and end this process, whatever it does, when the parent has
+    ended. The server that it was forked from lives as long as any worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+def end_with_parent() -> None:
+    """Wait for the end of the process that this one works for."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

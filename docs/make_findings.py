@@ -34,6 +34,7 @@ KEPT = {
     "tuning": ("variants", ""),
     "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
+    "objectives": ("objectives crossings claims", "objectives"),
 }
 """Tables and figures that are kept of each suite's report. Suites that need other libraries are
 not run by ``make findings``."""

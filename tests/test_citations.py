@@ -11,7 +11,6 @@ import pytest
 from coartic import load_task
 from coartic.analysis.citations import (
     PAPER,
-    MethodSource,
     behind_analysis,
     bibliography,
     references,
@@ -20,6 +19,7 @@ from coartic.analysis.citations import (
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.suites import Cell
+from coartic.runs.plan import DeclaredMethod
 from coartic.runs.store import FILE
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
@@ -89,23 +89,30 @@ def test_the_software_is_cited_by_the_facts_of_citation_cff():
         assert fact in text
 
 
+def declared(title, citation, origin="built in"):
+    return DeclaredMethod(title, citation, (), (), True, {}, origin, "")
+
+
 def test_each_work_once_with_the_methods_that_rest_on_it():
-    text = bibliography([MethodSource(m.name, m.title, m.citation, True) for m in BUILT_IN])
+    text = bibliography({m.name: declared(m.title, m.citation) for m in BUILT_IN})
     keys = keys_in(text)
     assert len(keys) == len(set(keys))
     assert set(keys) == {"coartic", *BIB} - set(ANALYSIS)
     assert keys[:2] == ["coartic", PAPER]
     assert f"% cma-es/bandit, cma-es/every\n{references()['hansen2016']}\n" in text
-    assert set(keys_in(bibliography([], analysis=True))) == {"coartic", PAPER, *ANALYSIS}
+    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", PAPER, *ANALYSIS}
 
 
 def test_methods_of_others_cite_themselves():
-    bold = MethodSource(
-        "cma-es/bold", "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", False
+    text = bibliography(
+        {
+            "cma-es/bold": declared(
+                "Bold & fast", "A. B. C_d (2020), me@here, 5 %\n of {x}.", "plug-in"
+            ),
+            "lab/silent": declared("Silent", "", "plug-in"),
+            "dual-process/EC9": declared("Of another version", "Ours (2030)."),
+        }
     )
-    silent = MethodSource("lab/silent", "Silent", "", False)
-    ours = MethodSource("dual-process/EC9", "Of another version", "Ours (2030).", True)
-    text = bibliography([bold, silent, ours])
     assert keys_in(text) == ["coartic", PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
     assert (
         r"  note = {A. B. C\_d (2020), me@here, 5 \% of "

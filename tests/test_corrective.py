@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import minimize
 
 from coartic import PAPER, MotionModel, Robot, correct
 from coartic.motion.compiled import entry, joint_chain, joint_lever
-from coartic.motion.corrective import shift_kernel
-from coartic.motion.movement import Goal, largest_square, scratch_for
+from coartic.motion.movement import Goal, largest_square
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import UNEVEN, configurations
@@ -77,10 +75,10 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     q[2:] += rng.choice([9.9e4, 5e4, 2.4e4]) * rng.choice([1, 1, -1])
     goal, slow = rng.uniform(-1, 1, 2), q.copy()
     fast = correct(robot, q, hand, tuple(goal))
-    scratch, model = scratch_for(robot), PAPER
+    model = PAPER
     iterations = _by_steps(
         slow, robot.arm(hand), Goal(*goal, 0.0), model.gain, model.correction_tolerance,
-        model.max_iterations, scratch.xs, scratch.ys,
+        model.max_iterations, *np.empty((2, robot.most_links + 1)),
     )  # fmt: skip
     assert fast.iterations == iterations
     np.testing.assert_array_equal(fast.q, slow)
@@ -107,93 +105,3 @@ def free_joints(robot, hand, locked):
 
 
 LOCKS = [(), ("x",), ("y",), ("x", "y")]
-
-
-@pytest.mark.parametrize("locked", LOCKS)
-@pytest.mark.parametrize("gain", [0.02, 0.3])
-def test_secondary_objective_equals_the_matrix_form(gain, locked):
-    rng = np.random.default_rng(4)
-    model = MotionModel(max_iterations=300)
-    converged = 0
-    for robot, hand in [(ROBOT, "left"), (ROBOT, "right"), (UNEVEN, "right")]:
-        for _ in range(2):
-            arguments = robot, rng.uniform(-2, 2, robot.dof), hand, tuple(rng.uniform(-2, 2, 2))
-            options = {"locked_base": locked, "nullspace_gain": gain, "model": model}
-            fast, slow = correct(*arguments, **options), reference.correct(*arguments, **options)
-            assert (fast.converged, fast.iterations) == (slow.converged, slow.iterations)
-            converged += fast.converged
-            if fast.converged:
-                np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
-    assert converged >= 3
-
-
-@pytest.mark.parametrize("locked", [(), ("y",)])
-def test_secondary_objective_finds_the_least_change_of_posture(locked):
-    """The nearest configuration that has the hand at the goal, by a solver."""
-    rng = np.random.default_rng(5)
-    free = free_joints(ROBOT, "right", locked)
-    model = MotionModel(correction_tolerance=1e-6)
-    gained = []
-    for _ in range(6):
-        q0 = rng.uniform(-1, 1, 10)
-        goal = ROBOT.forward_kinematics(q0, "right") + rng.uniform(-2, 2, 2)
-        options = {"locked_base": locked, "model": model}
-        plain = correct(ROBOT, q0, "right", tuple(goal), **options)
-        correction = correct(ROBOT, q0, "right", tuple(goal), nullspace_gain=0.1, **options)
-        assert plain.converged
-        assert correction.converged
-
-        def hand_misses(change, q0=q0, goal=goal):
-            q = np.array(q0)
-            q[free] += change
-            return ROBOT.forward_kinematics(q, "right") - goal
-
-        best = minimize(
-            lambda change: change @ change,
-            (correction.q - q0)[free],
-            jac=lambda change: 2 * change,
-            constraints={"type": "eq", "fun": hand_misses},
-        )
-        assert best.success
-        length = np.linalg.norm(correction.q - q0)
-        assert length == pytest.approx(best.fun**0.5, abs=1e-4)
-        gained.append(np.linalg.norm(plain.q - q0) - length)
-    assert min(gained) > -1e-4
-    assert max(gained) > 0.01
-
-
-@pytest.mark.parametrize("bend", [0.0, 1e-12, 1e-7, 1e-4])
-@pytest.mark.parametrize("gain", [0.1, 0.2])
-def test_secondary_objective_on_a_straight_arm(bend, gain):
-    """On a locked base a straight arm is singular: as safe as without the objective."""
-    q = np.zeros(10)
-    q[7] = bend
-    options = {"locked_base": ("x", "y"), "nullspace_gain": gain}
-    correction = correct(ROBOT, q, "right", (2.0, 2.0), **options)
-    assert correction.converged
-    assert np.linalg.norm(correction.q - q) < 3
-    stretched = correct(ROBOT, q, "right", (5.0, 0.1), **options)
-    assert not stretched.converged
-    assert np.linalg.norm(stretched.q) < 1e-3
-    if not bend:
-        assert stretched.iterations == 1
-
-
-@entry
-def _shift(target, q, arm, goal, mask, length, scratch):
-    shift_kernel(target, q, arm, goal, mask, length, scratch)
-
-
-@pytest.mark.parametrize("hand", HANDS)
-def test_shift_is_along_the_steepest_descent(hand):
-    """Its direction by finite differences of the squared distance; its length as asked."""
-    rng = np.random.default_rng(6)
-    for _ in range(10):
-        q, goal = rng.uniform(-2, 2, 10), rng.uniform(-3, 3, 2)
-        mask = rng.random(10) < 0.7
-        target = np.array(q)
-        _shift(target, q, ROBOT.arm(hand), Goal(*goal, 0.0), mask, 0.07, scratch_for(ROBOT))
-        nearby = q + 1e-6 * np.concatenate([np.eye(10), -np.eye(10)])
-        distances = ((ROBOT.forward_kinematics(nearby, hand) - goal) ** 2).sum(axis=1)
-        descent = (distances[10:] - distances[:10]) * mask
-        np.testing.assert_allclose(target - q, 0.07 * descent / np.linalg.norm(descent), atol=1e-8)

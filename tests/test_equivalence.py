@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from coartic.analysis.statistics.equivalence import difference, equivalence, shares
+from coartic.analysis.statistics.equivalence import difference, equivalence
 
 
 def test_interval_against_an_exact_value_is_students():
@@ -68,28 +68,3 @@ def test_degenerate_samples():
     point = equivalence([1.0] * 4, [3.0] * 4, 1.5)
     assert (point.low, point.high, point.verdict) == (-2.0, -2.0, "different")
     assert math.isnan(point.p)
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "low", "high"),
-    [  # Newcombe (1998), table II, method 10
-        ((56, 70), (48, 80), 0.0524, 0.3339),
-        ((9, 10), (3, 10), 0.1705, 0.8090),
-        ((6, 7), (2, 7), 0.0582, 0.8062),
-        ((5, 56), (0, 29), -0.0381, 0.1926),
-        ((10, 10), (0, 20), 0.6791, 1.0),
-        ((10, 10), (0, 10), 0.6075, 1.0),
-    ],
-)
-def test_difference_of_shares(first, second, low, high):
-    interval = shares(first, second, 0.25)
-    assert interval.estimate == pytest.approx(first[0] / first[1] - second[0] / second[1])
-    assert (interval.low, interval.high) == pytest.approx((low, high), abs=6e-5)
-    turned = shares(second, first, 0.25)
-    assert (-turned.high, -turned.low) == pytest.approx((interval.low, interval.high))
-
-
-def test_shares_agree_where_newcombes_interval_is_within_the_margin():
-    assert shares((20, 20), (20, 20), 0.25).verdict == "equivalent"
-    assert shares((5, 20), (9, 20), 0.25).verdict == "undecided"
-    assert shares((0, 20), (11, 20), 0.25).verdict == "different"

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from coartic import CoarticError
-from coartic.files import LISTING, check_folder, publish, write_atomically, write_outputs
+from coartic.files import LISTING, check_folder, publish, write_atomically, write_output
 
 
 def content(folder):
@@ -55,23 +55,23 @@ def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):
         with pytest.raises(OSError, match="No space"):
             write_atomically(path, b"new")
         with pytest.raises(CoarticError, match=r"cannot write .*No space left"):
-            write_outputs({path: b"new"}, replace=True)
+            write_output(path, b"new", replace=True)
     assert content(tmp_path) == {"a.txt": b"old"}
 
 
 def test_single_files_are_replaced_only_where_that_is_asked_for(tmp_path):
-    paths = [tmp_path / "a.txt", tmp_path / "b.txt"]
-    write_outputs({paths[1]: b"1"}, replace=False)
+    path = tmp_path / "b.txt"
+    write_output(path, b"1", replace=False)
     with pytest.raises(CoarticError, match="b.txt is there already; add --replace"):
-        write_outputs(dict.fromkeys(paths, b"2"), replace=False)
+        write_output(path, b"2", replace=False)
     assert content(tmp_path) == {"b.txt": b"1"}
-    write_outputs(dict.fromkeys(paths, b"2"), replace=True)
-    assert content(tmp_path) == {"a.txt": b"2", "b.txt": b"2"}
-    (tmp_path / "link").symlink_to(paths[0])
+    write_output(path, b"2", replace=True)
+    assert content(tmp_path) == {"b.txt": b"2"}
+    (tmp_path / "link").symlink_to(path)
     for path, words in (
         (tmp_path / "none" / "a.txt", "there is no folder"),
         (tmp_path, "no file"),
         (tmp_path / "link", "it is a link"),
     ):
         with pytest.raises(CoarticError, match=words):
-            write_outputs({path: b"3"}, replace=True)
+            write_output(path, b"3", replace=True)

@@ -8,8 +8,7 @@ from coartic import load_task
 from coartic.analysis import tables
 from coartic.analysis.claims import judge
 from coartic.analysis.claims.register import CLAIMS
-from coartic.analysis.generality.exploration import contrasts
-from coartic.analysis.generality.presence import presence, signs
+from coartic.analysis.generality.presence import signs
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.optima import KnownOptimum
@@ -46,7 +45,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
     for family in families:
         for number, name in enumerate(names_in(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
-            best[name, "free"] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
+            best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
                 if (label == EC1) == (family in ONE) or label == INITIAL:
                     value = centre(number) if callable(centre) else centre
@@ -89,16 +88,17 @@ def test_a_method_that_beats_the_search_makes_the_best_known():
 def test_planted_contrasts():
     """EC4 over EC3: 10 of 500 on all instances but the last of each family, where it loses 20."""
     study = rewarded({**RISING, EC4: lambda n: -540 if n < 4 else -570})
-    planted = {(c.first, c.second, c.family): c for c in contrasts(study)}
-    mixed = planted[EC4, EC3, "long/v1"]
-    assert mixed.difference.estimate == pytest.approx((4 * 0.02 - 0.04) / 5)
-    assert (mixed.better, mixed.worse, mixed.instances, mixed.told) == (4, 1, 5, 5)
-    assert mixed.difference.low < 0 < mixed.difference.high
-    rising = planted[EC3, EC2, ""]
-    assert rising.difference.estimate == pytest.approx(0.02)
+    planted = tables.exploration(study)
+    mixed = planted.loc["learner EC4 over learner EC3, long/v1"]
+    assert mixed.gain == pytest.approx((4 * 0.02 - 0.04) / 5)
+    assert (mixed.better, mixed.worse, mixed.instances, mixed.told_apart) == (4, 1, 5, 5)
+    assert mixed.gain_low < 0 < mixed.gain_high
+    rising = planted.loc["learner EC3 over learner EC2, all"]
+    assert rising.gain == pytest.approx(0.02)
     assert (rising.instances, rising.better) == (10, 10)
-    assert planted[EC1, INITIAL, "one-armed/v1"].difference.estimate == pytest.approx(0.12)
-    assert (EC3, EC2, "one-armed/v1") not in planted
+    initial = planted.loc["learner EC1 over the initial solution, one-armed/v1"]
+    assert initial.gain == pytest.approx(0.12)
+    assert "learner EC3 over learner EC2, one-armed/v1" not in planted.index
 
 
 def test_what_hands_make_of_a_contrast():
@@ -107,9 +107,9 @@ def test_what_hands_make_of_a_contrast():
     runs = study.runs
     of_two = runs.method == EC2
     runs.loc[of_two, "hands"] = [hands_of(task, "L") for task in runs.task[of_two]]
-    (arm,) = [c for c in contrasts(study) if (c.first, c.second, c.family) == (EC4, EC2, "")]
-    assert (arm.difference.estimate, arm.median) == (pytest.approx(0.04), pytest.approx(0.04))
-    assert arm.hands.estimate == pytest.approx((-536 + 556) / 500)  # the best run of either
+    arm = tables.exploration(study).loc["learner EC4 over learner EC2, all"]
+    assert (arm.gain, arm["median"]) == (pytest.approx(0.04), pytest.approx(0.04))
+    assert arm.by_hands == pytest.approx((-536 + 556) / 500)  # the best run of either
 
 
 def made_up_signs(study, hand=1.0, waiting=0.3):
@@ -138,12 +138,12 @@ def with_signs(study, **values):
 
 def test_presence():
     study = with_signs(rewarded(RISING), waiting=0.07)
-    present = {(p.sign, p.label, p.family): p for p in presence(sample(study))}
-    waiting = present["other arm", EC4, "long/v1"]
-    assert waiting.value.estimate == pytest.approx(0.09)
+    present = tables.family_signs(study)
+    waiting = present.loc[f"other arm, {EC4}, long/v1"]
+    assert waiting["mean"] == pytest.approx(0.09)
     assert (waiting.instances, waiting.there) == (5, 1)  # the last beyond a tenth of the way
-    assert present["hand", EC4, ""].there == 10
-    assert ("hand", EC1, "one-armed/v1") not in present
+    assert present.there[f"hand, {EC4}, all"] == 10
+    assert f"hand, {EC1}, one-armed/v1" not in present.index
 
 
 def test_claims_of_generality():

@@ -44,7 +44,7 @@ def results(tmp_path_factory):
 
 
 def test_every_method_runs_in_some_suite():
-    suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon"))
+    suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon", "objectives"))
     patterns = {pattern for suite in suites for block in suite.cells for pattern in block.methods}
     run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
     assert run == set(KNOWN)
@@ -287,26 +287,23 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
 
 def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
     """Known by their short names, and told what they use."""
-    cells = paper_cells(methods=["EC1-biased"], tasks=["ascending"])
-    assert [cell.label for cell in cells] == ["dual-process/EC1-biased"]
+    cells = paper_cells(methods=["EC1-subtask"], tasks=["ascending"])
+    assert [cell.label for cell in cells] == ["dual-process/EC1-subtask"]
     grid = suite_of(
         tmp_path,
-        'tasks = ["two-armed-2"]\nmethods = ["dual-process/EC4-nullspace"]\n'
-        "grid = { nullspace_gain = [0.05, 0.2] }",
+        'tasks = ["two-armed-2"]\nmethods = ["dual-process/EC4-subtask"]\n'
+        "grid = { discount = [0.0, 0.2] }",
     )
-    assert [cell.variant for cell in grid] == ["", "nullspace_gain=0.2"]
+    assert [cell.variant for cell in grid] == ["", "discount=0.2"]
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/"):
             method = entry.declared
             condition = (CONDITIONS | VARIANTS)[name.partition("/")[2]]
             for key, value in entry.complete({"trials": 1}).items():
                 assert key == "trials" or getattr(condition, key) == value
-            assert ("secondary objectives" in method.told) == bool(method.secondary)
-            assert bool(method.secondary) == name.endswith("-nullspace")
-            assert ("Jacobian" in method.told) == name.endswith("-biased")
-    for foreign in ("nullspace_gain", "bias"):  # told would no longer be right
-        with pytest.raises(CoarticError, match=f"{foreign} is an unknown key"):
-            KNOWN["dual-process/EC4"].complete({foreign: 0.1})
+            assert ("reward by subtask" in method.told) == name.endswith("-subtask")
+    with pytest.raises(CoarticError, match="discount is an unknown key"):
+        KNOWN["dual-process/EC4"].complete({"discount": 0.1})  # told would no longer be right
 
 
 def test_every_sequence_is_sorted_and_bounded():

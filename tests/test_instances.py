@@ -20,7 +20,7 @@ def test_the_interval_speaks_about_other_tasks():
     rng = np.random.default_rng(1)
     covered = 0
     for _ in range(150):
-        interval = other_tasks({f: simulated(rng, 8, 10) for f in "ab"}, seed=0)
+        interval = other_tasks({f: simulated(rng, 8, 10) for f in "ab"})
         covered += interval.low <= 0.3 <= interval.high
     # A percentile interval of 2 x 8 instances; 0.95 ± 3 standard errors, and short by a little.
     assert 0.895 <= covered / 150 <= 0.985
@@ -29,22 +29,22 @@ def test_the_interval_speaks_about_other_tasks():
 def test_runs_do_not_stand_for_tasks():
     """A thousand runs on four instances leave the interval as wide as the instances make it."""
     rng = np.random.default_rng(2)
-    wide = other_tasks({"a": simulated(rng, 4, 1000)}, seed=0)
-    narrow = other_tasks({"a": simulated(rng, 64, 10)}, seed=0)
+    wide = other_tasks({"a": simulated(rng, 4, 1000)})
+    narrow = other_tasks({"a": simulated(rng, 64, 10)})
     assert wide.high - wide.low > 2.5 * (narrow.high - narrow.low)
 
 
 def test_width_of_the_interval():
     """The root of the variance of instances over their number, twice 1.96 times."""
     centres = np.linspace(-1, 1, 40)
-    plain = other_tasks({"a": [(np.full(3, c),) for c in centres]}, seed=0)
+    plain = other_tasks({"a": [(np.full(3, c),) for c in centres]})
     assert plain.estimate == pytest.approx(0)
     assert plain.high - plain.low == pytest.approx(
         2 * 1.96 * centres.std(ddof=1) / math.sqrt(40), rel=0.08
     )
     # Runs add their own: variance 1 of each of 4.
     runs = np.array([-1.0, 1.0, -1.0, 1.0]) * math.sqrt(3 / 4)
-    noisy = other_tasks({"a": [(c + runs,) for c in centres]}, seed=0)
+    noisy = other_tasks({"a": [(c + runs,) for c in centres]})
     wider = math.sqrt((centres.var(ddof=1) + 3 / 4 / 4) / 40)
     assert noisy.high - noisy.low == pytest.approx(2 * 1.96 * wider, rel=0.08)
 
@@ -52,14 +52,14 @@ def test_width_of_the_interval():
 def test_families_count_alike_whatever_their_number_of_instances():
     many = [(np.array([1.0]),)] * 30
     few = [(np.array([0.0, 0.0]),)] * 3
-    both = other_tasks({"many": many, "few": few}, seed=0)
+    both = other_tasks({"many": many, "few": few})
     assert (both.estimate, both.low, both.high, both.note) == (0.5, 0.5, 0.5, NO_SPREAD)
     assert both.n == (30, 3)
-    none = other_tasks({"many": many, "few": few[:2]}, seed=0)
+    none = other_tasks({"many": many, "few": few[:2]})
     assert math.isnan(none.low)
     assert "fewer than 3 instances" in none.note
     with pytest.raises(ValueError, match="one instance"):
-        other_tasks({}, seed=0)
+        other_tasks({})
 
 
 def test_a_pair_is_the_difference_on_the_same_instance():
@@ -67,11 +67,11 @@ def test_a_pair_is_the_difference_on_the_same_instance():
     rng = np.random.default_rng(3)
     hard = rng.normal(0, 5, 20)
     pairs = [(rng.normal(h + 0.5, 0.1, 10), rng.normal(h, 0.1, 10)) for h in hard]
-    difference = other_tasks({"a": pairs}, seed=4)
+    difference = other_tasks({"a": pairs})
     assert difference.low < 0.5 < difference.high
     assert difference.high - difference.low < 0.1
-    assert difference == other_tasks({"a": pairs}, seed=4)
-    swapped = other_tasks({"a": [(b, a) for a, b in pairs]}, seed=4)
+    assert difference == other_tasks({"a": pairs})
+    swapped = other_tasks({"a": [(b, a) for a, b in pairs]})
     assert swapped.estimate == pytest.approx(-difference.estimate)
 
 

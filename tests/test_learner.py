@@ -23,6 +23,7 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.method import Information, Session
 from coartic.model import PAPER
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
@@ -45,7 +46,7 @@ def assert_equals_reference(task, condition, trials, seed=11):
     assert counters.corrections == slow.corrections
     parts = [slow.corrections_by_trial[:1], *_tenths(slow.corrections_by_trial[1:])]
     assert fast.corrections.tolist() == [part.sum() for part in parts]
-    assert counters.corrective_iterations == counters.jacobians - slow.biased_movements
+    assert counters.corrective_iterations == counters.jacobians
     assert counters.corrective_iterations == slow.corrective_iterations
     assert counters.failed_trials == (~slow.completed).sum()
     assert counters.trials == trials
@@ -116,11 +117,8 @@ def test_conditions_are_data(chosen, other, hands):
     assert slow.corrections > len(task.goals)
     assert slow.completed.all() == (hands != "random")  # a random hand fails now and then
     assert bettered(slow) or not other
-    if hands == "closest":  # the variants' fields, all of them at once
-        informed = replace(condition, nullspace_gain=0.1, bias=0.7)
-        slow = assert_equals_reference(task, informed, trials=4)
-        assert slow.biased_movements > len(task.goals)
-        free = replace(informed, corrects=False, noise_sd=0.02)
+    if hands == "closest":
+        free = replace(condition, corrects=False, noise_sd=0.02)
         slow = assert_equals_reference(task, free, trials=6)
         assert set(slow.completed) == {True, False}
 
@@ -211,11 +209,16 @@ def test_closest_hand_and_its_ties(shift, visited):
 def test_what_a_policy_spends_is_counted():
     content = {**load_task("two-armed-1").model_dump(mode="json"), "initial_hands": "best-of-all"}
     run = learn(parse_task(content, "x"), "EC3", seed=0, trials=1)
-    search = run.initial_search
-    assert (search.hands, search.trials, search.failed_trials) == ("LRLR", 16, 0)
-    assert search.movement_ticks > 16 * 532
-    assert search.corrections == 64
-    assert learn(load_task("two-armed-1"), "EC3", seed=0, trials=1).initial_search.trials == 0
+    assert run.first_hands == "LRLR"
+    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    session = Session(parse_task(content, "x"), 0, told)
+    assert session.find_initial_hands() == "LRLR"
+    assert (session.meter.trials, session.meter.failed_trials) == (16, 0)
+    assert session.meter.movement_ticks > 16 * 532
+    assert session.meter.corrections == 64
+    assert session.meter.jacobians == session.meter.corrective_iterations > 0
+    named = Session(load_task("two-armed-1"), 0, told)
+    assert (named.find_initial_hands(), named.meter.trials) == ("RRRR", 0)
 
 
 @pytest.mark.parametrize(
@@ -287,7 +290,7 @@ def test_errors():
     with pytest.raises(ValueError, match="at least 1"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
-        ("epsilon", 1.5), ("nullspace_gain", float("nan")), ("bias", -1.0), ("noise_sd", 1e20),
+        ("epsilon", 1.5), ("noise_sd", float("nan")), ("noise_sd", -1.0), ("noise_sd", 1e20),
         ("discount", 1.5), ("discount", 0.5), ("credit", "goal"),
     ]:  # fmt: skip
         with pytest.raises(ValueError, match=field):

@@ -18,7 +18,6 @@ from coartic.baselines.cascade import (
     SLACK,
     Cascade,
     CascadeError,
-    damped_projection,
 )
 from coartic.baselines.modelled_cascade import ModelledCascade
 from coartic.baselines.nullspace_control import FACES, Aim, Controller
@@ -82,6 +81,19 @@ def exact(rows, least, preferred):
 
 
 @settings(max_examples=50)
+def damped_projection(row, least, preferred, damping=DAMPING):
+    """What the cascade gives for a task of one row where no limit is active, in closed form.
+
+    ``z + a (b - a.z)_+ / |a|^2``, with ``a`` the row and ``b`` what the damping leaves of a
+    demand, ``least |a|^2 / (|a|^2 + λ^2)`` if that is positive; shapes ``(joints,)``. Sources:
+    Liegeois (1977) for the projection, Nakamura & Hanafusa (1986) for the damping.
+    """
+    square = float(row @ row)
+    left = least * square / (square + damping**2) if least > 0 else least
+    missing = max(0.0, left - float(row @ preferred))
+    return preferred + row * (missing / square if missing else 0.0)
+
+
 @given(
     configurations(ROBOT, -3, 3),
     st.floats(0, 2 * np.pi),

@@ -1,12 +1,13 @@
 """The posture graph: its dynamic programme against every chain, one by one."""
 
 import itertools
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import PostureGraph, Spent, sample_postures, spread_out
+from coartic.baselines.posture_graph import PostureGraph, sample_postures, spread_out
 from tests.support.strategies import changed
 
 TASKS = {
@@ -56,11 +57,11 @@ def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
     task = TASKS[name]
     if hand not in task.hands:
         return
-    spent = Spent()
+    spent = Counter()
     starts = np.tile(task.q0, (80, 1))
     samples = sample_postures(task, 1, hand, starts, np.random.default_rng(5), spent)
     assert len(samples) > 60
-    assert spent.forward_kinematics > spent.jacobians > 0
+    assert spent["forward_kinematics"] > spent["jacobians"] > 0
     miss = task.robot.forward_kinematics(samples, hand) - task.goals[1]
     assert np.hypot(*miss.T).max() <= task.radius
     (other,) = {"left", "right"} - {hand}

@@ -17,7 +17,6 @@ from coartic import (
     CoarticError,
     corrective_trial,
     hand_sequences,
-    learn,
     load_task,
 )
 from coartic.analysis.reconstruction import ensemble, layouts, readings, scoring
@@ -247,14 +246,12 @@ def test_a_reconstruction_is_found_and_scored(
     monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
     monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
     monkeypatch.setattr(scoring, "RESAMPLES", 20)
-    effort = {
-        "members": 4,
-        "runs": 2,
-        "plan": (ensemble.Wave(3, 2), ensemble.Wave(2, 2, 2, 0.01)),
-        "trials": 30,
-    }
+    monkeypatch.setattr(ensemble, "PLAN", ((3, 2, 0, 0.0), (2, 2, 2, 0.01)))
+    monkeypatch.setattr(ensemble, "TRIALS", 30)
+    monkeypatch.setattr(ensemble, "LAST_RUNS", 2)
+    effort = {"members": 4, "runs": 2}
     small = replace(search, tried=Counter())
-    members = ensemble.reconstruct(small, **effort, last=2)
+    members = ensemble.reconstruct(small, **effort)
     # Four that are spread, and the nearest where it is none of them.
     ours = members.member.str.startswith("m")
     assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
@@ -266,7 +263,7 @@ def test_a_reconstruction_is_found_and_scored(
         goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
         assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
     assert members["EC3 LRLR share"].between(0, 1).all()
-    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort, last=2)
+    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort)
     pd.testing.assert_frame_equal(again, members)
 
 
@@ -281,20 +278,6 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert [test.p_below for test in tests if isinstance(test, scoring.Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
-
-
-def test_printed_results_stand_beside_fresh_runs() -> None:
-    names = ["two-armed-1-F2", "ascending"]
-    table = scoring.beside_printed(names, runs=4, trials=60).set_index(["task", "figure"])
-    assert table.verdict["two-armed-1-F2", "RRRR, corrective process alone"] == "same"
-    row = table.loc["ascending", "EC1 mean"]
-    seeds = range(800_000_000, 800_000_004)
-    rewards = [learn(load_task("ascending"), "EC1", seed=seed, trials=60).reward for seed in seeds]
-    assert (row.printed, row.sd, row.ours) == (-303, 2.9, np.mean(rewards))
-    assert row.verdict == "different"
-    assert math.isnan(table.printed["two-armed-1-F2", "EC4 above EC3"])
-    with pytest.raises(CoarticError, match="prints nothing of task 'long/v1/i001'"):
-        scoring.beside_printed(["long/v1/i001"], runs=3)
 
 
 def test_what_stands_is_replaced_by_what_is_clearly_nearer(

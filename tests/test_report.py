@@ -43,7 +43,7 @@ def recomputed(study, name, row, values):
     mean = sum(rewards) / len(rewards)
     sd = np.sqrt(sum((reward - mean) ** 2 for reward in rewards) / max(len(rewards) - 1, 1))
     if name == "methods":
-        top = study.optima[row.split()[0], "free"].reward
+        top = study.optima[row.split()[0]].reward
         return {"reward": mean, "reward_sd": sd, "gap": (top - mean) / -top, "runs": len(runs)}
     if name == "published":
         return {"ours": mean, "ours_sd": sd, "difference": mean - values.published}

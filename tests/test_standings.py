@@ -44,12 +44,12 @@ def test_gaps_of_a_results_folder():
     results = fake_study(runs)
     optima = made_up_optima("two-armed-1")
     seen = MadeUp(results, optima=optima)
-    optimum = optima["two-armed-1", "free"].reward
+    optimum = optima["two-armed-1"].reward
     assert ends(seen) == {"two-armed-1": (-675.0, optimum)}
     first, second = gaps(seen).gap
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
-    missed = {("two-armed-1", "free"): replace(optima["two-armed-1", "free"], reward=-680)}
+    missed = {"two-armed-1": replace(optima["two-armed-1"], reward=-680)}
     below = MadeUp(results, optima=missed)  # below the initial solution
     assert gaps(below).empty
 

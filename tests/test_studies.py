@@ -71,6 +71,11 @@ def planted(*, stream="i", plain=FALLING, given=FALLING, dear=FALLING, learner=2
     return MadeUp(study_of(frame, tasks, suite="horizon"), _trajectories=trajectories)
 
 
+@pytest.fixture(autouse=True)
+def fewer_resamples(monkeypatch):
+    monkeypatch.setattr(studies, "RESAMPLES_OF_STUDIES", 9_999)
+
+
 def verdicts(study):
     entries = judged(study)
     assert {entry.claim.suite for entry in entries} == {study.suite}
@@ -177,7 +182,7 @@ def test_claims_on_stops(passing, stopping, expected, monkeypatch):
 def small(tmp_path_factory):
     """Both suites with little search: three tasks with one arm, and one of the paper's."""
     folder = tmp_path_factory.mktemp("studies")
-    quick = "nodes = 60, graphs = 1, chains = 4"
+    quick = "nodes = 40, graphs = 1, chains = 2"
     tasks = 'tasks = ["one-armed/v1/d001..d003"]'
     planner = f"""{tasks}
 methods = ["receding-horizon"]
@@ -187,7 +192,7 @@ grid = {{ horizon = [0, 1, 2] }}
     beside = f'{tasks}\ngoals = [2, 3]\nmethods = ["dual-process/EC1"]\nruns = 3\n'
     smooth = f"""{tasks.replace("]", ', "ascending", "descending"]')}
 methods = ["trajectory-optimisation/jerk"]
-parameters = {{ {quick}, noisy_starts = 1 }}
+parameters = {{ {quick}, noisy_starts = 0 }}
 grid = {{ timing = ["free", "fixed"], stop = [0, 1] }}
 """
     studies_of = {}

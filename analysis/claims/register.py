@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import AfterValidator, ValidationError, model_validator
 
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import Inference
 from coartic.analysis.words import read_beside
 from coartic.errors import CoarticError
-from coartic.inputs import problems
+from coartic.inputs import FileData, problems
 
 _FILE = read_beside(__file__, "claims")
 HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
@@ -137,10 +137,8 @@ class Finding:
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
 
 
-class Claim(BaseModel):
+class Claim(FileData):
     """One statement, of the paper where it has a place, and how it is decided."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
     section: str

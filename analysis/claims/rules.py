@@ -260,7 +260,7 @@ def ordered(data: Data, claim: Claim) -> Finding:
 def printed_corrective(task: str) -> float:
     """Printed reward of the corrective process alone, with the initial hands or the best."""
     solution = published_initial(task) or published_exhaustive(task)
-    return solution.reward if solution else math.nan
+    return solution.number if solution else math.nan
 
 
 def shown_beside(data: Data, claim: Claim) -> Parts:
@@ -320,7 +320,7 @@ def as_printed(task: str, of: Side) -> str | None:
     alone = {"initial": published_initial, "best": published_exhaustive}
     cell = published_cell(task, of.who) if of.what in REWARDS else None
     if of.who in alone and (solution := alone[of.who](task)):
-        value, derived = solution.reward, solution.derived
+        value, derived = solution.number, bool(solution.difference_of)
     elif cell and (summary := cell.sequences.get(of.hands) if of.hands else cell.summary):
         value, derived = summary.mean, summary.derived
     else:

@@ -48,9 +48,7 @@ def context(data: Data, _: Claim) -> Finding:
             apart = contexts_of(data, label).apart
             parts.append(f"{name_of(label)}: {number(apart, 2)} apart")
     bound = MARGINS["spread"]
-    test = Inference(
-        contexts.spreads, (contexts.n,), "permutation test over runs", p=contexts.p, seed=SEED
-    )
+    test = Inference(contexts.spreads, (contexts.n,), "permutation test over runs", p=contexts.p)
     less_p = dependence_below(*contexts.postures, bound, np.random.default_rng(SEED))
     less = replace(test, estimate=bound - test.estimate, method="bootstrap over runs", p=less_p)
     return Finding(test.estimate > bound, f"{'; '.join(parts)}.", (test,), (less,))

@@ -64,7 +64,7 @@ def described(study: Study, cell: CellRuns) -> dict[str, object]:
     """A row of :func:`method_rows`."""
     good, runs, rewards = cell.good, cell.runs, cell.rewards
     mean = float(rewards.mean()) if len(rewards) else math.nan
-    best = None if locks_base(runs) else study.optima.get((cell.task, "free"))
+    best = None if locks_base(runs) else study.optima.get(cell.task)
     told = set(runs.told.iloc[0].split(", ")) if len(runs) else set()
     hands = tally(good.hands.value_counts().to_dict())
     arm = "still" if keeps_still(good) else "moves"

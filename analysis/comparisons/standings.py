@@ -44,7 +44,7 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     """
     by_task = {}
     for name, task in study.tasks.items():
-        best = study.optima.get((name, "free"))
+        best = study.optima.get(name)
         initial = initial_solution(task, study.model)
         if best is not None and initial is not None and 0 != best.reward > -initial.ticks:
             by_task[name] = float(-initial.ticks), best.reward
@@ -119,7 +119,7 @@ def task_by_task(study: Study) -> Iterator[Standing]:
     for (task, label), cell in study.cells.items():
         has_gap = not math.isnan(method_rows(study).gap[task, label])
         if has_gap and len(cell.good) == len(cell.runs):
-            best, reward = study.optima[task, "free"].reward, mean(cell.rewards)
+            best, reward = study.optima[task].reward, mean(cell.rewards)
             # The higher the reward, the smaller the gap.
             gap, low, high = gap_share([reward.estimate, reward.high, reward.low], best).tolist()
             yield task, label, gap, low, high, len(cell.runs)

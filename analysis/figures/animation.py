@@ -10,7 +10,6 @@ import math
 import subprocess
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from matplotlib.patches import Circle, Polygon
 
 from coartic import CoarticError, Trajectory
 from coartic.analysis.figures.robot import MARKERS, box, numbered_below
-from coartic.files import check_outputs, write_outputs
+from coartic.files import check_output, write_output
 
 FORMATS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -36,39 +35,20 @@ _HIT = "0.55"  # of a goal; not black, which is the right hand
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One movement with its title."""
-
-    title: str
-    trajectory: Trajectory
+Panel = tuple[str, Trajectory]
+"""A title and a movement."""
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Which ticks are shown, and for how long."""
-
-    stride: int
-    """Ticks from one frame to the next."""
-    interval_s: float
-    """Seconds that a frame stands; a whole number of hundredths, as GIF has them."""
-    rows: tuple[int, ...]
-    """Row of the longest trajectory that each frame shows, from 0; the last is its end."""
-    held: int
-    """Times that the last frame is repeated."""
-
-
-def timing(ticks: int, speed: float | None = None) -> Pace:
-    """Frames of a movement of ``ticks`` rows at ``speed`` (ticks per second).
+def timing(ticks: int, speed: float | None = None) -> tuple[int, float]:
+    """Ticks from one frame to the next, and seconds that a frame stands, in whole hundredths as
+    GIF has them, of a movement of ``ticks`` rows at ``speed`` (ticks per second).
 
     Without a speed it lasts :data:`LASTS_S`, or less where that would be slower than a tick a
     frame.
     """
     speed = speed or max(ticks / LASTS_S, RATE)
     stride = max(1, math.ceil(speed / RATE - 1e-9))
-    interval = max(2, round(100 * stride / speed)) / 100
-    rows = tuple(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
-    return Pace(stride, interval, rows, max(1, round(HOLD_S / interval)))
+    return stride, max(2, round(100 * stride / speed)) / 100
 
 
 def animate(
@@ -78,50 +58,55 @@ def animate(
     speed: float | None = None,
     width: int = 800,
     replace: bool = False,
-) -> Pace:
-    """Draw movements side by side, all from their first tick, into ``path``; their timing.
+) -> tuple[int, float]:
+    """Draw movements side by side, all from their first tick, into ``path``.
+
+    Returns the number of frames that differ, and the ticks that are shown in a second.
 
     ``speed`` is in ticks per second, ``width`` of the picture in pixels. A movement that ends
     before the others stands still. Without ``replace`` no file is written over. Raises
     CoarticError for an ending that is not in :data:`FORMATS`, for MP4 without ffmpeg, and where
     the file cannot be written.
     """
-    check_output(path, replace=replace)
-    if not any(panel.trajectory.ticks for panel in panels):
+    check_film(path, replace=replace)
+    if not any(movement.ticks for _, movement in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    timed = timing(max(len(panel.trajectory.configurations) for panel in panels), speed)
+    ticks = max(len(movement.configurations) for _, movement in panels)
+    stride, interval_s = timing(ticks, speed)
+    rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
+    held = max(1, round(HOLD_S / interval_s))
     figure, scenes = figure_of(panels, width)
-    rate: Any = 1 / timed.interval_s
+    rate: Any = 1 / interval_s
     # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
-    gif_rate: Any = 1000 / (1000 * timed.interval_s + 0.5)
+    gif_rate: Any = 1000 / (1000 * interval_s + 0.5)
     mp4 = path.suffix.lower() == ".mp4"
     writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
     try:
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
-                for row in [*timed.rows, *[timed.rows[-1]] * timed.held]:
+                for row in [*rows, *[rows[-1]] * held]:
                     for scene in scenes:
                         scene.show(row)
                     writer.grab_frame()
-            write_outputs({path: film.read_bytes()}, replace=replace)
+            write_output(path, film.read_bytes(), replace=replace)
     except OSError as error:
         raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
     except subprocess.CalledProcessError as error:
         raise CoarticError(f"cannot write {path}: ffmpeg failed: {error.stderr}") from None
-    return timed
+    return len(rows), stride / interval_s
 
 
-def check_output(path: Path, *, replace: bool = False) -> None:
+def check_film(path: Path, *, replace: bool = False) -> None:
     """Raises CoarticError for what cannot be written: before anything is drawn.
 
-    An ending that is not supported, MP4 without ffmpeg, what :func:`check_outputs` refuses.
+    An ending that is not supported, MP4 without ffmpeg, what :func:`check_output` refuses.
     """
     if path.suffix.lower() not in FORMATS:
         raise CoarticError(f"--out {path}: the name must end in {', '.join(FORMATS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
-    check_outputs([path], replace=replace)
+    check_output(path, replace=replace)
 
 
 class Scene:
@@ -173,7 +158,7 @@ class Scene:
 
 def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
-    movements = [panel.trajectory for panel in panels]
+    movements = [movement for _, movement in panels]
     corners = np.array([box(movement.task, movement.configurations) for movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
@@ -182,12 +167,12 @@ def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]
     # Even in pixels, as MP4 wants it.
     height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
     figure = Figure(figsize=(inches, height), dpi=_DPI)
-    for index, panel in enumerate(panels):
+    for index, (title, movement) in enumerate(panels):
         left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        task = panel.trajectory.task
+        task = movement.task
         for number, ((x, y), below) in enumerate(
             zip(task.goals, numbered_below(task), strict=True), 1
         ):
@@ -196,7 +181,7 @@ def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]
                 str(number), (x, y + side * task.radius), (0, 3 * side), fontsize=9,
                 textcoords="offset points", ha="center", va="top" if below else "bottom",
             )  # fmt: skip
-        axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
+        axes.set_title(title, fontsize=9, loc="left", pad=18, parse_math=False)
         axes.tick_params(labelsize=8)
         axes.spines[["top", "right"]].set_visible(False)
     # What stands still takes most of the time of drawing: it is drawn once, as a picture.

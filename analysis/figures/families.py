@@ -41,7 +41,7 @@ def gaps_by_family(study: Study) -> Parts:
         for place, label in enumerate(order):
             rows = data[(data.method == label) & (data.family == family)]
             rows = rows.assign(gap=rows.gap.clip(upper=_FARTHEST))
-            draw_instances(axes, -place, rows, "gap", looks[label].color)
+            draw_instances(axes, -place, rows, "gap", looks[label]["color"])
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
         axes.set_xlim(-0.004, _FARTHEST * 1.15)
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])

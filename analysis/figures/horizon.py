@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import pandas as pd
@@ -74,11 +75,12 @@ def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -
 
 def beside(axes: Axes, rows: pd.DataFrame) -> None:
     """Other methods at the horizons that they are equivalent to."""
-    for row in rows[rows.arms == "all"].to_dict("records"):
+    over_all = rows[rows.arms == "all"].to_dict("records")
+    for row, marker in zip(over_all, itertools.cycle("sD^v"), strict=False):
         look = style.look_of(EC4 if row["method"] == "learner" else row["method"])
         at, gap = row["horizon"], 100 * row["gap"]
-        thin: Any = {"color": look.color, "linewidth": 0.8, "zorder": 4}
+        thin: Any = {"color": look["color"], "linewidth": 0.8, "zorder": 4}
         axes.hlines(gap, row["horizon_low"], row["horizon_high"], **thin)
         axes.vlines(at, 100 * row["gap_low"], 100 * row["gap_high"], **thin)
-        mark: Any = {"color": look.color, "marker": look.marker, "markersize": 5, "zorder": 5}
+        mark: Any = {"color": look["color"], "marker": marker, "markersize": 5, "zorder": 5}
         axes.plot(at, gap, linestyle="", **mark, label=name_of(row["method"]))

@@ -41,7 +41,7 @@ def learning_curves(study: Study) -> Parts:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.entry(name_of(label), linewidth=1.3, **look.line)
+        style.entry(name_of(label), linewidth=1.3, **look)
         for label, look in style.looks(labels).items()
     ]
     handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
@@ -60,16 +60,16 @@ def draw_curves(
     for label, rows in data.groupby("method", sort=False):
         look = look_of[str(label)]
         axes.fill_between(
-            rows.trial, rows.best_low, rows.best_high, color=look.color, alpha=0.22, linewidth=0
+            rows.trial, rows.best_low, rows.best_high, color=look["color"], alpha=0.22, linewidth=0
         )
-        axes.plot(rows.trial, rows.best, linewidth=1.3, **look.line)
-        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look.line)
+        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
     floor, top = data.best.min(), data.best_high.max()
     initial = initial_solution(task, study.model)
     if initial is not None:
         axes.axhline(-initial.ticks, **style.INITIAL)
         floor, top = -initial.ticks, max(top, -initial.ticks)
-    optimum = study.optima.get((task.name, "free"))
+    optimum = study.optima.get(task.name)
     if optimum is not None:
         axes.axhline(optimum.reward, **style.OPTIMUM)
         top = max(top, optimum.reward)

@@ -58,7 +58,7 @@ def draw_curves(axes: Axes, data: pd.DataFrame) -> None:
     for label, rows in data.groupby("method", sort=False):
         x = np.concatenate([rows.budget.clip(lower=edge), [most]])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
-        line: Any = {**style.look_of(str(label)).line, "linewidth": 1.3}
+        line: Any = {**style.look_of(str(label)), "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
         style.tip(drawn, f"{name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
     axes.set_xlim(edge, most)

@@ -50,7 +50,7 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame) -> None:
     """Methods that know as much of the reward, nearest first."""
     axes.set_title(f"{group[0].upper()}{group[1:]}")
     for place, row in enumerate(rows.to_dict("records")):
-        color = style.look_of(row["method"]).color
+        color = style.look_of(row["method"])["color"]
         mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
         end = row["gap"]
         if not math.isnan(row["low"]):

@@ -1,7 +1,7 @@
 """One style for all figures: sizes, colours and marks.
 
 Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on
-white. All are legible on white and on #111; marks and dashes tell what colours tell.
+white. All are legible on white and on #111; dashes tell what colours tell.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
-from typing import Any, NamedTuple
+from typing import Any
 
 from matplotlib import rc_params_from_file, style
 from matplotlib.artist import Artist
@@ -56,7 +56,6 @@ _COLORS: Mapping[Color, str] = {
 }
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK = _COLORS.values()
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
-MARKERS = "osD^vPXd"
 _DASHES: Mapping[Dash, Any] = {
     "solid": "-",
     "dashed": (0, (4, 1.5)),
@@ -71,34 +70,21 @@ styled = style.context(["default", RC])
 """A decorator: draw with this style and matplotlib's defaults, whatever the user has set."""
 
 
-class Look(NamedTuple):
-    """How a method is drawn."""
-
-    color: str
-    dash: Any
-    marker: str
-
-    @property
-    def line(self) -> dict[str, Any]:
-        """Keywords of a line."""
-        return {"color": self.color, "linestyle": self.dash}
+Look = dict[str, Any]
+"""How the lines of a method are drawn: ``color`` and ``linestyle``."""
 
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:
-    """Colour, dash and mark of each method: the project's own look the same in all figures."""
+    """The look of each method: the project's own look the same in all figures."""
     look_by_id = {
-        name: Look(_COLORS[row.look[0]], _DASHES[row.look[1]], row.look[2])
+        name: {"color": _COLORS[row.look[0]], "linestyle": _DASHES[row.look[1]]}
         for name, row in KNOWN_METHODS.items()
         if row.look is not None
     }
     free = itertools.cycle(
-        Look(color, dash, marker)
-        for (dash, color), marker in zip(
-            itertools.product(
-                (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
-            ),
-            itertools.cycle(MARKERS),
-            strict=False,
+        {"color": color, "linestyle": dash}
+        for dash, color in itertools.product(
+            (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
         )
     )
     return {label: look_by_id.get(label) or next(free) for label in dict.fromkeys(labels)}

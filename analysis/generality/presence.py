@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from coartic.analysis.generality.sample import Sample, sample
 from coartic.analysis.methods import CONDITIONS
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
-from coartic.analysis.statistics.estimates import Inference
-from coartic.analysis.statistics.instances import other_tasks
+from coartic.analysis.statistics.instances import Runs
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 
@@ -36,34 +33,12 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     return by_cell
 
 
-class Presence(NamedTuple):
-    """One signature of one condition in one family, or over all of them."""
-
-    family: str
-    label: str
-    sign: str
-    instances: int
-    value: Inference
-    there: int
-    """Instances whose mean is beyond :data:`THERE`."""
-
-
-def presence(sample: Sample) -> list[Presence]:
-    """Every signature by condition and family, and over all families."""
-    rows, by_cell = [], signs(sample.study)
-    for label in CONDITIONS:
-        for sign in THERE:
-            scores = {}
-            for family, names in sample.families.items():
-                values = [by_cell.get((name, label), {}).get(sign) for name in names]
-                instances = [(of_runs,) for of_runs in values if of_runs is not None]
-                if instances:
-                    scores[family] = instances
-            parts = [{family: instances} for family, instances in scores.items()]
-            for part in [*parts, scores] if len(parts) > 1 else parts:
-                means = [float(runs[0].mean()) for instances in part.values() for runs in instances]
-                family = next(iter(part)) if len(part) == 1 else ""
-                there = sum(value > THERE[sign] for value in means)
-                mean = other_tasks(part)
-                rows.append(Presence(family, label, sign, len(means), mean, there))
-    return rows
+def scores_of(sample: Sample, label: str, sign: str) -> dict[str, list[Runs]]:
+    """A sign of a condition by family, of the instances that have a value."""
+    by_cell, scores = signs(sample.study), {}
+    for family, names in sample.families.items():
+        values = [by_cell.get((name, label), {}).get(sign) for name in names]
+        instances: list[Runs] = [(of_runs,) for of_runs in values if of_runs is not None]
+        if instances:
+            scores[family] = instances
+    return scores

@@ -14,6 +14,7 @@ from coartic.analysis.statistics.instances import Runs, Scores, gap_share
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
+from coartic.tasks.task import address_of
 
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
@@ -50,7 +51,7 @@ class Sample:
         highest = solved.groupby("task").reward.max()
         by_name = {}
         for name in self.tasks:
-            optimum = self.study.optima.get((name, "free"))
+            optimum = self.study.optima.get(name)
             rewards = [int(highest[name])] if name in highest.index else []
             if optimum is not None:
                 rewards.append(optimum.reward)
@@ -134,8 +135,16 @@ class Sample:
 
 
 def one_by_one(study: Study) -> set[str]:
-    """Names of the tasks that a report has one by one: all, but instances of families if many."""
-    drawn = {name for name, task in study.tasks.items() if task.family is not None}
+    """Names of the tasks that a report has one by one.
+
+    All, but neither instances of families nor tasks with a penalty, if these are many. A variant
+    has the name of its task before the first dot.
+    """
+    drawn = {
+        name
+        for name, task in study.tasks.items()
+        if task.penalty is not None or address_of(name.partition(".")[0]) is not None
+    }
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 

@@ -19,6 +19,7 @@ SUITE = "human"
 FEWEST_TASKS = 10
 RESAMPLES = 1_999
 AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
+NOT_RUN = "no runs"
 
 
 class Test(BaseModel):
@@ -58,10 +59,29 @@ class Finding(BaseModel):
     where: str
     silent: dict[str, str] = {}
     built_in: dict[str, str] = {}
+    not_asked: str = ""
     note: str = ""
 
 
-FINDINGS = TypeAdapter(dict[str, Finding]).validate_python(read_beside(__file__, "human"))
+def read_findings() -> dict[str, Finding]:
+    """The findings by id, with the models in the place of the names of their groups."""
+    data = read_beside(__file__, "human")
+    groups: dict[str, list[str]] = data.pop("groups")
+    findings = TypeAdapter(dict[str, Finding]).validate_python(data)
+    for name, finding in findings.items():
+        for field in ("silent", "built_in"):
+            by_name: dict[str, str] = getattr(finding, field)
+            by_model = {
+                model: what for key, what in by_name.items() for model in groups.get(key, [key])
+            }
+            if unknown := by_model.keys() - MODELS.keys():
+                raise ValueError(f"{name}: {field} has {sorted(unknown)}, no models of measures.py")
+            by_name.clear()
+            by_name.update(by_model)
+    return findings
+
+
+FINDINGS = read_findings()
 """The findings by id, in the order of the table."""
 
 
@@ -70,33 +90,28 @@ def judged(study: Study) -> pd.DataFrame:
     """A row for each finding, test and model, in their order; none for folders of other suites.
 
     Columns ``finding``, ``model``, ``measure``, ``value`` with the ``low`` and ``high`` end of its
-    interval, ``tasks``, ``verdict`` of the finding (the same for all tests of one), ``built_in``.
+    interval, ``tasks``, ``verdict`` of the finding (the same for all tests of one), ``built_in``:
+    whether it follows from how the model is built, ``because``: why a model is silent.
     Intervals are of the bootstrap over tasks, 95 % for one test and wider for several
     (Bonferroni).
     """
-    columns = [
-        "finding",
-        "model",
-        "measure",
-        "value",
-        "low",
-        "high",
-        "tasks",
-        "verdict",
-        "built_in",
-    ]
     rows = []
     for name, finding in FINDINGS.items() if study.suite == SUITE else ():
         for model in MODELS:
-            values = [MEASURES[test.measure](study, MODELS[model]) for test in finding.tests]
+            silent = finding.silent.get(model, "")
+            values = [
+                None if silent else MEASURES[test.measure](study, MODELS[model])
+                for test in finding.tests
+            ]
             level = LEVEL / len(finding.tests)
             ends = [(math.nan,) * 3 if of is None else bootstrapped(of, level) for of in values]
             counts = [0 if of is None else len(of.by_task) for of in values]
-            verdict = verdict_of(finding, ends, counts)
+            verdict = SILENT if silent else verdict_of(finding, ends, counts)
+            built_in = finding.built_in.get(model) == verdict
             for test, end, count in zip(finding.tests, ends, counts, strict=True):
-                built_in = finding.built_in.get(model, "")
-                rows.append((name, model, test.measure, *end, count, verdict, built_in))
-    return pd.DataFrame(rows, columns=columns)
+                rows.append((name, model, test.measure, *end, count, verdict, built_in, silent))
+    columns = "finding model measure value low high tasks verdict built_in because"
+    return pd.DataFrame(rows, columns=columns.split())
 
 
 def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
@@ -113,7 +128,7 @@ def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
     resampled = np.array(
         [values.statistic(np.concatenate([values.by_task[k] for k in tasks])) for tasks in drawn]
     )
-    away: Array = (resampled[np.isfinite(resampled)] - estimate) * math.sqrt(count / (count - 1))
+    away: Array = (resampled - estimate) * math.sqrt(count / (count - 1))
     low, high = estimate + np.quantile(away, [level / 2, 1 - level / 2])
     return estimate, float(low), float(high)
 
@@ -123,7 +138,7 @@ def verdict_of(
 ) -> str:
     """Of a model on a finding, from the value of each test with its interval."""
     if not all(tasks):
-        return SILENT
+        return NOT_RUN
     agrees, disagrees = [], []
     for test, (_, low, high) in zip(finding.tests, ends, strict=True):
         sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
@@ -132,6 +147,6 @@ def verdict_of(
         near, far = sorted((sign * low, sign * high))
         agrees.append(near >= sign * bound)
         disagrees.append(far < sign * wrong)
-    if min(tasks) < FEWEST_TASKS:
+    if min(tasks) < FEWEST_TASKS or all(agrees) == any(disagrees):
         return UNDECIDED
-    return AGREES if all(agrees) else DISAGREES if any(disagrees) else UNDECIDED
+    return AGREES if all(agrees) else DISAGREES

@@ -34,6 +34,8 @@ STATIONS = 100
 NEAR_TIE = 0.05
 """Both hands need the same ticks within this share of the fewer."""
 FEWEST_TIES = 30
+LONG = 6
+"""Goals of a task on which it is asked how far ahead is enough."""
 ENOUGH = 1.01
 """Ticks of a horizon that is enough, as a multiple of those with all goals in view."""
 SERIAL = 0.95
@@ -101,17 +103,23 @@ def cells_by_method(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, An
     return by_method
 
 
-def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
-    """A model's runs by task; ``others`` are parameters in the place of its own."""
+def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
+    """A model's cells; ``others`` are parameters in the place of its own."""
     asked = {**model.parameters, **others}
     methods = [model.method] if model.method else {*map(most_exploring, study.tasks.values())}
-    return {
-        cell.task: study.trajectories(cell.task, cell.label)
+    return [
+        cell
         for method in methods
         for cell, parameters in cells_by_method(study).get(method, [])
         if (model.method or most_exploring(study.tasks[cell.task]) == method)
         and all(parameters.get(name) == value for name, value in asked.items())
-    }
+    ]
+
+
+def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
+    """A model's runs by task."""
+    cells = cells_of(study, model, **others)
+    return {cell.task: study.trajectories(cell.task, cell.label) for cell in cells}
 
 
 def still(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
@@ -119,7 +127,7 @@ def still(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Tra
     return {
         name: runs
         for name, runs in runs_of(study, model, **others).items()
-        if not _MOVED.match(name) and len(runs.task.hands) == arms and len(runs.task.goals) < 6
+        if not _MOVED.match(name) and len(runs.task.hands) == arms and len(runs.task.goals) < LONG
     }
 
 
@@ -133,6 +141,20 @@ def moved(study: Study, model: Model, goal: int, **others: Any) -> dict[str, lis
     for group in groups.values():
         group.sort(key=lambda runs: runs.task.goals[goal - 1])
     return {task: group for task, group in groups.items() if len(group) > 2}
+
+
+def run_ids(study: Study, name: str, where: str) -> str:
+    """The ids of a model's runs in a block of the suite: moved goals, tasks or long tasks."""
+    model = MODELS[name]
+    if where == "long tasks":  # all horizons together make one value
+        model = Model(model.method, {})
+    return " ".join(
+        str(run)
+        for cell in cells_of(study, model)
+        if bool(_MOVED.match(cell.task)) == (where == "moved goals")
+        and (len(study.tasks[cell.task].goals) >= LONG) == (where == "long tasks")
+        for run in cell.good.run_id
+    )
 
 
 # Postures that follow a goal that moves
@@ -229,7 +251,12 @@ def benefit_correlation(study: Study, model: Model) -> Values | None:
         for task, norm in norms.items()
         if task in alone
     ]
-    return Values(rows, lambda pairs: float(stats.kendalltau(*pairs.T).statistic)) if rows else None
+    return Values(rows, rank_correlation) if rows else None
+
+
+def rank_correlation(pairs: Array) -> float:
+    """Kendall's τ; 0 where one of both is the same on all tasks."""
+    return float(np.nan_to_num(stats.kendalltau(*pairs.T).statistic))
 
 
 # Paths of the hand
@@ -420,7 +447,7 @@ def sufficient_horizon(study: Study, model: Model) -> Values | None:
         return None
     ticks: dict[str, dict[int, int]] = {}
     for cell, parameters in cells_by_method(study).get(PLANNER, []):
-        if len(study.tasks[cell.task].goals) >= 6:
+        if len(study.tasks[cell.task].goals) >= LONG:
             horizon = min(parameters["horizon"], len(study.tasks[cell.task].goals) - 1)
             ticks.setdefault(cell.task, {})[horizon] = -int(cell.rewards[0])
     enough = [

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -30,7 +29,7 @@ from coartic.analysis.reconstruction.scoring import (
     printed_tests,
 )
 from coartic.analysis.reconstruction.search import Search
-from coartic.learner.learning import threads_for
+from coartic.learner.learning import TRIALS, threads_for
 from coartic.motion.sequences import CorrectiveTrials
 from coartic.robot import Array
 from coartic.tasks.readings import condition_under
@@ -47,26 +46,12 @@ ENSEMBLE, LAST = 0, 99
 CLEARLY = 2.0  # standard errors by which another point has to be nearer
 
 
-class Wave(NamedTuple):
-    """A step of the search for the nearest point."""
-
-    points: int
-    """Of how many points, the best of the wave before."""
-    runs: int
-    """Further runs a condition."""
-    around: int = 0
-    """Further points, in random steps from them."""
-    step: float = 0.0
-    """SD of these steps, length unit."""
-
-
-PLAN = (
-    Wave(points=60, runs=20),
-    Wave(points=12, runs=20, around=60, step=0.1),
-    Wave(points=12, runs=20, around=60, step=0.03),
-    Wave(points=16, runs=60),
-    Wave(points=5, runs=200),
-)
+PLAN = ((60, 20, 0, 0.0), (12, 20, 60, 0.1), (12, 20, 60, 0.03), (16, 60, 0, 0.0), (5, 200, 0, 0.0))
+"""The waves of the search for the nearest point. Of each: of how many points, the best of the wave
+before; further runs a condition; further points, in random steps from those; SD of these steps,
+length unit."""
+LAST_RUNS = 300
+"""Runs a condition of the nearest point and of one that stands, to choose between them."""
 
 
 class Scored(NamedTuple):
@@ -85,9 +70,6 @@ def reconstruct(
     *,
     members: int = 240,
     runs: int = 20,
-    last: int = 300,
-    plan: Sequence[Wave] = PLAN,
-    trials: int = 10_000,
     report: Callable[[str], None] = lambda text: None,
 ) -> pd.DataFrame:
     """Search, spread, score and choose.
@@ -96,8 +78,8 @@ def reconstruct(
     distance. The first is the nearest set that was found; each of the others is as far as
     possible from those before it. The layout's earlier sets of goals compete where they meet every
     constraint, and come last; the first of them stands unless another one is nearer beyond
-    chance, by ``last`` further runs a condition. The result depends on the arguments and on
-    nothing else.
+    chance, by :data:`LAST_RUNS` further runs a condition. The result depends on the arguments
+    and on nothing else.
     """
     layout = search.layout
     goals = np.array(list(layout.earlier.values())).reshape(-1, len(layout.goals), 2)
@@ -110,18 +92,17 @@ def reconstruct(
     apart = features(search.attempt(pool, sequences), printed)
     spread = pool[spread_out(apart, members, 0 if len(compete) else None)]
 
-    score = partial(scored, search, trials=trials)
     begin = np.concatenate([spread, without(compete, spread)])
-    results = score(begin, wave=ENSEMBLE, runs=runs)
+    results = scored(search, begin, wave=ENSEMBLE, runs=runs)
     report(described(results, runs))
-    nearest = best_of_waves(search, results, plan=plan, trials=trials, report=report).point[None]
+    nearest = best_of_waves(search, results, report).point[None]
     if len(compete) and not (nearest == compete[:1]).all():
         both = np.concatenate([nearest, compete[:1]])
-        challenger, standing = score(both, wave=LAST, runs=last)
+        challenger, standing = scored(search, both, wave=LAST, runs=LAST_RUNS)
         better = clearly_nearer(challenger, standing, printed_tests(search.task.name))
         report(
             f"the nearest {challenger.distance:.2f}, the one that stands {standing.distance:.2f}, "
-            f"{last} runs a condition: {'it is replaced' if better else 'it stands'}"
+            f"{LAST_RUNS} runs a condition: {'it is replaced' if better else 'it stands'}"
         )
         nearest = nearest if better else compete[:1]
 
@@ -131,7 +112,7 @@ def reconstruct(
     fresh = np.unique(without(points, begin), axis=0)
     by_point = {
         result.point.tobytes(): result
-        for result in (*results, *score(fresh, wave=ENSEMBLE, runs=runs))
+        for result in (*results, *scored(search, fresh, wave=ENSEMBLE, runs=runs))
     }
     rows = [
         member_row(name, places, by_point[point.tobytes()])
@@ -196,7 +177,6 @@ def scored(
     *,
     wave: int,
     runs: int,
-    trials: int = 10_000,
     before: Mapping[bytes, Scored] = MappingProxyType({}),
 ) -> list[Scored]:
     """Learning runs at points ``(N, P)``, with the seeds of a wave, beside what is printed.
@@ -211,7 +191,7 @@ def scored(
     def score(point: Array, goals: Array) -> Scored:
         task, earlier, cells = search.task_with(goals), before.get(point.tobytes()), {}
         for name, condition in conditions.items():
-            cell = learned(task, condition, seeds, model=search.model, trials=trials)
+            cell = learned(task, condition, seeds, model=search.model, trials=TRIALS)
             cells[name] = cell if earlier is None else pd.concat([earlier.cells[name], cell])
         comparisons = compared(tests, cells)
         return Scored(point, cells, comparisons, distance(comparisons))
@@ -223,24 +203,21 @@ def scored(
 def best_of_waves(
     search: Search,
     results: Sequence[Scored],
-    *,
-    plan: Sequence[Wave] = PLAN,
-    trials: int = 10_000,
-    report: Callable[[str], None] = lambda text: None,
+    report: Callable[[str], None],
 ) -> Scored:
     """The point that is nearest to what is printed after some waves, which begin with these."""
     before = {result.point.tobytes(): result for result in results}
-    for number, wave in enumerate(plan, ENSEMBLE + 1):
-        best = sorted(results, key=lambda result: result.distance)[: wave.points]
+    for number, (best_points, runs, around_them, step) in enumerate(PLAN, ENSEMBLE + 1):
+        best = sorted(results, key=lambda result: result.distance)[:best_points]
         points = np.array([result.point for result in best])
-        if wave.around:
-            rng = np.random.default_rng([number, wave.around])
-            around = np.round(search.spread(points, wave.around, rng, wave.step), DECIMALS)
+        if around_them:
+            rng = np.random.default_rng([number, around_them])
+            around = np.round(search.spread(points, around_them, rng, step), DECIMALS)
             around = search.admitted(around[search.layout.allowed(around)], "around the best")
             points = np.unique(np.concatenate([points, around]), axis=0)
-        results = scored(search, points, wave=number, runs=wave.runs, trials=trials, before=before)
+        results = scored(search, points, wave=number, runs=runs, before=before)
         before |= {result.point.tobytes(): result for result in results}
-        report(f"wave {number}: {described(results, wave.runs)}")
+        report(f"wave {number}: {described(results, runs)}")
     return min(results, key=lambda result: result.distance)
 
 

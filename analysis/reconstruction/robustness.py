@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import repeat
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -31,19 +31,10 @@ PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
 VERDICTS = ("supported", "not supported", "undecided")
 
 
-class Specification(NamedTuple):
-    """Choices that the paper leaves open."""
-
-    readings: str
-    """Those that are not the default, as ``ties=right``, with spaces between them."""
-    task: str
-    """Whose goals are of a member; empty where all goals are the default ones."""
-    member: str
-
-    @property
-    def label(self) -> str:
-        """Such as ``two-armed-1-m017, ties=right``; ``default`` where nothing differs."""
-        return ", ".join(filter(None, (self.member, *self.readings.split()))) or "default"
+Specification = tuple[str, str, str]
+"""Choices that the paper leaves open: readings that are not the default, as ``ties=right``, with
+spaces between them; the task whose goals are of a member, and the member, both empty where all
+goals are the default ones."""
 
 
 def judged_specifications(
@@ -51,7 +42,7 @@ def judged_specifications(
     *,
     claims: Iterable[Claim] = PAPERS,
     jobs: int = 1,
-    progress: Callable[[Specification], None] = lambda specification: None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> pd.DataFrame:
     """A row a specification and claim of the paper that its runs can judge.
 
@@ -70,8 +61,9 @@ def judged_specifications(
             judge_view, views, views.values(), repeat(names)
         ):
             rows += judged
-            judgeable |= {(specification.task, name) for name in claims_judged}
-            progress(specification)
+            readings, task, member = specification
+            judgeable |= {(task, name) for name in claims_judged}
+            progress(", ".join(filter(None, (member, *readings.split()))) or "default")
     kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
     return pd.DataFrame(kept, columns=list(COLUMNS))
 
@@ -86,12 +78,12 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
     tasks = {name: task_of(name) for name in study.plan.tasks}
     plain = {name: name for name, task in tasks.items() if task is None}
     if plain:
-        yield Specification(readings, "", ""), study_as(study, plain)
+        yield (readings, "", ""), study_as(study, plain)
     default = {task: task if task in tasks else f"{task}-m001" for task in with_members()}
     for task in with_members():
         others = {at: t for t, at in default.items() if t != task and at in tasks}
         for name in admitted_members(study, task):
-            yield Specification(readings, task, name), study_as(study, {name: task} | others)
+            yield (readings, task, name), study_as(study, {name: task} | others)
 
 
 def admitted_members(study: Study, task: str) -> list[str]:
@@ -137,7 +129,7 @@ def judge_view(
     specification: Specification, view: Study, names: Sequence[str]
 ) -> tuple[Specification, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
-    task, rows, claims_judged = specification.task, [], []
+    task, rows, claims_judged = specification[1], [], []
     wanted = [CLAIMS[name] for name in names]
     if task:  # what the default goals of the other task do is no matter of a member's
         for number, claim in enumerate(wanted):
@@ -153,7 +145,7 @@ def judge_view(
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
             claims_judged.append(claim.id)
-        row = {**specification._asdict(), "claim": claim.id}
+        row: dict[str, Any] = dict(zip(COLUMNS, (*specification, claim.id), strict=False))
         row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
         row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
         if finding.tests:

@@ -10,7 +10,7 @@ Runs are a table: ``reward`` of each (NaN where it completed no trial) and ``han
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -18,22 +18,15 @@ import numpy as np
 import pandas as pd
 from scipy import special, stats
 
-from coartic import CONDITIONS, PAPER, CoarticError, MotionModel, Task, learn_many, load_task
+from coartic import CONDITIONS, PAPER, MotionModel, Task, learn_many
 from coartic.analysis.published import RUNS, entries_of
-from coartic.analysis.reconstruction.layouts import constraints_of, try_sequences
-from coartic.analysis.statistics import equivalence
 from coartic.learner.conditions import ExplorationCondition
 from coartic.robot import Array
-from coartic.tasks.members import task_of
-from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
 
 RESAMPLES = 200  # of the runs, for the standard error of a distance
 FARTHEST = 5.0
 """Standard errors that a figure counts at most, and where too few runs learned its hands: a
 sequence that is not learned is as bad as one with a figure far off, never better."""
-SHARES = 0.25  # margin of equivalence of shares of runs
-FRESH_SEEDS = 800_000_000
-"""Seeds of runs for :func:`beside_printed` begin here: they have selected nothing."""
 
 
 @dataclass(frozen=True)
@@ -227,66 +220,3 @@ def distance_error(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> 
         drawn = {name: runs.iloc[numbers[name]] for name, runs in cells.items()}
         distances.append(distance(compared(tests, drawn)))
     return float(np.std(distances, ddof=1))
-
-
-def beside_printed(
-    names: Sequence[str],
-    *,
-    readings: Sequence[str] = (),
-    runs: int = 100,
-    trials: int = 10_000,
-    jobs: int = 2,
-    progress: Callable[[str], None] = lambda text: None,
-) -> pd.DataFrame:
-    """What is printed of tasks beside fresh runs of them, or of members: a row a figure.
-
-    Columns ``task``, ``figure``, ``printed``, ``sd`` (printed), ``ours``, ``our_sd``, ``runs``
-    (those that the figure rests on), ``low`` and ``high`` (of the difference) and ``verdict``
-    of equivalence: means within 1 %, shares within :data:`SHARES`. SDs and orders have no margin:
-    ``distance`` says by how many standard errors they, and all others, are off. Raises
-    CoarticError for a task of which nothing is printed.
-    """
-    chosen, rows = load_readings(readings), []
-    model, fields = model_under(chosen), condition_under(chosen)
-    for name in names:
-        task, plain = task_under(chosen, load_task(name)), task_of(name) or name
-        conditions = conditions_of(plain, fields)
-        if not conditions:
-            raise CoarticError(f"the paper prints nothing of task {name!r}")
-        for constraint in constraints_of(load_task(plain)):
-            if constraint.reward is not None:
-                (hands,) = constraint.sequences
-                tried = try_sequences(task, [hands], task.goal_array[None], model=model, jobs=1)
-                rows.append({
-                    "task": name, "figure": f"{hands}, corrective process alone",
-                    "printed": constraint.reward, "ours": float(tried.rewards[0, 0]), "runs": 1,
-                    "verdict": "same" if constraint.holds(tried)[0] else "different",
-                })  # fmt: skip
-        seeds, cells = range(FRESH_SEEDS, FRESH_SEEDS + runs), {}
-        for label, condition in conditions.items():
-            cells[label] = learned(task, condition, seeds, model=model, trials=trials, jobs=jobs)
-            progress(f"{name}, {label}: {runs} runs")
-        for test in printed_tests(plain):
-            ours, distance = test.compare(cells)
-            row = {"task": name, "figure": test.label, "ours": ours, "distance": distance}
-            if isinstance(test, Figure):
-                row |= equivalence_row(test, cells[test.condition])
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def equivalence_row(figure: Figure, runs: pd.DataFrame) -> dict[str, Any]:
-    """What is printed of a figure, and its difference from ours where it has a margin."""
-    rewards, share = learned_rewards(runs, figure.hands), figure.kind == "share"
-    row = {"printed": figure.value, "runs": len(runs) if share else len(rewards)}
-    if figure.kind == "mean":
-        row["sd"] = math.nan if figure.sd is None else figure.sd
-        row["our_sd"] = float(rewards.std(ddof=1)) if len(rewards) > 1 else math.nan
-    if share:
-        theirs = round(figure.value * figure.runs), figure.runs
-        difference = equivalence.shares((len(rewards), len(runs)), theirs, SHARES)
-    elif figure.kind == "mean" and len(rewards) > 1:
-        difference = equivalence.difference(rewards, figure.value, figure.sd, figure.runs)
-    else:
-        return row
-    return row | {name: getattr(difference, name) for name in ("low", "high", "verdict")}

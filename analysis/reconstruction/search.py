@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-import pandas as pd
 
 from coartic import CoarticError, MotionModel, Task, load_task
 from coartic.analysis.reconstruction.layouts import (
@@ -61,11 +60,6 @@ class Search:
         """The rewards that have to come out, by hand sequence in alphabetical order."""
         rewards = {c.sequences[0]: c.reward for c in self.constraints if c.reward is not None}
         return dict(sorted(rewards.items()))
-
-    @property
-    def tried_table(self) -> pd.DataFrame:
-        """What was tried: stage, number of sets of goals."""
-        return pd.DataFrame(self.tried.items(), columns=["stage", "sets of goals"])
 
     def task_with(self, goals: Array) -> Task:
         """The task with other goals, ``(G, 2)``."""

@@ -33,6 +33,8 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.paper import best_condition
 
 Facts = dict[str, Any]
+PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
+"""Terms of a penalty in words."""
 
 
 @cached
@@ -98,7 +100,7 @@ def gain(study: Study) -> Facts | None:
 def paper(study: Study) -> Facts | None:
     """What became of the paper's rewards and claims; None without its tasks and families."""
     entries = [entry for entry in judged(study) if entry.claim.place]
-    if not paper_rows(study) and not any(entry.run_ids for entry in entries):
+    if not entries or not (paper_rows(study) or any(entry.run_ids for entry in entries)):
         return None
     rewards = Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
     return {
@@ -144,7 +146,7 @@ def nearest(study: Study) -> Facts | None:
         return None
     by_trial = groups["trial"].to_dict("records")
     places = [place for place, row in enumerate(by_trial) if is_learner(row["method"])]
-    optima = [best for (_, arm), best in study.optima.items() if arm == "free"]
+    optima = study.optima.values()
     return {
         **{name: rows.to_dict("records") for name, rows in groups.items()},
         "best": nearest_first[0],
@@ -298,6 +300,29 @@ def stops(study: Study) -> list[Facts] | None:
 
 
 @cached
+def objectives(study: Study) -> Facts | None:
+    """Regrets at the largest weight, by penalty, and where trial and error overtakes."""
+    rows = tables.TABLES["objectives"](study)
+    if not len(rows):
+        return None
+    last = rows[rows.weight == rows.weight.max()]
+    by_term = {term: part.set_index("who") for term, part in last.groupby("term", sort=False)}
+    crossings = tables.TABLES["crossings"](study)
+    return {
+        "tasks": int(rows.tasks.max()),
+        "weight": rows.weight.max(),
+        "penalties": [
+            {"term": PENALTIES[str(term)], "regret": part.regret.to_dict()}
+            for term, part in by_term.items()
+        ],
+        "crossings": [
+            {**row, "term": PENALTIES[row["term"]]}
+            for row in crossings[crossings.who == "learner"].to_dict("records")
+        ],
+    }
+
+
+@cached
 def limits(study: Study) -> Facts:
     """What the results cannot show, as far as it depends on the folder."""
     runs, made_with = study.runs, study.made_with
@@ -306,7 +331,7 @@ def limits(study: Study) -> Facts:
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
     fewest = min((len(cell.runs) for cell in learners), default=0)
     tasks = {name: study.tasks[name] for name in study.tasks if name in one_by_one(study)}
-    optima = {name: study.optima.get((name, "free")) for name in tasks}
+    optima = {name: study.optima.get(name) for name in tasks}
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
     return {
         "runs": len(runs),

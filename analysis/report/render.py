@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import math
-from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -28,7 +27,7 @@ TONES = {
     "used to choose the goals": "plain",
 }
 """Class of a verdict on the page, by its words."""
-PACKAGES = "% needs \\usepackage{booktabs,siunitx} and \\usepackage[T1]{fontenc}"
+PACKAGES = "% needs \\usepackage{booktabs} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
 _LATEX = str.maketrans(
     {
@@ -133,34 +132,21 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str) -> str:
-    """A table for a paper, with booktabs; plain numbers stand in siunitx's S columns."""
-    cells: dict[str, Any] = {}
-    formats: dict[Any, Any] = {}
-    for column, header in columns_of(frame).items():
-        if is_number(frame[column]) and not any(f"{column}{end}" in frame for end in _COMPANIONS):
-            cells[header] = figures_of(frame, column)
-            formats[header] = partial(siunitx, column=column_of(column))
-        else:
-            cells[header] = list(map(latex, texts_of(frame, column)))
-    styler = pd.DataFrame(cells).style.format(formats, na_rep="{--}").hide(axis="index")
-    body = styler.format_index(latex, axis="columns").to_latex(
+    """A table for a paper, with booktabs: what the page shows, numbers to the right."""
+    columns = columns_of(frame)
+    cells = {
+        header: list(map(latex, texts_of(frame, column))) for column, header in columns.items()
+    }
+    styler = pd.DataFrame(cells).style.hide(axis="index").format_index(latex, axis="columns")
+    body = styler.to_latex(
         hrules=True,
-        siunitx=True,
-        column_format="".join("S" if header in formats else "l" for header in cells),
+        column_format="".join("r" if is_number(frame[column]) else "l" for column in columns),
         caption=latex(caption),
         label=f"tab:coartic-{name}",
         position="tp",
         position_float="centering",
     )
     return f"{PACKAGES}\n{body}"
-
-
-def siunitx(value: float, column: Column) -> str:
-    """A number as siunitx reads it: no thousands apart, a plain hyphen as the minus."""
-    if math.isinf(value):
-        return "{$\\infty$}"
-    text = number(100 * value if column.percent else value, 3 if column.p else column.digits)
-    return text.replace("−", "-").replace("\u202f", "")
 
 
 def latex(text: object) -> str:

@@ -153,12 +153,12 @@ def slopes(family: ContextFamily, cells: Mapping[str, Trajectories]) -> Rows:
     ``cells``: what one method did on tasks of the family, in their order.
     """
     task = next(iter(cells.values())).task
-    position = dict(zip(family.tasks, family.positions.tolist(), strict=True))
-    beside = {family.moving - 1, family.moving + 1} & set(range(1, len(task.goals) + 1))
+    moving, position = family
+    beside = {moving - 1, moving + 1} & set(range(1, len(task.goals) + 1))
     for goal, hand in product(sorted(beside), HANDS):
         runs = {name: cell.with_hand(hand, goal) for name, cell in cells.items()}
         places = [position[name] for name, of_task in runs.items() for _ in of_task]
-        n, place = len(places), {"goal": goal, "hand": hand, "moving": family.moving}
+        n, place = len(places), {"goal": goal, "hand": hand, "moving": moving}
         if not n:
             continue
         if len(set(places)) < LEAST:

@@ -13,7 +13,6 @@ independent evidence of the slope.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
@@ -29,17 +28,10 @@ LEAST = 3
 """Positions of the moving goal that make a family."""
 
 
-@dataclass(frozen=True)
-class ContextFamily:
-    """Tasks that differ in exactly one goal."""
-
-    moving: int
-    """Number of the goal that differs, from 1."""
-    tasks: tuple[str, ...]
-    positions: Array
-    """Position of that goal along the line it moves on, length unit, from the family's mean.
-    The line is the first principal axis, pointing right (or up): the coordinate itself
-    where only one changes."""
+ContextFamily = tuple[int, dict[str, float]]
+"""Tasks that differ in one goal: its number, from 1, and its position in each task, by name.
+Positions are along the line that it moves on, length unit, from the family's mean. The line is the
+first principal axis, pointing right (or up): the coordinate itself where only one changes."""
 
 
 def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
@@ -54,16 +46,16 @@ def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
     for (index, _), names in groups.items():
         goals = np.array([tasks[name].goals[index] for name in names])
         if len(np.unique(goals, axis=0)) >= LEAST:
-            moving.append(ContextFamily(index + 1, tuple(names), _along(goals)))
+            moving.append((index + 1, dict(zip(names, _along(goals).tolist(), strict=True))))
     return moving
 
 
 def variants(groups: Sequence[ContextFamily]) -> list[set[str]]:
     """Tasks that families join, directly or through tasks that they share."""
-    joined = DisjointSet(name for family in groups for name in family.tasks)
-    for family in groups:
-        for name in family.tasks:
-            joined.merge(family.tasks[0], name)
+    joined = DisjointSet(name for _, positions in groups for name in positions)
+    for _, positions in groups:
+        for name in positions:
+            joined.merge(next(iter(positions)), name)
     sets: list[set[str]] = joined.subsets()
     return sets
 

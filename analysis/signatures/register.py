@@ -61,7 +61,7 @@ def rows_of_cells(study: Study) -> Rows:
     groups, pairs = families(study.tasks), pairs_of_contexts(study)
     for (task, label), cell in trajectories.items():
         of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
-        moving = [group for group in groups if task in group.tasks]
+        moving = [group for group in groups if task in group[1]]
         rows = [measured_within(cell)]
         partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
         for first, second, shared in partners:
@@ -70,7 +70,7 @@ def rows_of_cells(study: Study) -> Rows:
         if not partners:
             rows.append(without(CONTEXTS, IN_FAMILY if moving else NO_CONTEXT))
         for group in moving:
-            cells = {name: of_method[name] for name in group.tasks if name in of_method}
+            cells = {name: of_method[name] for name in group[1] if name in of_method}
             if task == next(iter(cells)):
                 rows.append(slopes(group, cells))
         if not moving:

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
 from coartic.analysis.statistics.estimates import Interval
 from coartic.analysis.words import read_beside
+from coartic.inputs import FileData
 
 COLUMNS = {
     "signature": "", "where": "", "value": math.nan, "low": math.nan, "high": math.nan,
@@ -31,10 +32,8 @@ Row = dict[str, Any]
 Rows = Iterator[Row]
 
 
-class Signature(BaseModel):
+class Signature(FileData):
     """One signature, as a row of ``register.toml``, which says what the fields are."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     two_hands: bool = False

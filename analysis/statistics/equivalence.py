@@ -1,9 +1,8 @@
-"""Whether two means, or two shares, agree within a margin: by inclusion of their interval.
+"""Whether two means agree within a margin: by inclusion of their interval.
 
 A 95 % interval within ±margin is two one-sided tests at level 2.5 % (TOST; D. J. Schuirmann 1987,
 Journal of Pharmacokinetics and Biopharmaceutics 15). The interval of means is Welch's, since of
-the paper's runs only mean, SD and number are printed; that of shares of runs is that of
-R. G. Newcombe (1998), Statistics in Medicine 17, 873.
+the paper's runs only mean, SD and number are printed.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from coartic.analysis.statistics.estimates import (
     sample,
     samples_of,
     student,
-    wilson,
 )
 from coartic.robot import Array
 
@@ -35,7 +33,7 @@ MARGIN = 0.01
 class Equivalence(Inference):
     """A difference with its interval, beside a margin above 0.
 
-    ``p``, of means, is of the hypothesis that they differ by the margin or more: the larger p of
+    ``p`` is of the hypothesis that they differ by the margin or more: the larger p of
     the two one-sided tests.
     """
 
@@ -96,20 +94,3 @@ def _welch(value: float, variances: list[tuple[float, int]], margin: float) -> E
     interval = student(value, error, freedom)
     p = float(special.stdtr(freedom, (abs(value) - margin) / error))
     return replace(inference, low=interval.low, high=interval.high, p=p)
-
-
-def shares(first: tuple[int, int], second: tuple[int, int], margin: float) -> Equivalence:
-    """Share of ``first`` less that of ``second``, each a count and the runs it is out of.
-
-    Newcombe's hybrid of two Wilson intervals (1998, method 10), from −1 to 1.
-    """
-    a, b = (wilson(*of) for of in (first, second))
-    apart = a.value - b.value
-    return Equivalence(
-        apart,
-        (first[1], second[1]),
-        "difference of shares, score interval (Newcombe 1998, method 10)",
-        apart - math.hypot(a.value - a.low, b.high - b.value),
-        apart + math.hypot(a.high - a.value, b.value - b.low),
-        margin=margin,
-    )

@@ -3,8 +3,7 @@
 Samples are rewards (or any score) of independent runs; a plain number in the place of a sample is
 taken as known without error. Intervals are of the BCa bootstrap, and the edge cases of that are
 all in :func:`bootstrap_estimate`. Signatures have :func:`student` intervals, shares of runs
-Wilson's. Resampling gives the same result for the same seed, which has nothing to do with the
-seeds of the runs.
+Wilson's. Resampling has one seed, :data:`SEED`, which has nothing to do with the seeds of the runs.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14;
 R. Agarwal et al. (2021), NeurIPS 34 (probability of improvement); R. G. Newcombe (2006),
@@ -60,8 +59,6 @@ class Inference:
     """Of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     p: float = math.nan
-    seed: int | None = None
-    """Seed of the resampling; None where nothing was drawn."""
     note: str = ""
     """Why there is no interval or p-value, or why it is a special one."""
 
@@ -121,13 +118,13 @@ def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Ar
     return both.reward_x.to_numpy(np.float64), both.reward_y.to_numpy(np.float64)
 
 
-def mean(values: ArrayLike, *, seed: int = SEED, resamples: int = RESAMPLES) -> Inference:
+def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Inference:
     """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
-    return bootstrap_estimate("mean", (sample(values),), np.mean, seed, resamples)
+    return bootstrap_estimate("mean", (sample(values),), np.mean, resamples)
 
 
 def difference_of_means(
-    first: ArrayLike, second: ArrayLike | float, *, seed: int = SEED, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike | float, *, resamples: int = RESAMPLES
 ) -> Inference:
     """Mean of ``first`` less mean of ``second``, independent samples, or a sample and a number.
 
@@ -136,16 +133,16 @@ def difference_of_means(
     samples = samples_of(first, second)
     if len(samples) == 1:
         name = "difference to a known value"
-        return bootstrap_estimate(name, samples, np.mean, seed, resamples)
+        return bootstrap_estimate(name, samples, np.mean, resamples)
 
     def difference(a: Array, b: Array, axis: int) -> Array:
         return np.asarray(a.mean(axis) - b.mean(axis))
 
-    return bootstrap_estimate("difference of means", samples, difference, seed, resamples)
+    return bootstrap_estimate("difference of means", samples, difference, resamples)
 
 
 def probability_of_improvement(
-    first: ArrayLike, second: ArrayLike | float, *, seed: int = SEED, resamples: int = RESAMPLES
+    first: ArrayLike, second: ArrayLike | float, *, resamples: int = RESAMPLES
 ) -> Inference:
     """P(a run of ``first`` is higher than one of ``second``), a tie counting half.
 
@@ -161,7 +158,7 @@ def probability_of_improvement(
         samples, statistic = tuple(np.split(ranks, [len(samples[0])])), share_higher
     estimate, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
     if 0.0 < estimate < 1.0 or min(n) < FEWEST:
-        return bootstrap_estimate(name, samples, statistic, seed, resamples)
+        return bootstrap_estimate(name, samples, statistic, resamples)
     far = farthest_improvement(n)
     low, high = (far, 1.0) if estimate == 1.0 else (0.0, 1 - far)
     method = f"{name}, score interval (Newcombe 2006, method 5)"
@@ -212,7 +209,6 @@ def bootstrap_estimate(
     name: str,
     samples: tuple[Array, ...],
     statistic: Callable[..., Any],
-    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Inference:
     """A statistic of one or more independent samples with its BCa interval.
@@ -248,15 +244,15 @@ def bootstrap_estimate(
             vectorized=True,
             confidence_level=CONFIDENCE,
             method="percentile" if large else "BCa",
-            rng=np.random.default_rng(seed),
+            rng=np.random.default_rng(SEED),
         )
     low, high = map(float, result.confidence_interval)
     if math.isfinite(low) and math.isfinite(high) and not large:
-        return replace(inference, low=low, high=high, seed=seed)
+        return replace(inference, low=low, high=high)
     low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
     method = f"{name}, percentile bootstrap, {resamples} resamples"
     note = "" if large else "BCa is not defined for this sample"
-    return replace(inference, method=method, low=low, high=high, seed=seed, note=note)
+    return replace(inference, method=method, low=low, high=high, note=note)
 
 
 def student(value: float, error: float, freedom: float, p: float = math.nan) -> Interval:

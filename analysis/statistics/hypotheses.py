@@ -49,7 +49,6 @@ def bootstrap_test(
     second: ArrayLike | float,
     alternative: Alternative = "greater",
     *,
-    seed: int = SEED,
     resamples: int = RESAMPLES,
 ) -> Inference:
     """Test of equal means by the bootstrap: the paper's own kind of test.
@@ -78,7 +77,7 @@ def bootstrap_test(
     if not size:
         return replace(inference, note="no test: no spread to resample")
     observed = estimate / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
     for values, sign in zip(shifted, (1, -1), strict=False):
         rows = max(1, AT_ONCE // len(values))
@@ -96,10 +95,10 @@ def bootstrap_test(
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
-    return replace(inference, p=float(1 + extreme.sum()) / (1 + resamples), seed=seed)
+    return replace(inference, p=float(1 + extreme.sum()) / (1 + resamples))
 
 
-def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided") -> Inference:
+def sign_flip_test(differences: ArrayLike) -> Inference:
     """Permutation test of paired differences (n,): each may change its sign.
 
     Exact in level where the differences are symmetric about 0, as they are if within each
@@ -111,7 +110,7 @@ def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided
     inference = Inference(
         float(values.mean()),
         (len(values),),
-        f"{TAILS[alternative]} sign-flip test of paired differences, "
+        "two-tailed sign-flip test of paired differences, "
         + ("exact" if exact else f"{RESAMPLES} resamples"),
     )
     if len(values) < 2:
@@ -120,13 +119,12 @@ def sign_flip_test(differences: ArrayLike, alternative: Alternative = "two-sided
         (values,),
         np.mean,
         permutation_type="samples",
-        alternative=alternative,
         vectorized=True,
         n_resamples=RESAMPLES,
         batch=max(1, min(1_000, AT_ONCE // len(values))),
         rng=np.random.default_rng(SEED),
     )
-    return replace(inference, p=float(result.pvalue), seed=None if exact else SEED)
+    return replace(inference, p=float(result.pvalue))
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
@@ -139,9 +137,7 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Inference(count / total - share, (total,), name, p=p)
 
 
-def independence_test(
-    first: Sequence[int], second: Sequence[int], *, seed: int = SEED
-) -> Inference:
+def independence_test(first: Sequence[int], second: Sequence[int]) -> Inference:
     """Fisher's exact test that two rows of counts share one distribution over categories.
 
     Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all
@@ -159,9 +155,9 @@ def independence_test(
     pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
     *columns, (last, of_first) = sorted(pairs)
     if math.prod(count + 1 for count, _ in columns) > MOST_TABLES:
-        method = stats.MonteCarloMethod(rng=np.random.default_rng(seed))
+        method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
         p = float(stats.fisher_exact(rows, method=method).pvalue)
-        return replace(inference, method=f"{inference.method}, Monte Carlo", p=p, seed=seed)
+        return replace(inference, method=f"{inference.method}, Monte Carlo", p=p)
     # Ways to choose the first row's runs, by how many it has of the columns so far.
     ways, seen = {0: [1]}, math.comb(last, of_first)
     for count, in_first in columns:

@@ -61,7 +61,7 @@ def value(runs: Runs) -> float:
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
-def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
+def other_tasks(scores: Scores) -> Inference:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
     The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
@@ -81,7 +81,7 @@ def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
         return Inference(estimate, n, name, note=note)
     deviations = np.zeros(RESAMPLES)
     for place, (family, instances) in enumerate(scores.items()):
-        rng = np.random.default_rng([seed, place])
+        rng = np.random.default_rng([SEED, place])
         deviations += resampled_deviations(instances, values[family], rng)
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(estimate):
         return Inference(estimate, n, name, estimate, estimate, note=NO_SPREAD)
@@ -93,7 +93,7 @@ def other_tasks(scores: Scores, *, seed: int = SEED) -> Inference:
         [max(greatest_value(runs, 1) for runs in instances) for instances in scores.values()]
     )
     ends = max(float(low), float(least)), min(float(high), float(most))
-    return Inference(estimate, n, name, *ends, seed=seed)
+    return Inference(estimate, n, name, *ends)
 
 
 def greatest_value(runs: Runs, sign: int) -> float:

@@ -2,21 +2,47 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.generality.exploration import CONTRASTS, contrasts, gains
-from coartic.analysis.generality.presence import presence
-from coartic.analysis.generality.sample import sample
-from coartic.analysis.methods import INITIAL, is_variant, name_of
+from coartic.analysis.generality.presence import THERE, scores_of
+from coartic.analysis.generality.sample import Sample, sample
+from coartic.analysis.methods import (
+    CONDITIONS,
+    EC1,
+    EC2,
+    EC3,
+    EC4,
+    INITIAL,
+    is_variant,
+    name_of,
+)
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import interval
-from coartic.analysis.statistics.instances import other_tasks, value
+from coartic.analysis.statistics.estimates import LEVEL, interval
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.robot import Array
+
+Part = TypeVar("Part")
+CONTRASTS = (
+    (EC2, INITIAL),
+    (EC1, INITIAL),
+    (EC3, EC2),
+    (EC4, EC3),
+    (EC4, EC2),
+)
+"""More exploration against less: learning at all; random hands in place of the closest, the other
+arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
+differ in nothing but the hands that they try."""
+ALL = "all"
+"""In the column of families: the mean over all of them, each counting alike."""
 
 
 @table(
@@ -55,13 +81,60 @@ def family_gaps(study: Study) -> Rows:
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
+def gains(instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]) -> Scores:
+    """Rewards of both as shares of the best known, by family: what the first gains."""
+
+    def share(name: str, label: str) -> Array:
+        gap = instances.gap(name, label)
+        assert gap is not None  # of shared instances
+        return -gap
+
+    return {
+        family: [(share(name, first), share(name, second)) for name in of_family]
+        for family, of_family in names.items()
+    }
+
+
+def gains_by_hands(
+    instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]
+) -> Scores:
+    """The part of it that the hand sequences make: as if each run got the best that is known with
+    its hands. The rest is what joints make of them."""
+
+    def share(name: str, label: str) -> Array:
+        best_by_hands, best = instances.by_hands[name], instances.references[name].reward
+        hands = instances.study.cells[name, label].good.hands
+        return np.array([best_by_hands[str(sequence)] for sequence in hands]) / abs(best)
+
+    return {
+        family: [(share(name, first), share(name, second)) for name in of_family]
+        for family, of_family in names.items()
+    }
+
+
+def told_apart(first: Array, second: Array) -> bool:
+    """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
+    if not np.ptp(first) and not np.ptp(second):
+        return bool(first[0] != second[0])
+    other = second if len(second) > 1 else float(second[0])
+    return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
+
+
+def each_and_all(by_family: dict[str, Part]) -> Iterator[tuple[str, dict[str, Part]]]:
+    """Every family by itself, and ``all`` of them where there are several."""
+    for family, part in by_family.items():
+        yield family, {family: part}
+    if len(by_family) > 1:
+        yield ALL, by_family
+
+
 def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
     """Ids of the runs of methods on the instances of a family, or of all."""
     return runs_of(
         *(
             cell
             for (task, label), cell in study.cells.items()
-            if label in labels and (not family or study.tasks[task].family == family)
+            if label in labels and (family == ALL or study.tasks[task].family == family)
         )
     )
 
@@ -78,22 +151,31 @@ def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
 )
 def exploration(study: Study) -> Rows:
     """More exploration against less, by family and over all of them."""
-    for contrast in contrasts(study):
-        first, second = contrast.first, contrast.second
+    instances = sample(study)
+    for first, second in CONTRASTS if instances else ():
+        assert instances is not None
         less = "the initial solution" if second == INITIAL else name_of(second)
-        row: Row = {
-            "contrast": f"{name_of(first)} over {less}",
-            "family": contrast.family or "all",
-            "instances": contrast.instances,
-            **interval("gain", contrast.difference),
-            "median": contrast.median,
-            **interval("by_hands", contrast.hands),
-            "better": contrast.better,
-            "worse": contrast.worse,
-            "told_apart": contrast.told,
-            **family_runs(study, contrast.family, (first, second)),
-        }
-        yield f"{row['contrast']}, {row['family']}", row
+        contrast = f"{name_of(first)} over {less}"
+        for family, names in each_and_all(instances.shared(first, second)):
+            scores = gains(instances, first, second, names)
+            of_instances = [runs for of_family in scores.values() for runs in of_family]
+            # Equal means of different runs may differ in the last bit.
+            values = np.array(list(map(value, of_instances))).round(12)
+            row: Row = {
+                "contrast": contrast,
+                "family": family,
+                "instances": len(values),
+                **interval("gain", other_tasks(scores)),
+                "median": float(np.median(values)),
+                **interval(
+                    "by_hands", other_tasks(gains_by_hands(instances, first, second, names))
+                ),
+                "better": int((values > 0).sum()),
+                "worse": int((values < 0).sum()),
+                "told_apart": sum(told_apart(*runs) for runs in of_instances),
+                **family_runs(study, family, (first, second)),
+            }
+            yield f"{contrast}, {family}", row
 
 
 @table(
@@ -104,17 +186,20 @@ def exploration(study: Study) -> Rows:
 def family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, by condition and family."""
     instances = sample(study)
-    for sign in presence(instances) if instances else ():
-        row: Row = {
-            "sign": SIGNS[sign.sign].in_short,
-            "method": sign.label,
-            "family": sign.family or "all",
-            "instances": sign.instances,
-            "there": sign.there,
-            **interval("mean", sign.value),
-            **family_runs(study, sign.family, (sign.label,)),
-        }
-        yield f"{sign.sign}, {sign.label}, {row['family']}", row
+    for label, sign in itertools.product(CONDITIONS, THERE if instances else ()):
+        assert instances is not None
+        for family, scores in each_and_all(scores_of(instances, label, sign)):
+            means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]
+            row: Row = {
+                "sign": SIGNS[sign].in_short,
+                "method": label,
+                "family": family,
+                "instances": len(means),
+                "there": sum(mean > THERE[sign] for mean in means),
+                **interval("mean", other_tasks(scores)),
+                **family_runs(study, family, (label,)),
+            }
+            yield f"{sign}, {label}, {family}", row
 
 
 @cached

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from coartic.analysis.human.judge import FINDINGS, judged
-from coartic.analysis.human.measures import MODELS
+from coartic.analysis.human.measures import MODELS, run_ids
 from coartic.analysis.study import Study
 from coartic.analysis.tables.table import Column, Row, Rows, table
+from coartic.analysis.words import in_brackets, number
 
 
 @table(
@@ -14,24 +17,34 @@ from coartic.analysis.tables.table import Column, Row, Rows, table
     **{f"of {name}": Column(name) for name in MODELS},
 )
 def human(study: Study) -> Rows:
-    """Whether each model agrees with each finding; a star: because of how it is built."""
+    """Whether each model agrees with each finding, by how much; a star: it is built so."""
     for name, rows in judged(study).groupby("finding", sort=False):
-        verdicts: Row = {"finding": FINDINGS[str(name)].statement}
-        for row in rows.drop_duplicates("model").itertuples():
-            verdicts[f"of {row.model}"] = f"{row.verdict}{' *' if row.built_in else ''}"
-        yield str(name), verdicts | {"run_ids": ""}
+        finding = FINDINGS[str(name)]
+        verdicts: Row = {"finding": finding.statement}
+        for model, of_model in rows.groupby("model", sort=False):
+            verdicts[f"of {model}"] = in_words(of_model)
+        runs = (run_ids(study, model, finding.where) for model in MODELS)
+        yield str(name), verdicts | {"run_ids": " ".join(runs)}
 
 
-@table("finding, model, measure, value[], tasks, verdict")
+def in_words(tests: pd.DataFrame) -> str:
+    """A model's verdict on a finding, with the effect of each test."""
+    first = tests.iloc[0]
+    verdict = f"{first.verdict}{' *' if first.built_in else ''}"
+    effects = [
+        f"{number(row.value, 2)} {in_brackets(row.low, row.high, 2)}".strip()
+        for row in tests.itertuples()
+        if row.tasks
+    ]
+    return f"{verdict}: {'; '.join(effects)}" if effects else verdict
+
+
+@table("finding, model, measure, value[], tasks, verdict, built_in, because")
 def human_effects(study: Study) -> Rows:
-    """What each model shows of each finding, with its interval over tasks."""
-    for row in judged(study).itertuples():
-        if row.tasks:
-            yield (
-                f"{row.finding} {row.model} {row.measure}",
-                {
-                    **{"finding": row.finding, "model": row.model, "measure": row.measure},
-                    **{"value": row.value, "value_low": row.low, "value_high": row.high},
-                    **{"tasks": row.tasks, "verdict": row.verdict, "run_ids": ""},
-                },
-            )
+    """What each model shows of each finding, with its interval over tasks; why it is silent."""
+    for row in judged(study).rename(columns={"low": "value_low", "high": "value_high"}).to_dict(
+        "records"
+    ):
+        where = FINDINGS[row["finding"]].where
+        ids = run_ids(study, row["model"], where) if row["tasks"] else ""
+        yield f"{row['finding']} {row['model']} {row['measure']}", {**row, "run_ids": ids}

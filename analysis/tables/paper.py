@@ -15,16 +15,12 @@ from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import RUNS, Summary, published_cell, published_initial
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.statistics.estimates import (
-    Interval,
     interval,
     mean,
     standard_deviation,
-    student,
 )
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
-from coartic.analysis.trajectories import initial_solution
 from coartic.analysis.words import marked
 
 
@@ -48,7 +44,7 @@ def tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
         task, label = study.tasks[name], best_condition(study, name)
-        best = study.optima.get((name, "free"))
+        best = study.optima.get(name)
         row: Row = {
             "task": marked(task.label, task),
             "arms": len(task.hands),
@@ -87,7 +83,7 @@ def published(study: Study) -> Rows:
             "task": marked(study.tasks[task].label, study.tasks[task]),
             "condition": condition,
             **printed_mean(row.published),
-            "published_initial": getattr(published_initial(task), "reward", None),
+            "published_initial": getattr(published_initial(task), "number", None),
             **our_mean(row.rewards),
             "ours_initial": row.cell.good.initial_reward.dropna().mean(),
             "verdict": row.verdict,
@@ -166,58 +162,6 @@ def claims(study: Study) -> Rows:
             "run_ids": " ".join(entry.run_ids),
         }
         yield claim.id, row
-
-
-@cached
-def learned_rewards(study: Study) -> pd.DataFrame:
-    """Mean learned reward of the paper's conditions, on tasks that have more than one of them.
-
-    Of each task first the initial solution, then the conditions, each tested against the row
-    before it (one-tailed bootstrap test). Columns ``task``, ``method`` (``initial`` or a label),
-    ``runs``, ``reward[]``, ``published[]``, ``p``.
-    """
-    rows: list[Row] = []
-    for name, task in study.tasks.items():
-        printed = [c for c in CONDITIONS if published_cell(name, c.removeprefix(LEARNER))]
-        cells = [study.cells.get((name, label)) for label in printed or CONDITIONS]
-        solved = [cell for cell in cells if cell is not None and len(cell.good)]
-        execution = initial_solution(task, study.model)
-        if len(solved) < 2 or execution is None:
-            continue
-        before: Any = float(-execution.ticks)
-        initial = published_initial(name)
-        rows.append(
-            {
-                "task": name,
-                "method": "initial",
-                "reward": before,
-                "published": float(initial.reward) if initial else math.nan,
-            }
-        )
-        for cell in solved:
-            rewards, paper = cell.rewards, published_of(cell)
-            rows.append(
-                {
-                    "task": name,
-                    "method": cell.label,
-                    "runs": len(rewards),
-                    **interval("reward", mean(rewards)),
-                    **printed_interval(paper.summary if paper else None),
-                    "p": bootstrap_test(rewards, before).p,
-                }
-            )
-            before = rewards
-    columns = ["task", "method", "runs", "reward", "reward_low", "reward_high", "published"]
-    return pd.DataFrame(rows, columns=[*columns, "published_low", "published_high", "p"])
-
-
-def printed_interval(summary: Summary | None) -> Row:
-    """A printed mean with Student's interval, where an SD is printed."""
-    if summary is None or summary.sd is None or summary.runs < 2:
-        mean_of = Interval(math.nan if summary is None else summary.mean)
-    else:
-        mean_of = student(summary.mean, summary.sd / math.sqrt(summary.runs), summary.runs - 1)
-    return interval("published", mean_of)
 
 
 @cached

@@ -29,7 +29,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.files import check_outputs, publish, write_outputs
+    from coartic.files import check_output, publish, write_output
     from coartic.tasks.families import named_by, task_text
 
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
@@ -41,8 +41,8 @@ def draw(
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
-        check_outputs([out], replace=replace)
-        write_outputs({out: picture(drawing, out.suffix.lower())}, replace=replace)
+        check_output(out, replace=replace)
+        write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(drawing, ".svg")}
@@ -71,11 +71,11 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import Panel, animate, check_output
+    from coartic.analysis.figures.animation import animate, check_film
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
-    check_output(out, replace=replace)
+    check_film(out, replace=replace)
     if speed is not None and not speed > 0:
         raise CoarticError(f"--speed {speed:g}: give a number of ticks per second above 0.")
     if initial and other is not None:
@@ -85,15 +85,15 @@ def animate(
         _, stored = find_run(name, folder)
         movement, number = trajectory_of(stored), stored.run.row["run"]
         title = one_line(f"{movement.task.label}: {name_of(stored.method)}, run {number}")
-        panels.append(Panel(title, movement))
+        panels.append((title, movement))
     if initial:
-        task = panels[0].trajectory.task
+        task = panels[0][1].task
         hands = initial_hands(task, model=stored.model)
         movements = corrective_trial(task, hands, model=stored.model).movements
         initial_solution = trajectory(task, movements, model=stored.model)
-        panels.insert(0, Panel(f"{task.label}: initial solution", initial_solution))
-    timed = animate(panels, out, speed=speed, width=width, replace=replace)
-    say(f"{out}: {len(timed.rows)} frames, {timed.stride / timed.interval_s:.0f} ticks a second.")
+        panels.insert(0, (f"{task.label}: initial solution", initial_solution))
+    frames, ticks_a_second = animate(panels, out, speed=speed, width=width, replace=replace)
+    say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
 
 COMMANDS = (draw, animate)

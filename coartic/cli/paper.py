@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -87,6 +86,8 @@ def goals(
 
     It keeps an ensemble of them.
     """
+    import pandas as pd
+
     from coartic.analysis.reconstruction.ensemble import reconstruct
     from coartic.analysis.reconstruction.search import search_for
 
@@ -94,45 +95,11 @@ def goals(
     search = search_for(task, readings=tuple(reading or ()), jobs=jobs)
     out = checked_folder(folder, names)
     ensemble = reconstruct(search, members=members, runs=runs, report=say)
-    tables = zip(names, (ensemble, search.tried_table), strict=True)
-    publish(out, {name: csv_of(table) for name, table in tables})
+    tried = pd.DataFrame(search.tried.items(), columns=["stage", "sets of goals"])
+    publish(out, dict(zip(names, map(csv_of, (ensemble, tried)), strict=True)))
     distance = ensemble.distance[0]
     say(f"The nearest set lies {distance:.2f} standard errors from the printed results.")
     say(f"Written: {out / names[0]} and {out / names[1]}")
-
-
-@app.command("results")
-def results(
-    tasks: Annotated[
-        list[str], typer.Argument(metavar="TASK...", help="Tasks, or members of an ensemble.")
-    ],
-    runs: Annotated[
-        int, typer.Option(parser=at_least(3), metavar="N", help="Runs of each condition.")
-    ] = 100,
-    trials: TrialsOfRun = 10_000,
-    out: Annotated[
-        str | None, typer.Option(metavar="FOLDER", help="Folder for a table of it.")
-    ] = None,
-    reading: given.Readings = None,
-    jobs: given.Jobs = -1,
-) -> None:
-    """Compare every printed result of a task with fresh runs."""
-    from coartic.analysis.reconstruction.scoring import beside_printed
-
-    folder = None if out is None else checked_folder(out, ["printed.csv"])
-    table = beside_printed(
-        tasks,
-        readings=tuple(reading or ()),
-        runs=runs,
-        trials=trials,
-        jobs=jobs,
-        progress=say,
-    )
-    columns = ["figure", "task", "printed", "sd", "ours", "our_sd", "runs", "verdict"]
-    show_frame(table[columns].map(short))
-    if folder is not None:
-        publish(folder, {"printed.csv": csv_of(table)})
-        say(f"Written: {folder / 'printed.csv'}")
 
 
 @app.command("claims")
@@ -148,31 +115,21 @@ def claims(
 ) -> None:
     """Judge the claims under other readings and goals."""
     from coartic.analysis import load
-    from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.figures.robustness import specification_curve, verdicts
     from coartic.analysis.reconstruction.robustness import judged_specifications, shares
 
-    tables = ("specifications.csv", "shares.csv")
-    pictures = [f"{name}{kind}" for name in ("verdicts", "specification-curve") for kind in FORMATS]
-    folder = checked_folder(out, [*tables, *pictures])
+    names = ("specifications.csv", "shares.csv")
+    folder = checked_folder(out, names)
     table = judged_specifications(
         map(load, folders),
         jobs=jobs,
-        progress=lambda specification: say(f"Judged: {specification.label}"),
+        progress=lambda specification: say(f"Judged: {specification}"),
     )
     if table.empty:
         raise CoarticError(
             "no claim of the paper can be judged there. Run its conditions with 10 000 trials."
         )
     counts = shares(table)
-    files = dict(zip(tables, map(csv_of, (table, counts)), strict=True))
-    figures = [verdicts(table)]
-    if table.effect.notna().any():
-        figures.append(specification_curve(table))
-    files |= {
-        f"{plot.id}{kind}": picture(plot.figure, kind) for plot in figures for kind in FORMATS
-    }
-    publish(folder, files)
+    publish(folder, dict(zip(names, map(csv_of, (table, counts)), strict=True)))
     show_frame(counts)
     say(f"Written: {folder}")
 
@@ -187,10 +144,3 @@ def checked_folder(name: str, files: Sequence[str], what: str = "--out") -> Path
 def csv_of(table: pd.DataFrame) -> bytes:
     """A table as a file."""
     return table.to_csv(index=False, lineterminator="\n").encode()
-
-
-def short(value: object) -> str:
-    """A cell of a table: numbers with at most three decimals, nothing for NaN."""
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{round(value, 3):g}"
-    return str(value)

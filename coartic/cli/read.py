@@ -97,12 +97,12 @@ def compare(
 ) -> None:
     """Compare two results folders."""
     from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
-    from coartic.files import check_outputs, write_outputs
+    from coartic.files import check_output, write_output
 
     if out is not None:
         if out.suffix.lower() != ".csv":
             raise CoarticError(f"--out {out}: the name must end in .csv.")
-        check_outputs([out], replace=replace)
+        check_output(out, replace=replace)
     studies = load_pair(first, second)
     show_frame(differences(*studies))
     cells = compared_cells(*studies)
@@ -114,7 +114,7 @@ def compare(
     )
     say(f"{counted(len(cells), 'cell')} in both: {tally or 'nothing to compare'}.")
     if out is not None:
-        write_outputs({out: cells.to_csv(index=False).encode()}, replace=replace)
+        write_output(out, cells.to_csv(index=False).encode(), replace=replace)
         say(f"All cells: {out}")
     elif len(unlike) > 20:
         say("--out FILE.csv writes all cells.")
@@ -167,9 +167,8 @@ def cite(
     ] = False,
 ) -> None:
     """Print what to cite, as BibTeX."""
-    from coartic.analysis.citations import MethodSource, bibliography
+    from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
-    from coartic.runs.plan import BUILT_IN
     from coartic.runs.store import open_store
 
     made_with = None
@@ -177,11 +176,7 @@ def cite(
     if folder is not None:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
-    methods = [
-        MethodSource(name, method.title, method.citation, method.origin == BUILT_IN)
-        for name, method in declared.items()
-    ]
-    text = bibliography(methods, analysis=analysis, environment=made_with)
+    text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
 
 

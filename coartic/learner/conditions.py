@@ -4,11 +4,9 @@ A condition says which hands the robot has, which joints are perturbed (AModChos
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
 The learner reads these fields; it has no code of its own for any condition.
 
-Variants go beyond the paper. Two integrate informed search as its Discussion proposes:
-a secondary objective in the nullspace of the corrective process, and noise whose mean
-lies in the direction that the corrective process suggests. One takes the corrective
-process away, one learns from the reward of each subtask in place of the overall one, which
-the paper calls crucial. Suite ablations measures what each does to learning.
+Variants go beyond the paper. One takes the corrective process away, one learns from the reward
+of each subtask in place of the overall one, which the paper calls crucial. Suite ablations
+measures what each does to learning.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 MOST_NOISE = 100.0
-"""Largest noise, length unit and rad, and bias: far beyond what any arm can use. Targets that
+"""Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
 HandExploration = Literal["none", "closest", "random"]
 Ties = Literal["left", "right", "random", "nearest", "previous"]
@@ -56,11 +54,6 @@ class ExplorationCondition:
     hand_exploration: HandExploration  # "random" is DASel
     epsilon: Share = 0.2  # ε
     noise_sd: Noise = 0.05  # SD of η, length unit (base) or rad (joints)
-    nullspace_gain: Share = 0.0
-    """β of the corrective process (:func:`coartic.motion.corrective.correct`)."""
-    bias: Noise = 0.0
-    """Mean of η along the step that **A** would make from q*, on the explored joints, in
-    SDs of η. Its mean across that direction stays zero."""
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
@@ -119,14 +112,10 @@ CONDITIONS = {
         ExplorationCondition("EC4", HANDS, True, True, "random"),
     )
 }
-NULLSPACE_GAIN = 0.05  # β of the nullspace variants
-BIAS = 0.25  # of the biased variants, SDs of η
 VARIANTS = {
     f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **changes)  # type: ignore[arg-type]
     for base in ("EC1", "EC4")
     for name, changes in {
-        "nullspace": {"nullspace_gain": NULLSPACE_GAIN},
-        "biased": {"bias": BIAS},
         "uncorrected": {"corrects": False},
         "subtask": {"credit": "subtask"},
     }.items()

@@ -11,9 +11,8 @@ trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy genera
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
 and the pick is random, or where two hands are equal and ties are broken at random; one
-standard normal per explored joint, in the order of ``q``, where a target is stored; a bias
-draws nothing. Runs share nothing: the result of one depends neither on the others nor on
-their number.
+standard normal per explored joint, in the order of ``q``, where a target is stored. Runs share
+nothing: the result of one depends neither on the others nor on their number.
 """
 
 from __future__ import annotations
@@ -34,9 +33,10 @@ from coartic.motion.compiled import (
     joint_chain,
     record_type,
 )
-from coartic.motion.corrective import correct_lanes, shift_kernel
+from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
-from coartic.motion.movement import Scratch, move_lanes, scratch_for
+from coartic.motion.movement import move_lanes
+from coartic.motion.penalty import penalty_at
 from coartic.motion.problem import arm_of, goal_of
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
@@ -57,7 +57,6 @@ class Rules(NamedTuple):
     exploration: int
     epsilon: float
     noise_sd: float
-    bias: float
     corrects: bool
     ties: int
     rounding: float  # distances that differ by no more are equal
@@ -74,7 +73,7 @@ class Log(NamedTuple):
 
     count: Any  # (N,)
     movements: Any  # (N, 2 G) records of goal, hand, kind, ticks and target
-    hits: Any  # (N, G) records of hand and q
+    hits: Any  # (N, G) records of hand, penalty and q
 
 
 class Kept(NamedTuple):
@@ -84,6 +83,7 @@ class Kept(NamedTuple):
     completed: Any  # (N, T)
     best_trial: Any  # (N,), -1 for none
     replayed: Any  # (N,) whether the replay hit every goal
+    replay_rewards: Any  # (N,)
     counts: Any  # (N, counters) what was spent, without the replay
     corrections: Any  # (N, 1 + PARTS) made until the end of trial 0, and of each part of the rest
     first: Log
@@ -99,7 +99,6 @@ class Count(NamedTuple):
     iterations: int = 2
     corrections: int = 3
     failed: int = 4
-    biased: int = 5
 
 
 COUNT = Count()
@@ -112,8 +111,10 @@ class Work(NamedTuple):
 
     runs: Any  # (N,) records: see runs_for
     trials: Any  # (N,) records: see _TRIAL
+    before: Any  # (N, width) where each hit the goal before, or started; with a penalty alone
     lanes: Lanes
-    scratch: Scratch
+    xs: Any  # (n + 1,) for the longer arm: positions of its joints
+    ys: Any
 
 
 def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
@@ -133,7 +134,6 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         exploration=_EXPLORATION[condition.hand_exploration],
         epsilon=float(condition.epsilon),
         noise_sd=float(condition.noise_sd),
-        bias=float(condition.bias),
         corrects=bool(condition.corrects),
         ties=_TIES[condition.ties],
         rounding=_EQUALLY_NEAR if condition.equal_distance == "random" else -1.0,
@@ -163,7 +163,7 @@ def empty_log(runs: int, task: Task) -> Log:
     goals, q = len(task.goals), (np.float64, width_of(task.robot))
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
     movement = record_type({**numbers, "target": q})
-    hit = record_type({"hand": np.int64, "q": q})
+    hit = record_type({"hand": np.int64, "penalty": np.int64, "q": q})
     count = np.zeros(runs, dtype=np.int64)
     return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
@@ -175,7 +175,7 @@ _TRIAL = record_type(
         "stored": np.bool_,  # whether the hand has a stored target
         "aimed": np.bool_,  # whether it moves to a target of its own before A acts
         "going": np.bool_,  # whether the trial has not failed
-        "total": np.int64,  # ticks
+        "total": np.int64,  # ticks and penalties
         "counts": (np.int64, len(COUNT)),  # of all trials of the run
     }
 )
@@ -188,8 +188,10 @@ def work_for(runs: int, task: Task) -> Work:
     return Work(
         runs=runs_for(runs, task.robot),
         trials=np.zeros(runs, _TRIAL),
+        before=np.zeros((runs, width_of(task.robot))),
         lanes=lanes_for(task.robot),
-        scratch=scratch_for(task.robot),
+        xs=np.empty(task.robot.most_links + 1),
+        ys=np.empty(task.robot.most_links + 1),
     )
 
 
@@ -197,12 +199,11 @@ def work_for(runs: int, task: Task) -> Work:
 def distance_to_goal(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
     """How far a hand of run ``n`` is from the centre of a goal, length unit."""
     arm = arm_of(problem, hand)
-    scratch = work.scratch
-    joint_chain(work.runs[n].q, arm, scratch.xs, scratch.ys)
+    joint_chain(work.runs[n].q, arm, work.xs, work.ys)
     work.trials[n].counts[COUNT.evaluations] += 1
     tip = len(arm.links)
-    dx = problem.goals[number, 0] - scratch.xs[tip]
-    dy = problem.goals[number, 1] - scratch.ys[tip]
+    dx = problem.goals[number, 0] - work.xs[tip]
+    dy = problem.goals[number, 1] - work.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
 
 
@@ -303,20 +304,24 @@ def aim(
     number: int,
     first: bool,
     explore: bool,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
     rngs: Any,
     work: Any,
 ) -> None:
-    """Where something is learned, set the target; elsewhere see whether the goal is hit."""
-    goal = goal_of(problem, number)
+    """Where a target is planned or learned, set it; elsewhere see whether the goal is hit."""
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         run.acting = False
         if not trial.going:
             continue
         hand = trial.hand
+        if first and not math.isnan(first_targets[number, 0]):
+            trial.stored, trial.aimed, run.acting = False, True, True
+            fill_row(run.target, first_targets[number])
+            continue
         learned = tables[n, number, previous_hand(trial, rules), hand]
         stored = learned.target
         trial.stored = trial.aimed = learned.value > -math.inf
@@ -327,13 +332,6 @@ def aim(
             run.hit = distance_to_goal(n, number, hand, problem, work) <= problem.radius
             continue
         set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
-        if explore and rules.bias > 0.0:
-            # The mean of η moves into the direction in which **A** would step from q*(s, a).
-            arm, length = arm_of(problem, hand), rules.bias * rules.noise_sd
-            explored = rules.explored[hand]
-            shift_kernel(run.target, stored, arm, goal, explored, length, work.scratch)
-            trial.counts[COUNT.evaluations] += 1
-            trial.counts[COUNT.biased] += 1
         run.acting = True
 
 
@@ -405,11 +403,21 @@ def correct_runs(number: int, problem: Any, rules: Any, log: Any, work: Any) -> 
             run.acting = trial.going = run.converged
 
 
+@inlined
+def pay_penalty(n: int, number: int, hit: Any, problem: Any, work: Any) -> None:
+    """What run ``n`` loses beside ticks at the goal that it has just hit."""
+    before, arm = work.before[n], arm_of(problem, hit.hand)
+    hit.penalty = penalty_at(before, hit.q, arm, number == 0, problem.penalty, work.xs, work.ys)
+    work.trials[n].total += hit.penalty
+    fill_row(before, hit.q)
+
+
 @inner
 def make_trial(
     first: bool,
     explore: bool,
     first_hands: Any,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
@@ -417,10 +425,12 @@ def make_trial(
     rngs: Any,
     work: Any,
 ) -> None:
-    """One trial of every run into ``log``; the ``first`` one with ``first_hands``."""
+    """One trial of every run into ``log``; the ``first`` one with ``first_hands`` and targets."""
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         fill_row(run.q, problem.start)
+        if problem.penalty.exist:
+            fill_row(work.before[n], problem.start)
         run.evaluations = 0
         trial.previous = NO_HAND
         trial.going = True
@@ -432,7 +442,7 @@ def make_trial(
                 work.trials[n].hand = first_hands[number]
         else:
             choose_hands(number, explore, problem, rules, tables, rngs, work)
-        aim(number, first, explore, problem, rules, tables, rngs, work)
+        aim(number, first, explore, first_targets, problem, rules, tables, rngs, work)
         for kind in range(2):
             if kind == CORRECTIVE:
                 correct_runs(number, problem, rules, log, work)
@@ -443,6 +453,8 @@ def make_trial(
                 hit = log.hits[n, number]
                 hit.hand = trial.previous = trial.hand
                 fill_row(hit.q, work.runs[n].q)
+                if problem.penalty.exist:
+                    pay_penalty(n, number, hit, problem, work)
     for n in range(len(work.runs)):
         work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
 
@@ -459,7 +471,7 @@ def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> N
             while row > 0 and log.movements[n, row - 1].goal == number:
                 row -= 1
                 ticks += log.movements[n, row].ticks
-            credit = later = rules.discount * later - ticks
+            credit = later = rules.discount * later - (ticks + log.hits[n, number].penalty)
         hit = log.hits[n, number]
         knows = number > 0 and not rules.goal_alone
         before = log.hits[n, number - 1].hand if knows else NO_HAND
@@ -503,6 +515,7 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
 @entry
 def learn_kernel(
     first_hands: Any,
+    first_targets: Any,
     problem: Any,
     rules: Any,
     tables: Any,
@@ -513,7 +526,8 @@ def learn_kernel(
 ) -> None:
     """All trials of N runs, each with its own generator, and the replay of what they learned.
 
-    ``first_hands`` (G,) are those of trial 0. ``tables`` and ``kept`` are filled; ``log``
+    ``first_hands`` (G,) are those of trial 0, ``first_targets`` (G, width) where it moves to, NaN
+    where the corrective process acts. ``tables`` and ``kept`` are filled; ``log``
     is overwritten by every trial.
     """
     trials = kept.rewards.shape[1]
@@ -521,9 +535,13 @@ def learn_kernel(
         replay = trial == trials
         for n in range(len(work.trials) if replay else 0):  # which is not part of the runs
             fill_row(kept.counts[n], work.trials[n].counts)
-        make_trial(trial == 0, not replay, first_hands, problem, rules, tables, log, rngs, work)
+        first = trial == 0
+        make_trial(
+            first, not replay, first_hands, first_targets, problem, rules, tables, log, rngs, work
+        )
         if not replay:
             learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
         kept.replayed[n] = work.trials[n].going
+        kept.replay_rewards[n] = -work.trials[n].total
         copy_movements(n, log, kept.replay)

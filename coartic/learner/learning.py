@@ -28,14 +28,15 @@ from coartic.learner.kernel import (
     rules_of,
     work_for,
 )
+from coartic.method import Meter
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
-from coartic.motion.initial import InitialSearch, search_initial_hands
-from coartic.motion.lanes import LANES
+from coartic.motion.initial import initial_hands
+from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
-from coartic.motion.solution import Execution, Movement, execute, hands_in
+from coartic.motion.solution import Execution, Movement, execute, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of, letters_of
@@ -47,27 +48,6 @@ CORRECTIONS = "corrections"
 
 
 @dataclass(frozen=True)
-class Counters:
-    """What one run spent. The replay is not part of it."""
-
-    trials: int
-    """Trials made, trial 0 included."""
-    movement_ticks: int
-    """Control ticks of all trials, those of failed trials included."""
-    forward_kinematics: int
-    """Forward-kinematics evaluations the compiled kernels made. They skip steps that
-    cannot end a movement; a robot would sense its hand on every one of the ticks."""
-    jacobians: int
-    """Jacobian evaluations: one per corrective iteration and per biased movement."""
-    corrective_iterations: int
-    corrections: int
-    """Corrective movements made."""
-    failed_trials: int
-    """Trials that did not hit every goal: the corrective process did not converge, or
-    the variant has none for stored targets."""
-
-
-@dataclass(frozen=True)
 class LearningRun:
     """One run of the learner and everything it found."""
 
@@ -75,8 +55,8 @@ class LearningRun:
     condition: ExplorationCondition
     model: MotionModel
     seed: int
-    initial_search: InitialSearch
-    """Hands of trial 0, and what a policy spent on finding them."""
+    first_hands: str
+    """Hands of trial 0."""
     rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
     """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
     best_trial: int | None
@@ -87,7 +67,8 @@ class LearningRun:
     """Movements of the best trial."""
     replay: tuple[Movement, ...]
     """Movements of one noiseless greedy trial with the final tables."""
-    replay_completed: bool
+    replay_reward: int | None
+    """Its reward; None where it did not hit every goal."""
     values: Array
     """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Ticks: total
     rewards, or returns from that goal on where the condition credits subtasks."""
@@ -95,15 +76,11 @@ class LearningRun:
     """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
     corrections: NDArray[np.int64]
     """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
-    counters: Counters
+    counters: Meter
+    """What it spent; the replay is not part of it."""
     wall_s: float
     """Its share of the time that it and the runs beside it took."""
     cpu_s: float
-
-    @property
-    def first_hands(self) -> str:
-        """Hands of trial 0."""
-        return self.initial_search.hands
 
     @property
     def completed(self) -> NDArray[np.bool_]:
@@ -161,11 +138,9 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     @property
-    def replay_reward(self) -> int | None:
-        """Reward of the noiseless greedy trial with the final tables."""
-        if not self.replay_completed:
-            return None
-        return -sum(movement.ticks or 0 for movement in self.replay)
+    def replay_completed(self) -> bool:
+        """Whether the replay hit every goal."""
+        return self.replay_reward is not None
 
     @property
     def replay_hands(self) -> str | None:
@@ -206,11 +181,14 @@ def learn_many(
     trials: int = TRIALS,
     model: MotionModel = PAPER,
     jobs: int = -1,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """Run :func:`learn` for many seeds; one run per seed, in their order.
 
-    Runs go on side by side, on ``jobs`` threads, -1 for one per core; neither changes
-    anything but the time. Raises what :func:`learn` does.
+    ``start`` are movements that trial 0 makes in place of the corrective process, one to a target
+    for each goal, such as those of a plan; what they miss is corrected. Runs go on side by side, on
+    ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
+    :func:`learn` does, and SolutionError for such movements that break the rules.
     """
     need(task, Task, LOADED)
     condition = load_condition(condition)
@@ -220,16 +198,16 @@ def learn_many(
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
     checked_model(model, radius=task.radius)
-    search = search_initial_hands(task, condition.hands, model=model)
+    first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(map(checked_seed, seeds))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
     def perform(lot: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, search, lot, trials)
+        return learn_together(task, condition, model, first_hands, lot, trials, start)
 
-    compile_learner(task, condition, model, search)
+    compile_learner(task, condition, model, first_hands)
     if threads == 1:
         return [run for lot in lots for run in perform(lot)]
     with ThreadPoolExecutor(threads) as pool:
@@ -262,24 +240,29 @@ def learn_together(
     task: Task,
     condition: ExplorationCondition,
     model: MotionModel,
-    search: InitialSearch,
+    first_hands: str,
     seeds: Sequence[int],
     trials: int,
+    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """All trials of runs side by side, one a seed, which differ in nothing else.
 
-    Raises ValueError for more runs than there are lanes, and for initial hands that do not fit.
+    Raises ValueError for more runs than there are lanes, and for a first trial that does not fit.
     """
     runs, dof = len(seeds), task.robot.dof
-    first_hands = [HANDS.index(hand) for hand in hands_of(search.hands)]
-    if len(first_hands) != len(task.goals):
-        raise ValueError(f"{len(first_hands)} initial hands for {len(task.goals)} goals")
+    first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
+    for number, movements in movements_by_goal(task, list(start)) if start else ():
+        first_targets[number - 1, :dof] = movements[0].target
+    codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
+    if len(codes) != len(task.goals):
+        raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
     tables = empty_tables(runs, task)
     kept = Kept(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
         replayed=np.zeros(runs, dtype=np.bool_),
+        replay_rewards=np.zeros(runs, dtype=np.int64),
         counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
         first=empty_log(runs, task),
@@ -288,8 +271,9 @@ def learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
-        np.array(first_hands, dtype=np.int64),
-        problem_of(task, model, nullspace_gain=condition.nullspace_gain),
+        np.array(codes, dtype=np.int64),
+        first_targets,
+        problem_of(task, model),
         rules_of(task, condition),
         tables,
         kept,
@@ -306,21 +290,21 @@ def learn_together(
             condition=condition,
             model=model,
             seed=seed,
-            initial_search=search,
+            first_hands=first_hands,
             rewards=np.ma.array(kept.rewards[n], mask=~kept.completed[n]),
             best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
             initial=logged_movements(kept.first, n, dof),
             solution=logged_movements(kept.best, n, dof),
             replay=logged_movements(kept.replay, n, dof),
-            replay_completed=bool(kept.replayed[n]),
+            replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),
-            counters=Counters(
+            counters=Meter(
                 trials=trials,
                 movement_ticks=int(kept.counts[n, COUNT.ticks]),
                 forward_kinematics=int(kept.counts[n, COUNT.evaluations]),
-                jacobians=int(kept.counts[n, [COUNT.iterations, COUNT.biased]].sum()),
+                jacobians=int(kept.counts[n, COUNT.iterations]),
                 corrective_iterations=int(kept.counts[n, COUNT.iterations]),
                 corrections=int(kept.counts[n, COUNT.corrections]),
                 failed_trials=int(kept.counts[n, COUNT.failed]),
@@ -342,19 +326,19 @@ def warm_up(task: Task, *, learns: bool = True) -> None:
     hands = letters_of([hand] * len(task.goals))
     if learns:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        compile_learner(task, condition, PAPER, InitialSearch(hands))
+        compile_learner(task, condition, PAPER, hands)
     move(task.robot, task.q0, task.q0, hand, goal, task.radius)
     correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
     make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
 
 
 def compile_learner(
-    task: Task, condition: ExplorationCondition, model: MotionModel, search: InitialSearch
+    task: Task, condition: ExplorationCondition, model: MotionModel, first_hands: str
 ) -> None:
     """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
     links = task.robot.most_links
     if links not in _compiled_for:
-        learn_together(task, condition, model, search, [0], 0)
+        learn_together(task, condition, model, first_hands, [0], 0)
         _compiled_for.add(links)
 
 

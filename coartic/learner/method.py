@@ -8,17 +8,15 @@ declares holds under all its parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import chain
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from coartic.learner.conditions import (
-    BIAS,
     CONDITIONS,
     MOST_NOISE,
-    NULLSPACE_GAIN,
     VARIANTS,
     EqualDistance,
     ExplorationCondition,
@@ -30,8 +28,9 @@ from coartic.learner.conditions import (
     Update,
 )
 from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.motion.lanes import LANES
+from coartic.motion.solution import Movement
 from coartic.tasks.task import Task
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
@@ -53,20 +52,6 @@ class DualProcessParameters(Parameters):
     state: State = "previous-hand"
     learned: Learned = "best"
     """What the paper leaves open (:class:`coartic.learner.conditions.ExplorationCondition`)."""
-
-
-class NullspaceParameters(DualProcessParameters):
-    """Of the variants whose corrective process has a secondary objective."""
-
-    nullspace_gain: Annotated[float, Field(gt=0, le=1)] = NULLSPACE_GAIN
-    """β"""
-
-
-class BiasedParameters(DualProcessParameters):
-    """Of the variants whose noise is biased towards what the corrective process suggests."""
-
-    bias: Annotated[float, Field(gt=0, le=MOST_NOISE, allow_inf_nan=False)] = BIAS
-    """Mean of η along the suggested direction, in SDs of η."""
 
 
 class SubtaskParameters(DualProcessParameters):
@@ -102,13 +87,19 @@ class DualProcess(Method):
         trials: int = self.parameters.trials
         return max(1, min(LANES, _MOST_TRIALS // trials))
 
+    def first_trial(self, sessions: Sequence[Session], task: Task) -> tuple[Movement, ...]:
+        """The movements of trial 0, one for each goal; none where the corrective process acts."""
+        return ()
+
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's."""
         parameters: DualProcessParameters = self.parameters
-        condition = replace(self.condition, **parameters.model_dump(exclude={"trials"}))
+        of_condition = parameters.model_dump(include={f.name for f in fields(ExplorationCondition)})
+        condition = replace(self.condition, **of_condition)
         tasks = [session.hand_over(*self.told) for session in sessions]
         task, model = tasks[0], sessions[0].model
-        for session in sessions:
+        start = self.first_trial(sessions, task)
+        for session in sessions if not start else ():
             session.find_initial_hands(condition.hands)
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -122,12 +113,13 @@ class DualProcess(Method):
             trials=trials,
             model=model,
             jobs=1,
+            start=start,
         )
         return [_result(*pair) for pair in zip(sessions, runs, strict=True)]
 
 
 def _result(session: Session, run: LearningRun) -> Result | MethodError:
-    session.spend(**vars(run.counters))
+    session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
     session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
     if run.status != "ok":
         return MethodError("infeasible", run.reason)
@@ -139,18 +131,11 @@ def _result(session: Session, run: LearningRun) -> Result | MethodError:
     )
 
 
-_SECONDARY = "change the posture as little as possible (nullspace of a correction)"
-
-
 def _told(condition: ExplorationCondition) -> frozenset[Information]:
     """**A** and the total reward; what else a condition or variant makes use of."""
     told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.hand_exploration == "closest":  # to know where things are
         told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
-    if condition.bias:  # to know a single step of A, at a configuration of its own choice
-        told |= {Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN}
-    if condition.nullspace_gain:
-        told |= {Information.SECONDARY_OBJECTIVES}
     if condition.credit == "subtask":
         told |= {Information.REWARD_BY_SUBTASK}
     return frozenset(told)
@@ -159,20 +144,7 @@ def _told(condition: ExplorationCondition) -> frozenset[Information]:
 def _method(condition: ExplorationCondition) -> type[DualProcess]:
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
-    if condition.nullspace_gain:
-        parameters = NullspaceParameters
-        citation += (
-            " Nullspace: A. Liegeois (1977). Automatic supervisory control of the configuration "
-            "and behavior of multibody mechanisms. IEEE Transactions on Systems, Man, and "
-            "Cybernetics."
-        )
-    elif condition.bias:
-        parameters = BiasedParameters
-        citation += (
-            " Bias, after J. C. Spall (2003). Introduction to Stochastic Search and "
-            "Optimization. Wiley."
-        )
-    elif condition.credit == "subtask":
+    if condition.credit == "subtask":
         parameters = SubtaskParameters
         citation += (
             " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
@@ -191,7 +163,6 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
             + (f", {variant}" if variant else ""),
             "told": _told(condition),
             "citation": citation,
-            "secondary": (_SECONDARY,) if condition.nullspace_gain else (),
             "Parameters": parameters,
             "condition": condition,
         },

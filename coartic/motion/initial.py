@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import NamedTuple
 
 from coartic.errors import LOADED, NotApplicableError, need
 from coartic.model import PAPER, MotionModel
@@ -94,34 +93,25 @@ def initial_hands(
     all (``best-of-all``). Raises NotApplicableError where no candidate completes the
     task, or there are too many.
     """
-    return search_initial_hands(task, hands, model=model).hands
-
-
-class InitialSearch(NamedTuple):
-    """The initial hands of a task, and what a policy spent on finding them."""
-
-    hands: str
-    trials: int = 0
-    movement_ticks: int = 0
-    forward_kinematics: int = 0
-    corrective_iterations: int = 0
-    corrections: int = 0
-    failed_trials: int = 0
+    return search_initial_hands(task, hands, model=model)[0]
 
 
 def search_initial_hands(
     task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
-) -> InitialSearch:
-    """:func:`initial_hands` with its cost, which is nothing for a named sequence."""
+) -> tuple[str, Mapping[str, int]]:
+    """:func:`initial_hands`, and what finding them has spent, by the names of a session's meter:
+    nothing for a named sequence."""
     if not task.initial_is_policy:
-        return InitialSearch(task.initial_hands)
+        return task.initial_hands, {}
     allowed = task.hands if hands is None else hands
     ordered = tuple(hand for hand in HANDS if hand in allowed)
     return search_by_policy(task.model_dump_json(), ordered, model)
 
 
 @lru_cache(maxsize=64)
-def search_by_policy(task_json: str, hands: tuple[Hand, ...], model: MotionModel) -> InitialSearch:
+def search_by_policy(
+    task_json: str, hands: tuple[Hand, ...], model: MotionModel
+) -> tuple[str, Mapping[str, int]]:
     """The search of a task, given as JSON, with these hands: the same is made once."""
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     if task.initial_hands == "best-single-hand":
@@ -136,12 +126,13 @@ def search_by_policy(task_json: str, hands: tuple[Hand, ...], model: MotionModel
             f"{len(candidates)} hand sequences of initial_hands = {task.initial_hands!r}"
         )
     trials = [trial for _, trial in ranked]
-    return InitialSearch(
-        best,
-        trials=len(trials),
-        movement_ticks=sum(trial.ticks for trial in trials),
-        forward_kinematics=sum(trial.evaluations for trial in trials),
-        corrective_iterations=sum(trial.iterations for trial in trials),
-        corrections=sum(trial.corrections for trial in trials),
-        failed_trials=sum(not trial.completed for trial in trials),
-    )
+    iterations = sum(trial.iterations for trial in trials)
+    return best, {
+        "trials": len(trials),
+        "movement_ticks": sum(trial.ticks for trial in trials),
+        "forward_kinematics": sum(trial.evaluations for trial in trials),
+        "jacobians": iterations,
+        "corrective_iterations": iterations,
+        "corrections": sum(trial.corrections for trial in trials),
+        "failed_trials": sum(not trial.completed for trial in trials),
+    }

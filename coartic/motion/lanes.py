@@ -79,7 +79,7 @@ def lanes_for(robot: Robot) -> Lanes:
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     """The rows of arms of so many links; which of them a correction needs, and a movement."""
     joints = (BASE_DOF + links,)
-    corrected = {"q": joints, "pulled": ()}  # base x and y, then the joints of the arm
+    corrected = {"q": joints}  # base x and y, then the joints of the arm
     shared = {
         "run": (),  # which is in the lane: its index
         "first": (),  # index in a configuration of the first joint of its arm
@@ -135,7 +135,6 @@ def board(at: Any, lane: int, run: int, q: Any, arm: Any) -> None:
     """Put an arm into a lane, where the robot is in configuration ``q``."""
     seat(at, lane, run, arm)
     copy_arm(at.q, lane, q, arm)
-    at.pulled[lane] = 0.0
 
 
 @inlined

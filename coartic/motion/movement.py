@@ -35,7 +35,6 @@ from coartic.motion.lanes import (
     padded,
     place,
     runs_for,
-    width_of,
     winding,
 )
 from coartic.robot import BASE_DOF, Array, Hand, Robot
@@ -59,14 +58,6 @@ class Goal(NamedTuple):
     radius: float
 
 
-class Scratch(NamedTuple):
-    """Work space of the kernels: joint positions of an arm, a step of the robot."""
-
-    xs: Any  # (n + 1,) for the longer arm
-    ys: Any
-    step: Any  # (width,)
-
-
 class MoveResult(NamedTuple):
     """Outcome of one movement."""
 
@@ -78,12 +69,6 @@ class MoveResult(NamedTuple):
     """Whether the hand is within the goal's radius."""
     evaluations: int
     """Forward-kinematics evaluations the kernel made."""
-
-
-def scratch_for(robot: Robot) -> Scratch:
-    """Work space large enough for either arm of ``robot``."""
-    longest = robot.most_links
-    return Scratch(np.empty(longest + 1), np.empty(longest + 1), np.empty(width_of(robot)))
 
 
 @inner

@@ -10,6 +10,7 @@ from coartic.model import MotionModel
 from coartic.motion.compiled import inlined
 from coartic.motion.corrective import Corrector
 from coartic.motion.movement import Goal, checked_goal, configuration
+from coartic.motion.penalty import Terms, terms_of
 from coartic.robot import Arm
 from coartic.tasks.task import Task
 
@@ -24,10 +25,11 @@ class Problem(NamedTuple):
     right: Arm
     corrector: Corrector
     model: MotionModel
+    penalty: Terms
 
 
-def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -> Problem:
-    """The task for a kernel; ``nullspace_gain`` is that of the corrective process.
+def problem_of(task: Task, model: MotionModel) -> Problem:
+    """The task for a kernel.
 
     Raises ValueError for a task that is none any more: a copy with changed fields is unchecked,
     and kernels would read beyond their arrays.
@@ -40,8 +42,9 @@ def problem_of(task: Task, model: MotionModel, *, nullspace_gain: float = 0.0) -
         radius=float(task.radius),
         left=task.robot.arm("left"),
         right=task.robot.arm("right"),
-        corrector=Corrector("x" not in locked, "y" not in locked, float(nullspace_gain)),
+        corrector=Corrector("x" not in locked, "y" not in locked),
         model=model,
+        penalty=terms_of(task),
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from coartic.errors import LOADED, SolutionError, need
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.movement import checked_goal, configuration, follow
+from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, reach_in_turn
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, letters_of
@@ -66,6 +67,8 @@ class Execution:
     """Forward-kinematics evaluations made."""
     reason: str = ""
     """Why the task was not completed; empty where it was."""
+    penalty: int = 0
+    """What the goals hit cost beside the ticks; 0 where the task has no penalty."""
 
     @property
     def completed(self) -> bool:
@@ -74,8 +77,8 @@ class Execution:
 
     @property
     def reward(self) -> int | None:
-        """Total reward, -1 a tick; None where the task was not completed."""
-        return -self.ticks if self.completed else None
+        """Total reward, -1 a tick less the penalty; None where the task was not completed."""
+        return -(self.ticks + self.penalty) if self.completed else None
 
     @property
     def hands(self) -> str:
@@ -164,6 +167,7 @@ class SolutionRun:
     """An execution while it goes on."""
 
     def __init__(self, task: Task, solution: list[Movement]) -> None:
+        self.task = task
         # The corrective process has the last word.
         self.due = [
             [*movements, Movement(number, movements[0].hand, "corrective")]
@@ -205,14 +209,17 @@ class SolutionRun:
 
     def outcome(self) -> Execution:
         """What has happened so far."""
+        hits = np.array(self.configurations).reshape(1, -1, len(self.q))
+        hands = [[movements[0].hand for movements in self.due[: hits.shape[1]]]]
         return Execution(
             movements=tuple(self.movements),
-            configurations=np.array(self.configurations).reshape(-1, len(self.q)),
+            configurations=hits[0],
             ticks=sum(movement.ticks or 0 for movement in self.movements),
             corrections=self.corrections,
             iterations=self.iterations,
             evaluations=self.evaluations,
             reason=self.reason,
+            penalty=int(penalties(self.task, hands, hits).sum()),
         )
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.motion.movement import LARGEST, checked_goal, configuration
+from coartic.motion.penalty import penalties
 from coartic.motion.reach import reach_in_turn
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
@@ -43,11 +44,13 @@ class Trials(NamedTuple):
     and in the goals after a failure what was given."""
     reached: Array
     """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN after a failure."""
+    penalties: NDArray[np.int64]
+    """What each loses beside its ticks, shape ``(N,)``; 0 where the task has no penalty."""
 
     @property
     def rewards(self) -> Array:
         """Total rewards, shape ``(N,)``; -inf where a trial failed."""
-        return np.where(self.completed, -self.ticks, -np.inf)
+        return np.where(self.completed, -(self.ticks + self.penalties), -np.inf)
 
 
 def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel = PAPER) -> Trials:
@@ -64,10 +67,11 @@ def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel 
     starts = np.empty((count, task.robot.dof))
     starts[:] = configuration(task.robot, task.q0)
     goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
+    codes = hand_codes(task, hands, count)
     reached = reach_in_turn(
         task.robot,
         starts,
-        hand_codes(task, hands, count),
+        codes,
         np.array([goals], dtype=np.float64),
         float(task.radius),
         given,
@@ -85,6 +89,7 @@ def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel 
         evaluations=reached.evaluations.sum(axis=1),
         targets=given,
         reached=reached.q,
+        penalties=penalties(task, codes, reached.q).sum(axis=1),
     )
 
 

@@ -75,18 +75,6 @@ RESULTS = {
     "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
 }
 """Columns of table ``results`` beside its ``id``."""
-TIMINGS = (
-    "build_s",
-    "solve_s",
-    "wall_s",
-    "cpu_s",
-    "warm",
-    "together",
-    "process_peak_mb",
-    "commit",
-    "packages",
-)
-"""Columns of ``runs`` that may differ between two runs of one specification."""
 _DTYPES: dict[str, Any] = {
     **{
         name: {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64"}[kind.split()[0]]

@@ -503,7 +503,7 @@ def read_family(path: Path) -> Family:
 def task_text(task: Task) -> str:
     """The task as the text of its file, from which :func:`coartic.load_task` gives it again."""
     content = task.model_dump(mode="json")
-    tables = {key: content.pop(key) for key in ("start", "robot", "provenance")}
+    tables = {key: content.pop(key, {}) for key in ("start", "robot", "penalty", "provenance")}
     if task.robot == Robot():
         del tables["robot"]
     lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]
@@ -512,7 +512,7 @@ def task_text(task: Task) -> str:
             lines += [
                 "",
                 f"[{key}]",
-                *(f"{name} = {toml_value(value)}" for name, value in table.items()),
+                *(f"{k} = {toml_value(v)}" for k, v in table.items() if v is not None),
             ]
     return "\n".join(lines) + "\n"
 

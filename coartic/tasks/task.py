@@ -18,8 +18,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     ValidationError,
     ValidationInfo,
+    model_serializer,
     model_validator,
 )
 
@@ -35,6 +37,8 @@ LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
 MOST_GOALS = 100
+MOST_PENALTY = 10_000.0
+"""Ticks of each term of a penalty: many times what a task takes."""
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Of names of tasks and suites, which become names of files and parts of commands."""
@@ -104,6 +108,35 @@ class Start(FileData):
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
 
 
+Ticks = Annotated[float, Field(ge=0, le=MOST_PENALTY, allow_inf_nan=False)]
+
+
+class Penalty(FileData):
+    """What the reward loses at each goal beside 1 a tick: the sum of three terms, in ticks.
+
+    They tell apart postures in which a goal is hit (:mod:`coartic.motion.penalty`); the movements
+    are the same with and without it. The sum is rounded to whole ticks at each goal.
+    """
+
+    joints: Ticks = 0.0
+    """Costly joints: ticks for each length unit and rad of their way, straight from the posture at
+    the goal before."""
+    costly: Literal["base", "arms", "left-arm", "right-arm"] = "arms"
+    """Which joints these are."""
+    region: Ticks = 0.0
+    """A costly disc: ticks if an elbow of the arm that hits is at its centre, in proportion less
+    towards its rim. The elbow that is deepest in it counts."""
+    centre: Point | None = None
+    """Of the disc, length unit; the mean of the goals where left out."""
+    radius: Length = 1.0
+    """Of the disc, length unit."""
+    distinct: Ticks = 0.0
+    """Postures alike: ticks if the joints of the arm that hits are as they were at the goal before,
+    in proportion less the more they differ. The first goal has none before it."""
+    apart: Length = 1.0
+    """From here on postures do not count as alike, rad."""
+
+
 class Task(FileData):
     """A sequence of spatial goals to be hit, each with one of the robot's hands."""
 
@@ -123,6 +156,8 @@ class Task(FileData):
     the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
     robot: Robot = Robot()
+    penalty: Penalty | None = None
+    """What the reward loses beside 1 a tick; nothing in the paper's tasks."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
     """Source and status of the figures, by key."""
 
@@ -146,6 +181,14 @@ class Task(FileData):
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
         return copied
+
+    @model_serializer(mode="wrap")
+    def without_what_is_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Its content; ``penalty`` only where it has one, so that hashes of others stay."""
+        content: dict[str, Any] = write(self)
+        if self.penalty is None:
+            content.pop("penalty", None)
+        return content
 
     @property
     def initial_is_policy(self) -> bool:
@@ -290,4 +333,5 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 def all_keys() -> list[str]:
     """All keys of a task file, whatever table they belong to."""
     robot = [field.name for field in fields(Robot)]
-    return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
+    others = (*Start.model_fields, *robot, *Penalty.model_fields, *Provenance.model_fields)
+    return [*Task.model_fields, *others]

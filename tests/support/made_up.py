@@ -29,20 +29,12 @@ class MadeUp(Study):
 
 
 def made_up_optima(*tasks):
-    """Proven optima of some tasks, for ``MadeUp(results, optima=...)``: other arm free and still.
+    """Proven optima of some tasks, for ``MadeUp(results, optima=...)``.
 
     Whatever the shipped ones are: those of the two-armed tasks change with their goals.
     """
-    best = {
-        "ascending": (-292, -292),
-        "two-armed-1": (-465, -490),
-        "two-armed-2": (-306, -329),
-    }
-    return {
-        (task, arm): KnownOptimum(reward, reward)
-        for task in tasks
-        for arm, reward in zip(("free", "still"), best[task], strict=True)
-    }
+    best = {"ascending": -292, "two-armed-1": -465, "two-armed-2": -306}
+    return {task: KnownOptimum(best[task], best[task]) for task in tasks}
 
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):

@@ -8,6 +8,7 @@ policy's initial hands are taken over. Draws from its generator in the same orde
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction
 from coartic.motion.initial import initial_hands
 from coartic.motion.movement import MoveResult
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task, hands_of
 
@@ -35,7 +37,6 @@ class ReferenceRun(NamedTuple):
     corrections: int
     corrections_by_trial: NDArray[np.int64]
     corrective_iterations: int
-    biased_movements: int
 
 
 def move(
@@ -75,13 +76,11 @@ def correct(
     goal: tuple[float, float],
     *,
     locked_base: tuple[str, ...] = (),
-    nullspace_gain: float = 0.0,
     model: MotionModel = PAPER,
 ) -> Correction:
     """:func:`coartic.motion.corrective.correct`, with the Jacobian as a matrix."""
     free = np.ones(robot.dof)
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
-    start = np.array(q)
     q = np.array(q)
     for iteration in range(model.max_iterations):
         error = goal - robot.forward_kinematics(q, hand)
@@ -90,10 +89,6 @@ def correct(
         if not np.isfinite(error).all():
             return Correction(q, False, iteration)
         step = model.gain * free * (robot.jacobian(q, hand).T @ error)
-        if nullspace_gain:
-            jacobian = robot.jacobian(q, hand) * free
-            away = free * (start - q)
-            step += nullspace_gain * (away - np.linalg.pinv(jacobian) @ jacobian @ away)
         before, q = q, q + step
         if (q == before).all():  # a stationary point away from the goal: it stays for ever
             return Correction(q, False, iteration + 1)
@@ -109,15 +104,18 @@ def learn(
     seed: int,
     trials: int,
     model: MotionModel = PAPER,
+    start: Sequence[Movement] = (),
 ) -> ReferenceRun:
-    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line."""
+    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line; ``start``: trial 0."""
     rng = np.random.default_rng(seed)
-    first_hands = hands_of(initial_hands(task, condition.hands, model=model))
+    first_hands = [movement.hand for movement in start] or hands_of(
+        initial_hands(task, condition.hands, model=model)
+    )
     values: dict[tuple[State, Hand], float] = {}
     targets: dict[tuple[State, Hand], Array] = {}
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
-    ticks = corrections = iterations = biased = 0
+    ticks = corrections = iterations = 0
     by_trial = np.zeros(trials, dtype=np.int64)
     for trial in range(trials):
         q = np.array(task.q0)
@@ -133,10 +131,14 @@ def learn(
             else:
                 hand = _choose(task, condition, q, goal, state, previous, values, rng)
             has_target = (state, hand) in targets
-            if has_target or (trial > 0 and condition.unknown_target == "explores"):
+            if trial == 0 and start:
+                target = start[number].target
+                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
+                q, total, hit = result.q, total - result.ticks, result.hit
+                ticks += result.ticks
+            elif has_target or (trial > 0 and condition.unknown_target == "explores"):
                 stored = targets.get((state, hand), q)
-                target = _explore(task, condition, q, hand, goal, stored, rng)
-                biased += condition.bias > 0
+                target = _explore(task, condition, q, hand, stored, rng)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
@@ -146,9 +148,8 @@ def learn(
                 if has_target and not condition.corrects:
                     break
                 correction = correct(
-                    task.robot, q, hand, goal, locked_base=task.locked_base,
-                    nullspace_gain=condition.nullspace_gain, model=model,
-                )  # fmt: skip
+                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model
+                )
                 iterations += correction.iterations
                 if not correction.converged:
                     break
@@ -163,6 +164,8 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
+            hits, hands = [q for *_, q in visited], [hand for _, hand, _ in visited]
+            total -= penalty(task, hits, hands)[-1]
             subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
@@ -179,8 +182,37 @@ def learn(
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, ticks, corrections, by_trial, iterations, biased
+        rewards, completed, values, targets, ticks, corrections, by_trial, iterations
     )
+
+
+def penalty(task: Task, hits: list[Array], hands: list[Hand]) -> list[int]:
+    """What each goal loses beside its ticks (coartic.motion.penalty), from where they were hit."""
+    lost = []
+    before = np.array(task.q0)
+    for number, (q, hand) in enumerate(zip(hits, hands, strict=False)):
+        rule = task.penalty
+        if rule is None:
+            lost.append(0)
+            continue
+        arm = range(task.robot.dof)[task.robot.joints(hand)]
+        costly = {
+            "base": [0, 1],
+            "arms": range(2, task.robot.dof),
+            "left-arm": range(task.robot.dof)[task.robot.joints("left")],
+            "right-arm": range(task.robot.dof)[task.robot.joints("right")],
+        }[rule.costly]
+        ticks = rule.joints * math.sqrt(sum((q[j] - before[j]) ** 2 for j in costly))
+        elbows = task.robot.joint_positions(q, hand)[1:-1]
+        centre = np.mean(task.goals, axis=0) if rule.centre is None else rule.centre
+        distances = [math.dist(elbow, centre) for elbow in elbows]
+        ticks += rule.region * max([0.0, *(1 - d / rule.radius for d in distances)])
+        if number > 0:
+            change = math.sqrt(sum((q[j] - before[j]) ** 2 for j in arm))
+            ticks += rule.distinct * max(0.0, 1 - change / rule.apart)
+        lost.append(math.floor(ticks + 0.5))
+        before = q
+    return lost
 
 
 def _choose(
@@ -222,7 +254,6 @@ def _explore(
     condition: ExplorationCondition,
     q: Array,
     hand: Hand,
-    goal: tuple[float, float],
     stored: Array,
     rng: np.random.Generator,
 ) -> Array:
@@ -233,12 +264,6 @@ def _explore(
     explored[:2] &= ["x" not in task.locked_base, "y" not in task.locked_base]
     if not condition.modify_other:
         target[task.robot.joints(other)] = q[task.robot.joints(other)]
-    if condition.bias:
-        error = goal - task.robot.forward_kinematics(stored, hand)
-        step = explored * (task.robot.jacobian(stored, hand).T @ error)
-        length = math.sqrt(_sum_of_squares(step))
-        if length:
-            target += condition.bias * condition.noise_sd / length * step
     target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))
     return target
 

@@ -1,0 +1,167 @@
+"""The study of wrong objectives, on a small folder: against a slow loop, and in closed form."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import execute, load_task
+from coartic.analysis import tables
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.objectives import less_regret
+from coartic.analysis.claims.register import CLAIMS, Claim
+from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.report import build, facts
+from coartic.analysis.report.text import sentence
+from coartic.analysis.studies import objectives
+from coartic.analysis.studies.objectives import advantage, crossing, crossings, rewards
+from coartic.analysis.study import load
+from coartic.benchmarks.run import run_suite
+from coartic.benchmarks.suites import load_suite, select_cells
+from coartic.learner.rows import movements_from
+from coartic.tasks.task import hands_of
+from tests.support import reference
+from tests.support.made_up import row, study_of
+from tests.support.suites import KNOWN, InProcess
+
+SMALL = """
+title = "x"
+description = "x"
+runs = 3
+trials = 60
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["believed-reward/plan", "believed-reward/EC1"]
+parameters = { nodes = 40, graphs = 1, starts = 2 }
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["dual-process/EC1"]
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["believed-reward/plan", "believed-reward/EC1"]
+parameters = { nodes = 40, graphs = 1, starts = 2 }
+penalties = [{ distinct = 100 }, { distinct = 300 }]
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["dual-process/EC1"]
+penalties = [{ distinct = 100 }, { distinct = 300 }]
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("objectives")
+    (folder / "own.toml").write_text(SMALL)
+    run_suite(folder / "own.toml", folder / "results", executor=InProcess())
+    return load(folder / "results")
+
+
+def test_a_plan_is_scored_under_penalties_that_it_does_not_know(study):
+    frame = rewards(study).set_index(["task", "term", "weight", "who"]).reward
+    movements, _ = study.movements
+    for name in (f"one-armed/v1/d00{k}" for k in range(3)):
+        (label,) = {label for _, label in study.cells if label.startswith("believed-reward/plan")}
+        run = str(study.cells[name, label].good.run_id.iloc[0])
+        plain = study.tasks[name]
+        execution = execute(plain, movements_from(plain, movements[run]))
+        hits, hands = list(execution.configurations), list(hands_of(execution.hands))
+        assert frame[name, "region", 0.0, "ticks"] == -execution.ticks
+        for weight in (100.0, 300.0):
+            task = study.tasks[f"{name}.distinct-{weight:g}"]
+            lost = sum(reference.penalty(task, hits, hands))
+            assert frame[name, "distinct", weight, "ticks"] == -execution.ticks - lost
+            told = frame[name, "distinct", weight, "told"]
+            assert told >= frame[name, "distinct", weight, "ticks"] - 2
+            cell = study.cells[task.name, "dual-process/EC1"]
+            assert frame[name, "distinct", weight, "learner"] == cell.rewards.mean()
+
+
+def test_regret_is_less_and_its_advantage_the_difference(study):
+    frame = rewards(study)
+    assert (frame.regret >= 0).all()
+    assert (frame.groupby(["task", "term", "weight"]).regret.min() < 5).all()
+    table = advantage(study, "learner", "ticks", "distinct")
+    assert list(table.columns) == [0.0, 100.0, 300.0]
+    assert len(table) == 3
+    assert table[0.0].mean() < table[300.0].mean()  # the more wrong the planner is
+    assert not len(advantage(study, "cma-es", "ticks", "distinct"))
+    table = crossings(study)
+    assert (table.weight_low <= table.weight).all()
+    assert (table.weight <= table.weight_high).all()
+
+
+def test_where_a_line_crosses_zero():
+    weights = np.array([0.0, 30.0, 100.0])
+    assert crossing(weights, np.array([-3.0, -1.0, 1.0])) == 65.0
+    assert crossing(weights, np.array([-1.0, 3.0, 4.0])) == 7.5
+    assert crossing(weights, np.array([1.0, 3.0, 4.0])) == 0.0
+    assert crossing(weights, np.array([1.0, 3.0, -4.0])) == math.inf
+    assert crossing(weights, np.array([1.0, -2.0, 2.0])) == 65.0  # for good
+
+
+def test_the_rule_compares_regrets(study):
+    claim = Claim(
+        id="x", section="x", statement="x", rule="less_regret", suite="own",
+        cells={"distinct 300": ["learner", "ticks"]},
+    )  # fmt: skip
+    finding = less_regret(Data(study), claim)
+    values = advantage(study, "learner", "ticks", "distinct")[300.0]
+    assert finding.tests[0].estimate == pytest.approx(values.mean() - 1.0)
+    assert finding.holds == (values.mean() > 1.0)
+    missing = claim.model_copy(update={"cells": {"region 300": ["learner", "ticks"]}})
+    with pytest.raises(MissingError, match="region"):
+        less_regret(Data(study), missing)
+
+
+def test_suite_has_what_its_claims_compare():
+    cells = select_cells(load_suite("objectives"), KNOWN)
+    claims = [claim for claim in CLAIMS.values() if claim.suite == "objectives"]
+    assert claims
+    weights = {task.name.partition(".")[2].split("-")[1] for task in (c.task for c in cells)
+               if task.penalty is not None}  # fmt: skip
+    assert weights == {"30", "100", "300"}
+    for claim in claims:
+        for where in claim.cells:
+            assert where.split(" ")[1] in weights | {"0"}
+    instances = {c.task.name for c in cells if "/" in c.task.name and c.task.penalty is None}
+    assert len(instances) >= 40
+    assert all("/i" in name for name in instances)
+
+
+def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
+    """Regrets of ten tasks, planted in the place of solutions."""
+    planted = {"told": 0.0, "ticks": 50.0, "learner": 20.0, "from plan": 10.0}
+    rows = []
+    for number in range(10):
+        for weight, share in ((0.0, 0.0), (100.0, 0.5), (300.0, 1.0)):
+            for who, regret in planted.items():
+                at = {"ticks": share, "from plan": share}.get(who, 1.0)
+                rows.append(
+                    {
+                        "task": f"one-armed/v1/i{number:03d}", "family": "one-armed/v1",
+                        "split": "test", "term": "region", "weight": weight, "who": who,
+                        "reward": -100.0, "regret": regret * at * (0.8 + 0.4 * number / 9),
+                        "cell": SimpleNamespace(runs=pd.DataFrame({"run_id": [f"{number}"]})),
+                    }
+                )  # fmt: skip
+    frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
+    monkeypatch.setattr(objectives, "rewards", lambda study: frame)
+    study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
+    table = tables.TABLES["objectives"](study)
+    assert table.regret["region 300 ticks"] == pytest.approx(50)
+    assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]
+    assert table.helps["region 100 from plan"] == pytest.approx(15)  # 20 % against 5 %
+    assert set(table.tasks) == {10}
+    crossings = tables.TABLES["crossings"](study)
+    # 25 % at 100, so that 20 % lie at 80.
+    assert crossings.crossing["region learner"] == pytest.approx(80)
+    assert list(crossings.index) == ["region learner"]
+    assert build.drawn(study, "objectives")
+    assert "weight of 80 with a costly disc" in sentence("objectives", facts.objectives(study))
+
+
+def test_variants_of_instances_are_not_listed_one_by_one(study):
+    assert len(study.tasks) == 9
+    assert not one_by_one(study)
