@@ -42,8 +42,8 @@ def in_words(tests: pd.DataFrame) -> str:
 @table("finding, model, measure, value[], tasks, verdict, built_in, because")
 def human_effects(study: Study) -> Rows:
     """What each model shows of each finding, with its interval over tasks; why it is silent."""
-    for row in judged(study).rename(columns={"low": "value_low", "high": "value_high"}).to_dict(
-        "records"
+    for row in (
+        judged(study).rename(columns={"low": "value_low", "high": "value_high"}).to_dict("records")
     ):
         where = FINDINGS[row["finding"]].where
         ids = run_ids(study, row["model"], where) if row["tasks"] else ""
