@@ -31,10 +31,10 @@ def in_words(tests: pd.DataFrame) -> str:
     """A model's verdict on a finding, with the effect of each test."""
     first = tests.iloc[0]
     verdict = f"{first.verdict}{' *' if first.built_in else ''}"
+    there = tests[tests.tasks > 0]
     effects = [
-        f"{number(row.value, 2)} {in_brackets(row.low, row.high, 2)}".strip()
-        for row in tests.itertuples()
-        if row.tasks
+        f"{number(value, 2)} {in_brackets(low, high, 2)}".strip()
+        for value, low, high in zip(there.value, there.low, there.high, strict=True)
     ]
     return f"{verdict}: {'; '.join(effects)}" if effects else verdict
 
@@ -42,9 +42,9 @@ def in_words(tests: pd.DataFrame) -> str:
 @table("finding, model, measure, value[], tasks, verdict, built_in, because")
 def human_effects(study: Study) -> Rows:
     """What each model shows of each finding, with its interval over tasks; why it is silent."""
-    for row in (
-        judged(study).rename(columns={"low": "value_low", "high": "value_high"}).to_dict("records")
-    ):
-        where = FINDINGS[row["finding"]].where
-        ids = run_ids(study, row["model"], where) if row["tasks"] else ""
-        yield f"{row['finding']} {row['model']} {row['measure']}", {**row, "run_ids": ids}
+    frame = judged(study).rename(columns={"low": "value_low", "high": "value_high"})
+    for row in frame.itertuples():
+        finding, model = str(row.finding), str(row.model)
+        values: Row = {column: getattr(row, column) for column in frame.columns}
+        ids = run_ids(study, model, FINDINGS[finding].where) if row.tasks else ""
+        yield f"{finding} {model} {row.measure}", values | {"run_ids": ids}
