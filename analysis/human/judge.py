@@ -9,7 +9,13 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
-from coartic.analysis.human.measures import MEASURES, MODELS, Values
+from coartic.analysis.human.measures import (
+    MEASURES,
+    MODELS,
+    PLANNERS_AHEAD,
+    PLANNERS_BLIND,
+    Values,
+)
 from coartic.analysis.statistics.estimates import LEVEL, SEED
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import read_beside
@@ -150,3 +156,24 @@ def verdict_of(
     if min(tasks) < FEWEST_TASKS or all(agrees) == any(disagrees):
         return UNDECIDED
     return AGREES if all(agrees) else DISAGREES
+
+
+def separating(study: Study) -> dict[str, list[str]]:
+    """The findings that tell models apart: on which one kind agrees and the other disagrees.
+
+    ``learner_from_planners``: the paper's learner from every planner that is judged;
+    ``look_ahead``: planners with one goal in view from all with more.
+    """
+    verdicts = judged(study).drop_duplicates(["finding", "model"])
+    kinds = {
+        "learner_from_planners": (["learner"], [*PLANNERS_BLIND, *PLANNERS_AHEAD]),
+        "look_ahead": (list(PLANNERS_BLIND), list(PLANNERS_AHEAD)),
+    }
+    apart: dict[str, list[str]] = {kind: [] for kind in kinds}
+    for finding, rows in verdicts.groupby("finding", sort=False):
+        by_model = rows.set_index("model").verdict
+        for kind, groups in kinds.items():
+            first, second = (set(by_model[group]) - {SILENT, NOT_RUN} for group in groups)
+            if (first, second) in (({AGREES}, {DISAGREES}), ({DISAGREES}, {AGREES})):
+                apart[kind].append(str(finding))
+    return apart

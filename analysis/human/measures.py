@@ -74,6 +74,19 @@ MODELS = {
     "least jerk": Model("trajectory-optimisation/jerk", {**_FREE, "stop": 0}),
 }
 """What is compared with people, by name."""
+PLANNERS_BLIND = ("no goal ahead", "null-space control, this goal")
+"""Planners that heed one goal at a time."""
+PLANNERS_AHEAD = (
+    "one goal ahead",
+    "two goals ahead",
+    "all goals ahead",
+    "null-space control, next goals",
+    "posture-based, two goals",
+    "shortest path",
+    "least acceleration",
+    "least jerk",
+)
+"""Planners that heed later goals."""
 
 
 class Values(NamedTuple):
