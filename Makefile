@@ -2,7 +2,8 @@
 #   make benchmark   the paper's experiments, all methods beside them, and the report
 #   make test        the test suite
 # make benchmark FULL=1 adds the ablations, the moved goals and the search for the optima.
-# make docs builds the site; make findings makes the numbers in it anew.
+# make docs builds the site; make findings makes the numbers in it anew; make paper prints the
+# article on the replication.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
@@ -12,7 +13,7 @@ READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations locus optimum)
 STORED := comparison ablations locus families horizon stops objectives
 
-.PHONY: benchmark test check format docs findings speed setup clean
+.PHONY: benchmark test check format docs findings paper speed setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -52,6 +53,10 @@ findings: $(READY)
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
 	$(BIN)/python docs/make_findings.py --from $(OUT)
+
+# docs/paper.md as a PDF; it needs Chromium.
+paper: $(READY)
+	$(BIN)/python docs/print_paper.py
 
 setup: $(READY)
 

@@ -8,19 +8,23 @@ their reports, copies the tables with ``--from results``, and fills in the pages
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import pandas as pd
 
-from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
+from coartic.analysis.report import next_goal
+from coartic.analysis.study import load
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
 STORED = DOCS / "stored"
+ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
         "claims contexts hands learning methods price published ranking signatures tasks",
@@ -63,15 +67,37 @@ def row(suite: str, name: str, which: str) -> Row:
     return Row(table(suite, name).loc[which])
 
 
-def claim(name: str, suite: str = "comparison") -> Row:
+def claims(suite: str = "") -> pd.DataFrame:
+    """The judged claims of a suite.
+
+    Without one: the paper's claims by suite comparison, and by ablations where that has no runs.
+    """
+    if suite:
+        return table(suite, "claims")
+    judged, others = table("comparison", "claims"), table("ablations", "claims")
+    without_runs = judged.index[judged.evidence.str.startswith("Not judged")]
+    judged.loc[without_runs] = others.loc[without_runs]
+    return judged
+
+
+def claim(name: str, suite: str = "") -> Row:
     """A judged claim by its id."""
-    return row(suite, "claims", name)
+    return Row(claims(suite).loc[name])
 
 
-def verdicts(suite: str = "comparison") -> dict[str, int]:
+def verdicts(suite: str = "") -> dict[str, int]:
     """How many claims have each verdict."""
-    counts = table(suite, "claims").verdict.value_counts()
+    counts = claims(suite).verdict.value_counts()
     return {str(verdict): int(count) for verdict, count in counts.items()}
+
+
+def seen(evidence: str, words: str, which: int = 0) -> str:
+    """A number, with its interval if there is one, that stands behind some words of evidence.
+
+    Raises IndexError if there is none.
+    """
+    estimate = r"\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
+    return str(re.findall(re.escape(words) + estimate, evidence)[which])
 
 
 def interval(values: Row, column: str, digits: int = 1, scale: float = 1.0) -> str:
@@ -101,7 +127,11 @@ def filled_pages() -> dict[str, str]:
     )
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "expect": expect, "name_of": name_of, "register": CLAIMS,
+        "seen": seen, "expect": expect, "name_of": name_of,
+        "printed": tomllib.loads((ANALYSIS / "published.toml").read_text("utf-8"))["general"],
+        "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
+        "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
+        "stored": lambda suite: (STORED / suite).is_dir(),
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
     waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
@@ -115,7 +145,8 @@ def filled_pages() -> dict[str, str]:
 def store(results: Path) -> None:
     """Copy tables and figures from the reports below ``results``; lists of run ids stay there.
 
-    What is stored of a suite without a report there stays as it is.
+    The postures of every report's first figure are taken from the runs of suite ``locus``. What is
+    stored of a suite without a report there stays as it is.
     """
     for suite, (tables, figures) in KEPT.items():
         report, kept = results / suite / "report", STORED / suite
@@ -129,6 +160,8 @@ def store(results: Path) -> None:
             frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
+        if suite == "locus":
+            next_goal.store(load(results / suite))
 
 
 def main() -> None:

@@ -243,6 +243,16 @@ def margins() -> Iterator[str]:
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 
 
+def next_goal() -> Iterator[str]:
+    """The first figure of every report, with its styles and its script."""
+    from coartic.analysis.report.next_goal import STORED, next_goal
+
+    styles, script = (STORED.with_suffix(end).read_text("utf-8") for end in (".css", ".js"))
+    yield "```{raw} html"
+    yield f"<style>{styles}</style>{next_goal()}<script>{{{script}}}</script>"
+    yield "```"
+
+
 class Made(SphinxDirective):
     """Put the Markdown that a function of this file yields in the directive's place."""
 

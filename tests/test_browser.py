@@ -37,7 +37,7 @@ def opened(browser, address):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
     problems, contexts = [], []
 
-    def open_page(width=1280, **options):
+    def open_page(width=1280, link=address, **options):
         context = browser.new_context(viewport={"width": width, "height": 900}, **options)
         contexts.append(context)
         page = context.new_page()
@@ -49,7 +49,7 @@ def opened(browser, address):
                 None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
             ),
         )
-        page.goto(address)
+        page.goto(link)
         return page
 
     yield open_page
@@ -148,6 +148,102 @@ def test_the_player_plays_by_keyboard_and_shows_the_robot_where_the_run_ended(op
         assert min(np.linalg.norm(drawn - centre) for centre in centres) < task.radius + 2e-3
 
 
+def place(page):
+    """The chosen position of the goal that moves, and where the slider says that the bases are."""
+    slider = page.locator("#next-goal-place")
+    heights = re.findall(r"base at height (\S+)\.", slider.get_attribute("aria-valuetext"))
+    return int(slider.input_value()), *map(float, heights)
+
+
+def centre(page):
+    """Of the handle in the second picture."""
+    box = page.locator(".touch .handle").nth(1).bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_the_next_goal_moves_by_keyboard_and_pointer_and_only_what_is_learned_follows(opened):
+    page = opened()
+    page.locator("#next-goal-place").focus()
+    page.keyboard.press("Home")
+    seen = [place(page)]
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+        seen.append(place(page))
+        chosen = page.locator(".touch svg .shown")
+        assert chosen.count() == 2
+        for goal, arm in zip(
+            chosen.locator(".moved").all(), chosen.locator(".arm").all(), strict=True
+        ):
+            assert goal.is_visible()
+            x, y = map(float, arm.get_attribute("points").split()[-1].split(","))
+            aim = np.array(load_task("ascending").goals[1])
+            assert np.linalg.norm([x, -y] - aim) < 0.1 + 2e-3  # the page rounds
+    places, alone, learned = zip(*seen, strict=True)
+    assert places == (0, 1, 2, 3, 4, 5)
+    assert len(set(alone)) == 1
+    assert learned == tuple(sorted(learned))
+    assert learned[-1] > learned[0] + 0.3
+    # The pointer drags the goal down.
+    page.mouse.move(*centre(page))
+    page.mouse.down()
+    page.mouse.move(0, 2000, steps=5)
+    assert place(page) == seen[0]
+    page.mouse.up()
+    page.mouse.move(0, 0)
+    assert place(page) == seen[0]
+
+
+def test_the_next_goal_is_dragged_by_a_finger(opened):
+    page = opened(390, has_touch=True, is_mobile=True)
+    page.locator("#next-goal-place").fill("0")
+    page.locator(".touch svg").nth(1).scroll_into_view_if_needed()
+    before = page.evaluate("scrollY")
+    x, y = centre(page)
+    finger = page.context.new_cdp_session(page)
+    moves = [("touchStart", y), *(("touchMove", y - step) for step in range(5, 300, 5))]
+    for kind, height in moves:
+        points = [{"x": x, "y": height}]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    assert place(page)[0] == 5
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    assert page.evaluate("scrollY") == before  # the page did not scroll instead
+
+
+STATE = """[...document.querySelectorAll("select[id], input[id]")].map(each => each.value)
+    .concat([...document.querySelectorAll(".facts")].map(each => each.innerText))"""
+
+
+def test_the_address_holds_the_view(opened, address):
+    page = opened(reduced_motion="reduce")
+    untouched = page.evaluate(STATE)
+    assert page.url == address
+    page.locator("#next-goal-place").fill("5")
+    page.select_option("#player-view", "own")
+    page.select_option("#player-0", "ascending initial")
+    page.select_option("#player-1", "two-armed-1 dual-process/EC4")
+    page.locator("#player-tick").fill("57")
+    page.get_by_label("One tick back").click()
+    page.select_option("#claims-verdict", "undecided")
+    page.locator("#price").scroll_into_view_if_needed()
+    page.evaluate("document.getElementById('price').scrollIntoView()")
+    page.wait_for_url("**player-tick=56**#price")
+    again = opened(link=page.url, reduced_motion="no-preference")
+    assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
+    again.wait_for_timeout(300)
+    assert again.url == page.url
+    assert abs(again.evaluate("document.getElementById('price').getBoundingClientRect().top")) < 2
+    # Back at the beginning nothing is left of it.
+    page.evaluate("scrollTo(0, 0)")
+    page.select_option("#claims-verdict", "")
+    page.locator("#next-goal-place").fill(untouched[0])
+    page.select_option("#player-view", "0")
+    page.locator("#player-tick").fill(untouched[4])
+    page.wait_for_url(address)
+    # What an old link names and the page does not have is left out.
+    odd = opened(link=f"{address}?player-0=nobody&player-tick=x&nothing=1", reduced_motion="reduce")
+    assert odd.evaluate(STATE) == untouched
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
     page = opened(width, color_scheme=scheme, reduced_motion="reduce")
@@ -183,5 +279,8 @@ def test_without_scripts_all_is_there(browser, address):
     page.goto(address)
     assert page.locator(".without").is_visible()
     assert page.locator("#table-claims tbody tr").count() > 10
+    # Both ends of the way of the goal are drawn, for both methods.
+    assert not page.locator("#next-goal-place").is_visible()
+    assert [goal.is_visible() for goal in page.locator(".touch .moved").all()].count(True) == 4
     assert not page.locator("#claims-search").is_visible()
     context.close()

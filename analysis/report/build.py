@@ -22,6 +22,7 @@ from coartic.analysis.figures import FIGURES, Plot
 from coartic.analysis.figures.plot import picture, svg_for_page
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report import facts
+from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
@@ -187,7 +188,7 @@ def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
     player = player_json(study)
-    scripts = ["page.js", *(["player.js"] if player else [])]
+    scripts = ["page.js", "next_goal.js", *(["player.js"] if player else []), "address.js"]
     template = environment(escape=True).get_template("page.html.jinja")
     script = "\n".join(f"{{\n{(here / name).read_text(encoding='utf-8')}}}" for name in scripts)
     try:
@@ -197,7 +198,8 @@ def page(study: Study) -> str:
     return template.render(
         title=title(study),
         description=" ".join(answer["text"] for answer in answers(study)),
-        styles=(here / "page.css").read_text(encoding="utf-8"),
+        styles="".join((here / f"{name}.css").read_text("utf-8") for name in ("page", "next_goal")),
+        next_goal=next_goal(study),
         script=script,
         player=player.replace("<", "\\u003c"),
         answers=answers(study),

@@ -170,6 +170,11 @@ class Mover {
 
 /* ---- The player ---- */
 
+/* A movement's name in addresses, whatever else the report has. */
+function keyOf(movement) {
+  return `${movement.on} ${movement.label || "initial"}`;
+}
+
 class Player {
   constructor(root, data) {
     this.data = data;
@@ -186,6 +191,7 @@ class Player {
         if (!this.spent) this.play();
       }, { threshold: 0.6 });
       seen.observe(root);
+      ["input", "change"].forEach((kind) => root.addEventListener(kind, () => seen.disconnect()));
     } else this.go(this.pauseAt || this.last);
   }
 
@@ -202,13 +208,15 @@ class Player {
       const select = element("select", { id: `${id}-${k}` }, own);
       this.data.tasks.forEach((task, at) => {
         const group = element("optgroup", { label: task.label }, select);
-        this.data.movements.forEach((movement, index) => {
+        this.data.movements.forEach((movement) => {
           if (movement.task === at) {
-            element("option", { value: index, text: `${movement.name} (${movement.ticks} ticks)` }, group);
+            element("option", { value: keyOf(movement), text: `${movement.name} (${movement.ticks} ticks)` }, group);
           }
         });
       });
-      select.addEventListener("change", () => this.load(this.selects.map((each) => Number(each.value))));
+      select.addEventListener("change", () => this.load(this.selects.map((each) => (
+        this.data.movements.findIndex((movement) => keyOf(movement) === each.value)
+      ))));
       return select;
     });
     this.watch = element("p", { class: "watch" }, root);
@@ -222,7 +230,7 @@ class Player {
     };
     step("◂", "One tick back", -1);
     step("▸", "One tick on", 1);
-    this.slider = element("input", { type: "range", "aria-label": "Tick", min: 0, step: 1, value: 0 }, controls);
+    this.slider = element("input", { type: "range", id: `${id}-tick`, "aria-label": "Tick", min: 0, step: 1, value: 0 }, controls);
     this.slider.addEventListener("input", () => { this.pause(); this.go(Number(this.slider.value)); });
     this.count = element("span", { class: "count" }, controls);
     this.status = element("p", { class: "unseen", role: "status", "aria-live": "polite" }, root);
@@ -241,7 +249,7 @@ class Player {
   load(show) {
     this.pause();
     this.shown = show.length > 1 ? show : [show[0], show[0]];
-    this.shown.forEach((index, k) => { this.selects[k].value = index; });
+    this.shown.forEach((index, k) => { this.selects[k].value = keyOf(this.data.movements[index]); });
     const distinct = [...new Set(show)];
     this.movers = distinct.map((index, k) => {
       const movement = this.data.movements[index];
@@ -287,6 +295,7 @@ class Player {
     this.slider.setAttribute("aria-valuetext", this.count.textContent);
     if (!this.playing) {
       this.status.textContent = this.movers.map((mover) => `${mover.head}: ${mover.words}`).join("; ");
+      this.slider.dispatchEvent(new Event("change", { bubbles: true }));
     }
   }
 

@@ -1,0 +1,40 @@
+"use strict";
+/* Keeps what is chosen and the section in view in the address, so that a view can be sent as a link. */
+(() => {
+  const controls = [...document.querySelectorAll("select[id], input[id]")];
+  const atStart = new Map(controls.map((control) => [control, control.value]));
+  const headings = [...document.querySelectorAll("h2[id]")];
+
+  const read = () => {
+    const asked = new URLSearchParams(window.location.search);
+    controls.filter((control) => asked.has(control.id)).forEach((control) => {
+      const before = control.value;
+      control.value = asked.get(control.id);
+      if (control.value !== asked.get(control.id)) control.value = before; // an old link
+      else control.dispatchEvent(new Event(control.tagName === "SELECT" ? "change" : "input", { bubbles: true }));
+    });
+  };
+
+  const write = () => {
+    const changed = controls.filter((control) => control.value !== atStart.get(control) && !control.closest("[hidden]"));
+    const query = new URLSearchParams(changed.map((control) => [control.id, control.value])).toString();
+    const heading = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);
+    const section = heading && heading.closest("section");
+    const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
+    const within = target && section && section.contains(target); // as a claim is
+    const hash = within ? window.location.hash : heading ? `#${heading.id}` : "";
+    window.history.replaceState(null, "", window.location.pathname + (query && `?${query}`) + hash);
+  };
+
+  /* Waits until nothing changes. What moves by itself before the reader does anything is not kept. */
+  let touched = false;
+  let waiting;
+  const later = (event) => {
+    touched ||= event.isTrusted;
+    if (!touched) return;
+    clearTimeout(waiting);
+    waiting = setTimeout(write, 200);
+  };
+  read();
+  ["input", "change", "scroll"].forEach((kind) => window.addEventListener(kind, later));
+})();

@@ -1,0 +1,116 @@
+"""The figure to touch: one goal is moved, and the posture at the goal before it is looked at.
+
+Suite ``locus`` moves a goal from run to run. :func:`postures` takes what the figure shows from the
+runs of that suite; folders of other suites show ``next_goal.csv``, which is made by the same
+function. The page draws every position, and ``next_goal.js`` chooses one of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic import CoarticError, Task, load_task
+from coartic.analysis.figures.robot import box
+from coartic.analysis.methods import EC1, INITIAL, name_of
+from coartic.analysis.report.text import environment
+from coartic.analysis.study import Study
+from coartic.analysis.words import number
+from coartic.robot import Array
+
+TASK, MOVED = "ascending", 3
+"""The task, and the goal of it that is moved; goals count from 1. The suite moves goal 2 as well,
+which the learner's posture follows less."""
+METHODS = {INITIAL: "One goal at a time", EC1: "Learned"}
+"""The methods side by side, with their headings."""
+HANDLE = 0.45
+"""Length unit around the goal where a pointer takes hold of it."""
+STORED = Path(__file__).with_name("next_goal.csv")
+"""Postures of a folder of suite ``locus``, for folders of other suites."""
+
+
+def postures(study: Study) -> pd.DataFrame:
+    """Where the goal is that is moved, and the posture at the goal before it: a row a run.
+
+    Of the positions at which every method of the figure has solved runs; empty where there are
+    fewer than two.
+    """
+    moved = [name for name in study.tasks if name.startswith(f"{TASK}.goal{MOVED}_")]
+    rows = []
+    for name in moved:
+        cells = [study.cells.get((name, label)) for label in METHODS]
+        solved = [cell for cell in cells if cell is not None and len(cell.good)]
+        for cell in solved if len(solved) == len(METHODS) else []:
+            runs = study.trajectories(name, cell.label).runs
+            for run_id, run in zip(cell.good.run_id, runs, strict=False):
+                x, y = run.task.goals[MOVED - 1]
+                q = run.execution.configurations[MOVED - 2]
+                joints = dict(zip(run.task.robot.joint_names, q, strict=True))
+                rows.append({"method": cell.label, "run_id": run_id, "x": x, "y": y, **joints})
+    positions = {(row["x"], row["y"]) for row in rows}
+    frame = pd.DataFrame(rows if len(positions) > 1 else [])
+    version = study.made_with["coartic"]
+    return frame.assign(suite=study.suite, seed=study.plan.seed, version=version)
+
+
+def store(study: Study) -> None:
+    """Keep the postures of a folder of suite ``locus`` for folders of other suites."""
+    kept = postures(study)
+    if kept.empty:
+        raise CoarticError(f"{study.folder} lacks runs of {TASK} with goal {MOVED} moved")
+    kept.to_csv(STORED, index=False, float_format="%.4f", lineterminator="\n")
+
+
+def next_goal(study: Study | None = None) -> str:
+    """The figure as HTML, from a folder's own runs or from the stored ones."""
+    shown = pd.DataFrame() if study is None else postures(study)
+    shown = pd.read_csv(STORED) if shown.empty else shown
+    task = load_task(TASK)
+    low, high = box(task, shown[[*task.robot.joint_names]].to_numpy())
+    high[1] = max(high[1], shown.y.max() + HANDLE)
+    panels: list[dict[str, Any]] = []
+    for label, name in METHODS.items():
+        rows = shown[shown.method == label]
+        places = [place_of(task, runs) for _, runs in rows.groupby(["x", "y"])]
+        rise = number(places[-1]["base"] - places[0]["base"], 2)
+        panels.append({"name": name, "places": places, "rise": rise, "runs": len(rows)})
+        panels[-1]["method"] = name_of(label)
+    goals = [place["goal"] for place in panels[0]["places"]]
+    template = environment(escape=True).get_template("next_goal.html.jinja")
+    return template.render(
+        panels=panels,
+        goals=goals,
+        others=[(k, x, y) for k, (x, y) in enumerate(task.goals, 1) if k != MOVED],
+        start=int(np.square(np.subtract(goals, task.goals[MOVED - 1])).sum(axis=1).argmin()),
+        moved=MOVED,
+        radius=task.radius,
+        handle=HANDLE,
+        sight=[round(value, 2) for value in (low[0], -high[1], *(high - low))],
+        task=task.label,
+        **shown[["suite", "seed", "version"]].iloc[0],
+    )
+
+
+def place_of(task: Task, runs: pd.DataFrame) -> dict[str, Any]:
+    """One position of the goal with the postures of one method's runs there, and their mean."""
+    configurations = runs[[*task.robot.joint_names]].to_numpy()
+    mean = configurations.mean(axis=0)
+    return {
+        "goal": (float(runs.x.iloc[0]), float(runs.y.iloc[0])),
+        "runs": [robot(task, q) for q in configurations],
+        "mean": robot(task, mean),
+        "base": float(mean[1]),
+    }
+
+
+def robot(task: Task, q: Array) -> dict[str, Any]:
+    """A posture as SVG wants it, with y downwards: corners of the base, joints of each arm."""
+
+    def points(of: Array) -> list[str]:
+        return [f"{x:.3f},{-y:.3f}" for x, y in np.asarray(of)]
+
+    arms = [points(task.robot.joint_positions(q, hand)) for hand in task.hands]
+    return {"base": points(task.robot.base_outline(q)), "arms": arms}

@@ -1,0 +1,36 @@
+"""The report's first figure, in which a goal moves: its runs."""
+
+import pandas as pd
+import pytest
+
+from coartic import CoarticError
+from coartic.analysis.report import next_goal
+from coartic.analysis.study import load
+from coartic.benchmarks.run import plan_suite
+from coartic.benchmarks.suites import load_suite, select_cells
+from tests.support.suites import KNOWN, InProcess
+
+
+@pytest.fixture(scope="module")
+def moved(tmp_path_factory):
+    """The first run of each cell of suite ``locus`` that the figure shows."""
+    cells = select_cells(load_suite("locus"), KNOWN, methods=list(next_goal.METHODS))
+    cells = [cell for cell in cells if f".goal{next_goal.MOVED}_" in cell.task.name]
+    plan = plan_suite("locus", cells=cells, runs=1, trials=10_000)
+    folder = tmp_path_factory.mktemp("locus")
+    plan.perform(folder, executor=InProcess())
+    return load(folder)
+
+
+def test_the_stored_postures_are_those_of_the_suite(moved):
+    ours, stored = next_goal.postures(moved), pd.read_csv(next_goal.STORED)
+    kept = stored[stored.run_id.isin(ours.run_id)].reset_index(drop=True)
+    pd.testing.assert_frame_equal(ours, kept, check_exact=False, rtol=0, atol=1e-4)
+    assert stored.run_id.is_unique
+
+
+def test_a_folder_shows_its_own_runs_or_else_the_stored_ones(moved, traced):
+    assert "6 runs of learner EC1" in next_goal.next_goal(moved)
+    assert "120 runs of learner EC1" in next_goal.next_goal(traced) == next_goal.next_goal()
+    with pytest.raises(CoarticError, match="goal 3 moved"):
+        next_goal.store(traced)
