@@ -161,6 +161,8 @@ def verdict_of(
 def separating(study: Study) -> dict[str, list[str]]:
     """The findings that tell models apart: on which one kind agrees and the other disagrees.
 
+    Undecided ones are left out.
+
     ``learner_from_planners``: the paper's learner from every planner that is judged;
     ``look_ahead``: planners with one goal in view from all with more.
     """
@@ -173,7 +175,9 @@ def separating(study: Study) -> dict[str, list[str]]:
     for finding, rows in verdicts.groupby("finding", sort=False):
         by_model = rows.set_index("model").verdict
         for kind, groups in kinds.items():
-            first, second = (set(by_model[group]) - {SILENT, NOT_RUN} for group in groups)
+            first, second = (
+                set(by_model[group]) - {SILENT, NOT_RUN, UNDECIDED} for group in groups
+            )
             if (first, second) in (({AGREES}, {DISAGREES}), ({DISAGREES}, {AGREES})):
                 apart[kind].append(str(finding))
     return apart

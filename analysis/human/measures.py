@@ -7,6 +7,7 @@ statistic that is made of them, or None where nothing follows for the model.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -201,7 +202,7 @@ def slope_norms(
     norms = {}
     for task, group in moved(study, model, at + distance, **others).items():
         square = float(squared_slopes(group, at + distance, at)[joints].sum())
-        norms[task] = float(np.sign(square) * np.sqrt(abs(square)))
+        norms[task] = round(float(np.sign(square) * np.sqrt(abs(square))), 6)  # else 0 is 1e-12
     return norms
 
 
@@ -423,7 +424,7 @@ def late_less_early(study: Study, model: Model) -> Values | None:
 
 
 def near_tie_repeats(study: Study, model: Model) -> Values | None:
-    """Share of near ties in which the hand stays the same; None with too few."""
+    """Share of near ties in which the hand stays the same."""
     by_task = []
     for runs in still(study, model, 2).values():
         repeats = [
@@ -433,9 +434,10 @@ def near_tie_repeats(study: Study, model: Model) -> Values | None:
         ]
         if repeats:
             by_task.append(np.array(repeats, dtype=np.float64)[:, None])
-    if sum(map(len, by_task)) < FEWEST_TIES:
+    if not by_task:
         return None
-    return Values(by_task, lambda rows: float(rows.mean()))
+    enough = sum(map(len, by_task)) >= FEWEST_TIES
+    return Values(by_task, lambda rows: float(rows.mean()) if enough else math.nan)
 
 
 def near_ties(run: Trajectory) -> Iterator[int]:
