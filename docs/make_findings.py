@@ -39,6 +39,7 @@ KEPT = {
     "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
     "objectives": ("objectives crossings claims", "objectives"),
+    "human": ("human human-effects", "human"),
 }
 """Tables and figures that are kept of each suite's report. Suites that need other libraries are
 not run by ``make findings``."""

@@ -13,7 +13,15 @@ _SPEC.loader.exec_module(make_findings)
 
 @pytest.mark.parametrize(
     "page",
-    ["findings.md", "foreign.md", "horizon.md", "objectives.md", "paper.md", "stops.md"],
+    [
+        "findings.md",
+        "foreign.md",
+        "horizon.md",
+        "human.md",
+        "objectives.md",
+        "paper.md",
+        "stops.md",
+    ],
 )
 def test_a_page_is_its_template_filled_from_the_stored_tables(page):
     assert make_findings.filled_pages()[page] == (DOCS / page).read_text(encoding="utf-8")

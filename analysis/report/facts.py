@@ -18,6 +18,7 @@ from coartic.analysis.comparisons.paper import paper_rows
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import leaders
 from coartic.analysis.generality.sample import one_by_one, sample
+from coartic.analysis.human import judge
 from coartic.analysis.methods import (
     CONDITIONS,
     LEARNER,
@@ -320,6 +321,16 @@ def objectives(study: Study) -> Facts | None:
             for row in crossings[crossings.who == "learner"].to_dict("records")
         ],
     }
+
+
+@cached
+def human(study: Study) -> Facts | None:
+    """The findings about people that tell models apart, and how often the learner agrees."""
+    rows = judge.judged(study).drop_duplicates(["finding", "model"])
+    if not len(rows):
+        return None
+    learner = rows[rows.model == "learner"].verdict.value_counts().to_dict()
+    return {"learner": learner, "findings": len(judge.FINDINGS), **judge.separating(study)}
 
 
 @cached

@@ -1,0 +1,183 @@
+"""Which models agree with which findings: :func:`judged` has a row for each pair and test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+
+from coartic.analysis.human.measures import (
+    MEASURES,
+    MODELS,
+    PLANNERS_AHEAD,
+    PLANNERS_BLIND,
+    Values,
+)
+from coartic.analysis.statistics.estimates import LEVEL, SEED
+from coartic.analysis.study import Study, cached
+from coartic.analysis.words import read_beside
+from coartic.robot import Array
+
+SUITE = "human"
+FEWEST_TASKS = 10
+RESAMPLES = 1_999
+AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
+NOT_RUN = "no runs"
+
+
+class Test(BaseModel):
+    """One inequality that a finding predicts."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    measure: str
+    above: float | None = None
+    below: float | None = None
+    disagree: float | None = None
+    """Beyond which, on the wrong side, it is a disagreement; the bound itself if not given."""
+
+    @model_validator(mode="after")
+    def is_one_inequality(self) -> Test:
+        """Check that the measure exists and that there is one bound."""
+        if self.measure not in MEASURES or (self.above is None) == (self.below is None):
+            raise ValueError("should have a measure of measures.py, and either above or below")
+        return self
+
+
+class Finding(BaseModel):
+    """A published finding; ``human.toml`` says what the fields are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    statement: str
+    population: str
+    statistic: str
+    quote: str
+    place: str
+    source: str
+    doi: str
+    read: str
+    predicts: str
+    tests: Sequence[Test]
+    where: str
+    silent: dict[str, str] = {}
+    built_in: dict[str, str] = {}
+    not_asked: str = ""
+    note: str = ""
+
+
+def read_findings() -> dict[str, Finding]:
+    """The findings by id, with the models in the place of the names of their groups."""
+    data = read_beside(__file__, "human")
+    groups: dict[str, list[str]] = data.pop("groups")
+    findings = TypeAdapter(dict[str, Finding]).validate_python(data)
+    for name, finding in findings.items():
+        for field in ("silent", "built_in"):
+            by_name: dict[str, str] = getattr(finding, field)
+            by_model = {
+                model: what for key, what in by_name.items() for model in groups.get(key, [key])
+            }
+            if unknown := by_model.keys() - MODELS.keys():
+                raise ValueError(f"{name}: {field} has {sorted(unknown)}, no models of measures.py")
+            by_name.clear()
+            by_name.update(by_model)
+    return findings
+
+
+FINDINGS = read_findings()
+"""The findings by id, in the order of the table."""
+
+
+@cached
+def judged(study: Study) -> pd.DataFrame:
+    """A row for each finding, test and model, in their order; none for folders of other suites.
+
+    Columns ``finding``, ``model``, ``measure``, ``value`` with the ``low`` and ``high`` end of its
+    interval, ``tasks``, ``verdict`` of the finding (the same for all tests of one), ``built_in``:
+    whether it follows from how the model is built, ``because``: why a model is silent.
+    Intervals are of the bootstrap over tasks, 95 % for one test and wider for several
+    (Bonferroni).
+    """
+    rows = []
+    for name, finding in FINDINGS.items() if study.suite == SUITE else ():
+        for model in MODELS:
+            silent = finding.silent.get(model, "")
+            values = [
+                None if silent else MEASURES[test.measure](study, MODELS[model])
+                for test in finding.tests
+            ]
+            level = LEVEL / len(finding.tests)
+            ends = [(math.nan,) * 3 if of is None else bootstrapped(of, level) for of in values]
+            counts = [0 if of is None else len(of.by_task) for of in values]
+            verdict = SILENT if silent else verdict_of(finding, ends, counts)
+            built_in = finding.built_in.get(model) == verdict
+            for test, end, count in zip(finding.tests, ends, counts, strict=True):
+                rows.append((name, model, test.measure, *end, count, verdict, built_in, silent))
+    columns = "finding model measure value low high tasks verdict built_in because"
+    return pd.DataFrame(rows, columns=columns.split())
+
+
+def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
+    """A statistic of all tasks, and its interval over tasks drawn with replacement.
+
+    Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread.
+    """
+    estimate = values.statistic(np.concatenate(values.by_task))
+    count = len(values.by_task)
+    if count < 2:
+        return estimate, math.nan, math.nan
+    rng = np.random.default_rng(SEED)
+    drawn = rng.integers(count, size=(RESAMPLES, count))
+    resampled = np.array(
+        [values.statistic(np.concatenate([values.by_task[k] for k in tasks])) for tasks in drawn]
+    )
+    away: Array = (resampled - estimate) * math.sqrt(count / (count - 1))
+    low, high = estimate + np.quantile(away, [level / 2, 1 - level / 2])
+    return estimate, float(low), float(high)
+
+
+def verdict_of(
+    finding: Finding, ends: Sequence[tuple[float, float, float]], tasks: Sequence[int]
+) -> str:
+    """Of a model on a finding, from the value of each test with its interval."""
+    if not all(tasks):
+        return NOT_RUN
+    agrees, disagrees = [], []
+    for test, (_, low, high) in zip(finding.tests, ends, strict=True):
+        sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
+        assert bound is not None
+        wrong = bound if test.disagree is None else test.disagree
+        near, far = sorted((sign * low, sign * high))
+        agrees.append(near >= sign * bound)
+        disagrees.append(far < sign * wrong)
+    if min(tasks) < FEWEST_TASKS or all(agrees) == any(disagrees):
+        return UNDECIDED
+    return AGREES if all(agrees) else DISAGREES
+
+
+def separating(study: Study) -> dict[str, list[str]]:
+    """The findings that tell models apart: on which one kind agrees and the other disagrees.
+
+    Undecided ones are left out.
+
+    ``learner_from_planners``: the paper's learner from every planner that is judged;
+    ``look_ahead``: planners with one goal in view from all with more.
+    """
+    verdicts = judged(study).drop_duplicates(["finding", "model"])
+    kinds = {
+        "learner_from_planners": (["learner"], [*PLANNERS_BLIND, *PLANNERS_AHEAD]),
+        "look_ahead": (list(PLANNERS_BLIND), list(PLANNERS_AHEAD)),
+    }
+    apart: dict[str, list[str]] = {kind: [] for kind in kinds}
+    for finding, rows in verdicts.groupby("finding", sort=False):
+        by_model = rows.set_index("model").verdict
+        for kind, groups in kinds.items():
+            first, second = (
+                set(by_model[group]) - {SILENT, NOT_RUN, UNDECIDED} for group in groups
+            )
+            if (first, second) in (({AGREES}, {DISAGREES}), ({DISAGREES}, {AGREES})):
+                apart[kind].append(str(finding))
+    return apart

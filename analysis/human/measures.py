@@ -1,0 +1,502 @@
+"""What the findings of ``human.toml`` are put to: one function for each measure.
+
+A measure takes a study of suite ``human`` and a model, and returns its values on each task with the
+statistic that is made of them, or None where nothing follows for the model.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from coartic import Hand, Trajectory
+from coartic.analysis.cells import CellRuns
+from coartic.analysis.methods import EC2, EC3, INITIAL, most_exploring
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.subtasks import (
+    isolated_agreement,
+    isolated_reach,
+    isolated_reaches,
+    postures_before,
+)
+from coartic.analysis.study import Study, cached
+from coartic.analysis.trajectories import Trajectories, postures
+from coartic.robot import BASE_DOF, Array
+
+STATIONS = 100
+"""Points at equal distances along a hand's path."""
+NEAR_TIE = 0.05
+"""Both hands need the same ticks within this share of the fewer."""
+FEWEST_TIES = 30
+LONG = 6
+"""Goals of a task on which it is asked how far ahead is enough."""
+ENOUGH = 1.01
+"""Ticks of a horizon that is enough, as a multiple of those with all goals in view."""
+SERIAL = 0.95
+"""Share of goals hit with the quicker hand for them alone that asks for no look-ahead."""
+TICKS_OF_A_TURN = 5
+"""Ticks before a hit, and after it, over which the direction of a hand is measured."""
+PRACTISED, BEGUN = 10_000, 100
+"""Trials of the learner after practice, and after a hundredth of it."""
+_MOVED = re.compile(r"(?P<task>.+)\.goal(?P<goal>\d+)_.+")
+
+
+class Model(NamedTuple):
+    """One model: a method with its parameters; no id for the learner that explores most."""
+
+    method: str
+    parameters: Mapping[str, Any]
+
+
+PLANNER = "receding-horizon"
+_FREE = {"timing": "free"}
+MODELS = {
+    "learner": Model("", {"trials": PRACTISED}),
+    "learner EC2": Model(EC2, {}),
+    "learner EC3": Model(EC3, {}),
+    "CMA-ES": Model("cma-es/bandit", {}),
+    "corrective process": Model(INITIAL, {}),
+    "no goal ahead": Model(PLANNER, {"horizon": 0}),
+    "one goal ahead": Model(PLANNER, {"horizon": 1}),
+    "two goals ahead": Model(PLANNER, {"horizon": 2}),
+    "all goals ahead": Model(PLANNER, {"horizon": 7}),
+    "null-space control, this goal": Model("nullspace-qp/none", {}),
+    "null-space control, next goals": Model("nullspace-qp/next-goal", {}),
+    "posture-based, two goals": Model("posture-based/two-goals", {}),
+    "shortest path": Model("trajectory-optimisation/path-length", {}),
+    "least acceleration": Model("trajectory-optimisation/acceleration", {**_FREE, "stop": 0}),
+    "least jerk": Model("trajectory-optimisation/jerk", {**_FREE, "stop": 0}),
+}
+"""What is compared with people, by name."""
+PLANNERS_BLIND = ("no goal ahead", "null-space control, this goal")
+"""Planners that heed one goal at a time."""
+PLANNERS_AHEAD = (
+    "one goal ahead",
+    "two goals ahead",
+    "all goals ahead",
+    "null-space control, next goals",
+    "posture-based, two goals",
+    "shortest path",
+    "least acceleration",
+    "least jerk",
+)
+"""Planners that heed later goals."""
+
+
+class Values(NamedTuple):
+    """What is measured on each task, ``(n, k)`` with any n, and the statistic of all rows."""
+
+    by_task: list[Array]
+    statistic: Callable[[Array], float]
+
+
+Measure = Callable[[Study, Model], Values | None]
+
+
+def mean_of(by_task: list[Array]) -> Values | None:
+    """The mean over tasks of one value each; None without any."""
+    there = [np.reshape(v, (1, -1)) for v in by_task if np.isfinite(v).all()]
+    return Values(there, lambda rows: float(rows.mean())) if there else None
+
+
+@cached
+def cells_by_method(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, Any]]]]:
+    """Cells with a solution and their parameters, by method."""
+    by_method: dict[str, list[tuple[CellRuns, dict[str, Any]]]] = {}
+    for cell in study.cells.values():
+        if len(cell.good):
+            parameters = json.loads(str(cell.good.parameters.iloc[0]))
+            by_method.setdefault(cell.method, []).append((cell, parameters))
+    return by_method
+
+
+def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
+    """A model's cells; ``others`` are parameters in the place of its own."""
+    asked = {**model.parameters, **others}
+    methods = [model.method] if model.method else {*map(most_exploring, study.tasks.values())}
+    return [
+        cell
+        for method in methods
+        for cell, parameters in cells_by_method(study).get(method, [])
+        if (model.method or most_exploring(study.tasks[cell.task]) == method)
+        and all(parameters.get(name) == value for name, value in asked.items())
+    ]
+
+
+def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
+    """A model's runs by task."""
+    cells = cells_of(study, model, **others)
+    return {cell.task: study.trajectories(cell.task, cell.label) for cell in cells}
+
+
+def still(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
+    """Runs on tasks with so many arms and fewer than six goals, of which none was moved."""
+    return {
+        name: runs
+        for name, runs in runs_of(study, model, **others).items()
+        if not _MOVED.match(name) and len(runs.task.hands) == arms and len(runs.task.goals) < LONG
+    }
+
+
+def moved(study: Study, model: Model, goal: int, **others: Any) -> dict[str, list[Trajectories]]:
+    """Runs on the tasks in which one goal moves, by the task that they come from, in its order."""
+    groups: dict[str, list[Trajectories]] = {}
+    for name, runs in runs_of(study, model, **others).items():
+        parts = _MOVED.match(name)
+        if parts and int(parts["goal"]) == goal:
+            groups.setdefault(parts["task"], []).append(runs)
+    for group in groups.values():
+        group.sort(key=lambda runs: runs.task.goals[goal - 1])
+    return {task: group for task, group in groups.items() if len(group) > 2}
+
+
+def run_ids(study: Study, name: str, where: str) -> str:
+    """The ids of a model's runs in a block of the suite: moved goals, tasks or long tasks."""
+    model = MODELS[name]
+    if where == "long tasks":  # all horizons together make one value
+        model = Model(model.method, {})
+    return " ".join(
+        str(run)
+        for cell in cells_of(study, model)
+        if bool(_MOVED.match(cell.task)) == (where == "moved goals")
+        and (len(study.tasks[cell.task].goals) >= LONG) == (where == "long tasks")
+        for run in cell.good.run_id
+    )
+
+
+# Postures that follow a goal that moves
+
+
+def squared_slopes(group: list[Trajectories], moving: int, at: int) -> Array:
+    """Of each joint's slope on the place of the goal that moves, squared, shape ``(dof,)``.
+
+    The posture at goal ``at``, in rad or length unit per length unit. Of several runs the products
+    of different ones, whose mean is right however much runs differ; below 0 by chance only.
+    """
+    places = np.array([runs.task.goals[moving - 1][1] for runs in group])
+    weights = (places - places.mean()) / ((places - places.mean()) ** 2).sum()
+    count = min(len(runs.runs) for runs in group)
+    by_run = np.array([postures(runs.runs[:count], at) for runs in group])
+    slopes = np.einsum("p,prj->rj", weights, by_run)
+    if count == 1:
+        return np.asarray(slopes[0] ** 2)
+    total = slopes.sum(axis=0) ** 2 - (slopes**2).sum(axis=0)
+    return np.asarray(total / (count * (count - 1)))
+
+
+def slope_norms(
+    study: Study, model: Model, distance: int, joints: slice = slice(None), **others: Any
+) -> dict[str, float]:
+    """Length of the vector of slopes by task; with the sign of its square, which chance can turn.
+
+    Distance 1 and 2: the posture at goal 1 follows goal 2 or 3; -1: that at goal 2 follows goal 1.
+    """
+    at = 1 if distance > 0 else 2
+    norms = {}
+    for task, group in moved(study, model, at + distance, **others).items():
+        square = float(squared_slopes(group, at + distance, at)[joints].sum())
+        norms[task] = round(float(np.sign(square) * np.sqrt(abs(square))), 6)  # else 0 is 1e-12
+    return norms
+
+
+def slope_norm(
+    study: Study, model: Model, distance: int, joints: slice = slice(None)
+) -> Values | None:
+    """Mean slope norm over tasks."""
+    return mean_of([*map(np.array, slope_norms(study, model, distance, joints).values())])
+
+
+def nearer_goal_more(study: Study, model: Model) -> Values | None:
+    """Slope norm at distance 1 less that at distance 2."""
+    near, far = (slope_norms(study, model, distance) for distance in (1, 2))
+    return mean_of([np.array(near[task] - far[task]) for task in near if task in far])
+
+
+def practice(study: Study, model: Model) -> list[Array]:
+    """Slope norms at distances 1 and 2 after all trials and after a hundredth, by task, (1, 4)."""
+    if model.method:
+        return []
+    norms = [
+        slope_norms(study, model, distance, trials=trials)
+        for trials in (PRACTISED, BEGUN)
+        for distance in (1, 2)
+    ]
+    return [
+        np.array([[of[task] for of in norms]]) for task in norms[0] if all(task in n for n in norms)
+    ]
+
+
+def horizon_rise(study: Study, model: Model) -> Values | None:
+    """Rise of the slope norm at distance 2 with practice."""
+    by_task = practice(study, model)
+    return (
+        Values(by_task, lambda rows: float((rows[:, 1] - rows[:, 3]).mean())) if by_task else None
+    )
+
+
+def ratio_rise(study: Study, model: Model) -> Values | None:
+    """Rise of the ratio of the mean slope norms at distance 2 and 1 with practice."""
+    by_task = practice(study, model)
+
+    def statistic(rows: Array) -> float:
+        near, far, near_before, far_before = rows.mean(axis=0)
+        return float(far / near - far_before / near_before)
+
+    return Values(by_task, statistic) if by_task else None
+
+
+def benefit_correlation(study: Study, model: Model) -> Values | None:
+    """Kendall's τ of what preparing can save and of the slope norm at distance 1, over tasks.
+
+    What can be saved: ticks with no goal ahead less the fewest of any run, where no goal moved.
+    """
+    norms = slope_norms(study, model, 1)
+    alone = still(study, MODELS["no goal ahead"], 1)
+    highest = study.runs[study.runs.status == "ok"].groupby("task").reward.max()
+    rows = [
+        np.array([[norm, alone[task].runs[0].ticks + float(highest[task])]])
+        for task, norm in norms.items()
+        if task in alone
+    ]
+    return Values(rows, rank_correlation) if rows else None
+
+
+def rank_correlation(pairs: Array) -> float:
+    """Kendall's τ; 0 where one of both is the same on all tasks."""
+    return float(np.nan_to_num(stats.kendalltau(*pairs.T).statistic))
+
+
+# Paths of the hand
+
+
+def hand_path(run: Trajectory, goal: int) -> Array:
+    """Positions of the hitting hand from the goal before to this one, shape ``(k, 2)``."""
+    return np.asarray(run.task.robot.forward_kinematics(run.subtask(goal), run.hands[goal - 1]))
+
+
+def stations(path: Array) -> Array:
+    """Points at equal distances along a path, shape ``(STATIONS, 2)``."""
+    lengths = np.concatenate([[0.0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
+    at = np.linspace(0, lengths[-1], STATIONS)
+    return np.column_stack([np.interp(at, lengths, coordinate) for coordinate in path.T])
+
+
+def turn(first: Array, second: Array) -> float:
+    """Angle from one direction to another, left positive, -π to π rad."""
+    cross = first[0] * second[1] - first[1] * second[0]
+    return float(np.arctan2(cross, first @ second))
+
+
+def bows(run: Trajectory) -> Iterator[tuple[float, float, float]]:
+    """Bow of each way between two others, turn to the next, turn from the last (left positive)."""
+    ends = [
+        np.array(run.task.robot.forward_kinematics(run.task.q0, run.hands[0])),
+        *run.task.goal_array,
+    ]
+    chords = np.diff(ends, axis=0)
+    for k in range(1, len(chords) - 1):
+        path = stations(hand_path(run, k + 1))
+        chord = path[-1] - path[0]
+        away = path - path[0]
+        side = (chord[0] * away[:, 1] - chord[1] * away[:, 0]) / np.linalg.norm(chord)
+        yield float(side.mean()), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])
+
+
+def bow_slope(study: Study, model: Model) -> Values | None:
+    """Slope of the bow on the next turn, given the last one, over the reaches of all tasks."""
+    by_task = [
+        np.array([row for run in runs.runs for row in bows(run)])
+        for runs in still(study, model, 1).values()
+    ]
+
+    def statistic(rows: Array) -> float:
+        bow, to_next, from_last = rows.T
+        columns = np.column_stack([to_next, from_last, np.ones(len(bow))])
+        return float(np.linalg.lstsq(columns, bow)[0][0])
+
+    return Values(by_task, statistic) if by_task else None
+
+
+def turn_at_goals(run: Trajectory) -> float:
+    """Mean angle by which the hand turns at goals that others follow, 0 to π rad."""
+    angles = []
+    for goal in range(1, len(run.task.goals)):
+        before, after = hand_path(run, goal), hand_path(run, goal + 1)
+        into = before[-1] - before[-1 - min(TICKS_OF_A_TURN, len(before) - 1)]
+        out = after[min(TICKS_OF_A_TURN, len(after) - 1)] - after[0]
+        angles.append(abs(turn(into, out)))
+    return float(np.mean(angles))
+
+
+def turn_saved(study: Study, model: Model) -> Values | None:
+    """Turn at goals under the corrective process alone less that of the model, on one arm."""
+    alone = still(study, MODELS["corrective process"], 1)
+    return mean_of([
+        np.array(turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)]))
+        for task, runs in still(study, model, 1).items()
+        if task in alone
+    ])  # fmt: skip
+
+
+def stop_ratio(study: Study, model: Model) -> Values | None:
+    """How far apart hand paths to goal 1 lie before two places of goal 2: stopping by passing."""
+    if "stop" not in model.parameters:
+        return None
+    apart = []
+    for stop in (1, 0):
+        apart.append({
+            task: float(np.linalg.norm(ends[0] - ends[1], axis=1).mean())
+            for task, group in moved(study, model, 2, stop=stop).items()
+            if (ends := [stations(hand_path(group[k].runs[0], 1)) for k in (0, -1)])
+        })  # fmt: skip
+    rows = [np.array([[apart[0][task], apart[1][task]]]) for task in apart[0] if task in apart[1]]
+    if not rows:
+        return None
+    return Values(rows, lambda pairs: float(pairs[:, 0].mean() / pairs[:, 1].mean()))
+
+
+def path_excess(run: Trajectory) -> float:
+    """Length of the hand's paths beyond their chords, as a share of these."""
+    paths = [hand_path(run, goal) for goal in range(1, len(run.task.goals) + 1)]
+    lengths = sum(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in paths)
+    return lengths / sum(float(np.linalg.norm(path[-1] - path[0])) for path in paths) - 1
+
+
+def changed_by_practice(
+    study: Study, model: Model, measured: Callable[[Trajectory], float], sign: int
+) -> Values | None:
+    """What the learner changes from the corrective process alone, its first trial."""
+    if model.method not in ("", EC2, EC3):
+        return None
+    values = []
+    for arms in (1, 2):
+        alone = still(study, MODELS["corrective process"], arms)
+        for task, runs in still(study, model, arms).items():
+            if task in alone:
+                learned = np.mean([measured(run) for run in runs.runs])
+                values.append(np.array(sign * (learned - measured(alone[task].runs[0]))))
+    return mean_of(values)
+
+
+# Which hand, and what the other does
+
+
+def first_movement(study: Study, model: Model) -> Values | None:
+    """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
+    values = []
+    for runs in still(study, model, 2).values():
+        excess = []
+        for run in runs.runs:
+            alone = isolated_reach(run.task, run.task.q0, 1, run.hands[0])
+            if run.hands[0] != run.hands[1] and alone is not None:
+                excess.append(int(run.execution.ticks_by_goal()[0]) - alone[0])
+        values += [np.array(np.mean(excess))] if excess else []
+    return mean_of(values)
+
+
+@cached
+def needs_other_hands(study: Study) -> set[str]:
+    """Tasks whose best solution takes a hand that is slower for some goal that others follow."""
+    best: dict[str, Trajectory] = {}
+    for model in MODELS.values():
+        for task, runs in still(study, model, 2).items():
+            for run in runs.runs:
+                if task not in best or run.ticks < best[task].ticks:
+                    best[task] = run
+    return {task for task, run in best.items() if np.mean(isolated_agreement(run)[:-1]) < SERIAL}
+
+
+def late_less_early(study: Study, model: Model) -> Values | None:
+    """Share of goals hit with the quicker hand for them: the last but one, less those before."""
+    return mean_of([
+        np.array(np.mean([agree[-2] - np.mean(agree[:-2]) for agree in agreements]))
+        for task, runs in still(study, model, 2).items()
+        if task in needs_other_hands(study)
+        and (agreements := [np.array(isolated_agreement(run), float) for run in runs.runs])
+    ])  # fmt: skip
+
+
+def near_tie_repeats(study: Study, model: Model) -> Values | None:
+    """Share of near ties in which the hand stays the same."""
+    by_task = []
+    for runs in still(study, model, 2).values():
+        repeats = [
+            run.hands[goal - 1] == run.hands[goal - 2]
+            for run in runs.runs
+            for goal in near_ties(run)
+        ]
+        if repeats:
+            by_task.append(np.array(repeats, dtype=np.float64)[:, None])
+    if not by_task:
+        return None
+    enough = sum(map(len, by_task)) >= FEWEST_TIES
+    return Values(by_task, lambda rows: float(rows.mean()) if enough else math.nan)
+
+
+def near_ties(run: Trajectory) -> Iterator[int]:
+    """Goals but the first that both hands reach in the same ticks from the posture before."""
+    befores = postures_before(run.execution, run.task)
+    for goal in range(2, len(run.task.goals) + 1):
+        ticks: dict[Hand, int] = isolated_reaches(run.task, befores[goal - 1], goal)
+        few, many = min(ticks.values(), default=0), max(ticks.values(), default=0)
+        if len(ticks) == 2 and many - few <= NEAR_TIE * few:
+            yield goal
+
+
+def waiting_hand(study: Study, model: Model) -> Values | None:
+    """Share of the way to its next goal that the waiting hand covers, mean over goals."""
+    of_tasks = [SIGNS["other arm"].of(runs) for runs in still(study, model, 2).values()]
+    return mean_of([np.array(values.mean()) for values in of_tasks if len(values)])
+
+
+def sufficient_horizon(study: Study, model: Model) -> Values | None:
+    """The fewest goals ahead with which the planner is within 1 % of all goals in view."""
+    if model != MODELS["all goals ahead"]:
+        return None
+    ticks: dict[str, dict[int, int]] = {}
+    for cell, parameters in cells_by_method(study).get(PLANNER, []):
+        if len(study.tasks[cell.task].goals) >= LONG:
+            horizon = min(parameters["horizon"], len(study.tasks[cell.task].goals) - 1)
+            ticks.setdefault(cell.task, {})[horizon] = -int(cell.rewards[0])
+    enough = [
+        min(
+            h
+            for h, of_horizon in by_horizon.items()
+            if of_horizon <= ENOUGH * by_horizon[max(by_horizon)]
+        )
+        for by_horizon in ticks.values()
+    ]
+    return mean_of([np.array(float(h)) for h in enough])
+
+
+MEASURES: dict[str, Measure] = {
+    "slope norm at distance 1": partial(slope_norm, distance=1),
+    "slope norm at distance 2": partial(slope_norm, distance=2),
+    "slope norm at distance -1": partial(slope_norm, distance=-1),
+    "slope norm of the base": partial(slope_norm, distance=1, joints=slice(0, BASE_DOF)),
+    "slope norm of the arm": partial(slope_norm, distance=1, joints=slice(BASE_DOF, None)),
+    "slope norm at distance 1 less that at distance 2": nearer_goal_more,
+    "rise of the slope norm at distance 2": horizon_rise,
+    "rise of the ratio of slope norms": ratio_rise,
+    "benefit correlation": benefit_correlation,
+    "sufficient horizon": sufficient_horizon,
+    "bow slope": bow_slope,
+    "turn saved at goals": turn_saved,
+    "stop ratio": stop_ratio,
+    "ticks saved by practice": partial(
+        changed_by_practice, measured=lambda run: float(run.ticks), sign=-1
+    ),
+    "rise of the path excess": partial(changed_by_practice, measured=path_excess, sign=1),
+    "first movement against isolated reach": first_movement,
+    "hand as in isolation, late less early": late_less_early,
+    "near-tie repeats": near_tie_repeats,
+    "preshaping of the other arm": waiting_hand,
+}
+"""Every measure by the name that ``human.toml`` calls it by."""
