@@ -14,7 +14,7 @@ from coartic.analysis.human.judge import (
     AGREES,
     DISAGREES,
     FINDINGS,
-    NOT_RUN,
+    NO_CASES,
     SILENT,
     UNDECIDED,
     bootstrapped,
@@ -36,7 +36,7 @@ ABOVE, BETWEEN, RATIO = (
         (ABOVE, [(0.04, 0.2)], 10, UNDECIDED),
         (ABOVE, [(-0.02, 0.04)], 10, DISAGREES),
         (ABOVE, [(0.06, 0.2)], 9, UNDECIDED),
-        (ABOVE, [(math.nan, math.nan)], 0, NOT_RUN),
+        (ABOVE, [(math.nan, math.nan)], 0, NO_CASES),
         (BETWEEN, [(1.2, 2.5)] * 2, 10, AGREES),
         (BETWEEN, [(1.2, 3.5)] * 2, 10, UNDECIDED),  # above 3, and not yet above 4
         (BETWEEN, [(4.2, 4.5)] * 2, 10, DISAGREES),

@@ -22,7 +22,7 @@ MARKS = {
 @figure(
     "human",
     "Which models agree with which findings about people",
-    "+ agrees, − disagrees, ? undecided, · silent: nothing follows for the model; empty: no runs. "
+    "+ agrees, − disagrees, ? undecided, · silent: nothing follows for the model; empty: no cases. "
     "In a circle: the verdict follows from how the model is built.",
 )
 def human(study: Study) -> Parts:

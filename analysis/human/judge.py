@@ -25,7 +25,7 @@ SUITE = "human"
 FEWEST_TASKS = 10
 RESAMPLES = 1_999
 AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
-NOT_RUN = "no runs"
+NO_CASES = "no cases"
 
 
 class Test(BaseModel):
@@ -144,7 +144,7 @@ def verdict_of(
 ) -> str:
     """Of a model on a finding, from the value of each test with its interval."""
     if not all(tasks):
-        return NOT_RUN
+        return NO_CASES
     agrees, disagrees = [], []
     for test, (_, low, high) in zip(finding.tests, ends, strict=True):
         sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
@@ -176,7 +176,7 @@ def separating(study: Study) -> dict[str, list[str]]:
         by_model = rows.set_index("model").verdict
         for kind, groups in kinds.items():
             first, second = (
-                set(by_model[group]) - {SILENT, NOT_RUN, UNDECIDED} for group in groups
+                set(by_model[group]) - {SILENT, NO_CASES, UNDECIDED} for group in groups
             )
             if (first, second) in (({AGREES}, {DISAGREES}), ({DISAGREES}, {AGREES})):
                 apart[kind].append(str(finding))

@@ -16,14 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
-from coartic import Hand, Trajectory
+from coartic import Trajectory
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import EC2, EC3, INITIAL, most_exploring
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import (
     isolated_agreement,
     isolated_reach,
-    isolated_reaches,
     postures_before,
 )
 from coartic.analysis.study import Study, cached
@@ -444,8 +443,9 @@ def near_ties(run: Trajectory) -> Iterator[int]:
     """Goals but the first that both hands reach in the same ticks from the posture before."""
     befores = postures_before(run.execution, run.task)
     for goal in range(2, len(run.task.goals) + 1):
-        ticks: dict[Hand, int] = isolated_reaches(run.task, befores[goal - 1], goal)
-        few, many = min(ticks.values(), default=0), max(ticks.values(), default=0)
+        reaches = [isolated_reach(run.task, befores[goal - 1], goal, h) for h in run.task.hands]
+        ticks = [reach[0] for reach in reaches if reach is not None]
+        few, many = min(ticks, default=0), max(ticks, default=0)
         if len(ticks) == 2 and many - few <= NEAR_TIE * few:
             yield goal
 
