@@ -12,7 +12,7 @@ READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations locus optimum)
 STORED := comparison ablations locus families horizon stops objectives
 
-.PHONY: benchmark test check format docs findings speed setup clean
+.PHONY: benchmark test check format docs findings speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -44,6 +44,10 @@ docs: $(VENV)/.docs
 
 speed: $(READY)
 	$(BIN)/python -m coartic.benchmarks.speed
+
+# The wheel and the source distribution of the last commit, each run in an empty environment.
+release-check: $(READY)
+	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
 
 # The suites behind docs/findings.md, their reports, and the pages made from them: two hours.
 findings: $(READY)
