@@ -11,9 +11,9 @@ FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations locus optimum)
-STORED := comparison ablations locus families horizon stops objectives
+STORED := comparison ablations locus families horizon stops objectives human
 
-.PHONY: benchmark test check format docs findings paper speed setup clean
+.PHONY: benchmark test check format docs findings paper speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -46,7 +46,12 @@ docs: $(VENV)/.docs
 speed: $(READY)
 	$(BIN)/python -m coartic.benchmarks.speed
 
-# The suites behind docs/findings.md, their reports, and the pages made from them: two hours.
+# The wheel and the source distribution of the last commit, each run in an empty environment.
+release-check: $(READY)
+	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
+
+# The suites behind docs/findings.md, their reports, and the pages made from them: two and a
+# half hours.
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \

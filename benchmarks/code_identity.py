@@ -1,7 +1,7 @@
 """The code that a result comes from, as a hash of syntax trees.
 
-Comments, docstrings and the place of a file do not count: a changed number makes a result stale,
-a better sentence does not.
+Comments, docstrings, ``__version__`` and the place of a file do not count: a changed number makes
+a result stale, a better sentence or a release does not.
 """
 
 from __future__ import annotations
@@ -47,17 +47,19 @@ def imported_files(path: Path, root: Path) -> Iterator[Path]:
 
 
 def essence(path: Path) -> str:
-    """What counts of a module: its syntax tree without docstrings."""
+    """What counts of a module: its syntax tree without docstrings and ``__version__``."""
     return syntax(path.read_bytes())[0]
 
 
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
-    """Syntax tree of a module without docstrings, as a text; its imports: level, module, names."""
+    """What counts of a module, as a text; its imports: level, module, names."""
     imports = []
     for node in ast.walk(tree := ast.parse(content)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             node.value.value = None
+        elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__version__":
+            node.value = ast.Constant(None)
         elif isinstance(node, ast.Import):
             imports.append((0, "", tuple(alias.name for alias in node.names)))
         elif isinstance(node, ast.ImportFrom):

@@ -1,5 +1,6 @@
 """Figures: what they show is what the runs say."""
 
+import re
 from importlib import import_module
 
 import numpy as np
@@ -18,7 +19,7 @@ from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support import made_up
-from tests.support.suites import KNOWN, run_and_write
+from tests.support.suites import KNOWN, ROOT, run_and_write
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +42,11 @@ def test_every_figure_of_the_papers_cells(figures):
         assert plot.alt
         assert plot.caption
         assert len(plot.data)
+
+
+def test_the_gallery_shows_every_figure():
+    shown = re.findall(r'FIGURES\["([^"]+)"\]', (ROOT / "docs" / "gallery.md").read_text("utf-8"))
+    assert sorted(shown) == sorted(FIGURES)
 
 
 def test_the_typical_run_is_nearest_the_median(study):

@@ -82,7 +82,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
 
 FILES = {
     "mine.py": f"from mine_helper import STEP\nimport mine_parts.more\n{TEXT}    files = ('w',)",
-    "mine_helper.py": "'Numbers.'\nSTEP = 1  # at least",
+    "mine_helper.py": "'Numbers.'\n__version__ = '1'\nSTEP = 1  # at least",
     "mine_parts/more.py": "def more(x):\n    return x + 1",
     "w": "weights",
 }
@@ -97,10 +97,11 @@ def code_of(folder, **changed):
 
 
 def test_what_counts_as_the_code_of_a_method(tmp_path, monkeypatch):
-    """Numbers in it and in what it imports and reads; no comment, no docstring."""
+    """Numbers in it and in what it imports and reads; no comment, docstring or version."""
     monkeypatch.setattr("sys.path", [*sys.path])  # which is added to
     first = code_of(tmp_path)
-    words = {"mine_helper.py": "'Other words.'\nSTEP = 1", "mine.py": "# x\n" + FILES["mine.py"]}
+    helper = "'Other words.'\n__version__ = '2'\nSTEP = 1"
+    words = {"mine_helper.py": helper, "mine.py": "# x\n" + FILES["mine.py"]}
     assert code_of(tmp_path, **words) == first
     changes = (
         {"mine_helper.py": "STEP = 2"},
