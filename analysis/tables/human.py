@@ -31,7 +31,7 @@ def in_words(tests: pd.DataFrame) -> str:
     """A model's verdict on a finding, with the effect of each test."""
     first = tests.iloc[0]
     verdict = f"{first.verdict}{' *' if first.built_in else ''}"
-    there = tests[tests.tasks > 0]
+    there = tests[tests.tasks > 0].drop_duplicates("measure")
     effects = [
         f"{number(value, 2)} {in_brackets(low, high, 2)}".strip()
         for value, low, high in zip(there.value, there.low, there.high, strict=True)
@@ -42,7 +42,8 @@ def in_words(tests: pd.DataFrame) -> str:
 @table("finding, model, measure, value[], tasks, verdict, built_in, because")
 def human_effects(study: Study) -> Rows:
     """What each model shows of each finding, with its interval over tasks; why it is silent."""
-    frame = judged(study).rename(columns={"low": "value_low", "high": "value_high"})
+    frame = judged(study).drop_duplicates(["finding", "model", "measure"])
+    frame = frame.rename(columns={"low": "value_low", "high": "value_high"})
     for row in frame.itertuples():
         finding, model = str(row.finding), str(row.model)
         values: Row = {column: getattr(row, column) for column in frame.columns}
