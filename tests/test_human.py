@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from coartic.analysis import tables
 from coartic.analysis.human import measures
@@ -61,6 +62,13 @@ def test_an_interval_covers_as_often_as_it_says():
         _, low, high = bootstrapped(Values(tasks, lambda rows: float(rows.mean())), 0.05)
         held += low <= 0 <= high
     assert 0.90 <= held / 200 <= 0.99
+
+
+def test_rank_correlation_is_kendalls():
+    pairs = np.random.default_rng(2).integers(6, size=(14, 2)).astype(float)
+    expected = stats.kendalltau(*pairs.T).statistic
+    assert measures.rank_correlation(pairs) == pytest.approx(expected)
+    assert measures.rank_correlation(np.column_stack([np.zeros(14), np.arange(14)])) == 0
 
 
 def moving(slopes, noise, rng, runs=4):

@@ -23,7 +23,7 @@ from coartic.robot import Array
 
 SUITE = "human"
 FEWEST_TASKS = 10
-RESAMPLES = 1_999
+RESAMPLES = 9_999
 AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
 NO_CASES = "no cases"
 
