@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from coartic.analysis import tables
-from coartic.analysis.human import measures
+from coartic.analysis.human import judge, measures
 from coartic.analysis.human.judge import (
     AGREES,
     DISAGREES,
@@ -53,15 +53,16 @@ def test_verdicts(finding, ends, tasks, verdict):
     assert verdict_of(finding, values, [tasks] * len(ends)) == verdict
 
 
-def test_an_interval_covers_as_often_as_it_says():
-    """Means of 15 tasks: about 95 of 100 intervals hold the truth, 0."""
+def test_an_interval_covers_as_often_as_it_says(monkeypatch):
+    """Means of 15 tasks: about 95 of 100 intervals hold the truth, 0; a few less with so few."""
+    monkeypatch.setattr(judge, "RESAMPLES", 499)
     rng = np.random.default_rng(5)
     held = 0
-    for _ in range(200):
+    for _ in range(300):
         tasks = [np.array([[value]]) for value in rng.standard_normal(15)]
         _, low, high = bootstrapped(Values(tasks, lambda rows: float(rows.mean())), 0.05)
         held += low <= 0 <= high
-    assert 0.90 <= held / 200 <= 0.99
+    assert 0.88 <= held / 300 <= 0.985
 
 
 def test_rank_correlation_is_kendalls():
@@ -91,7 +92,7 @@ def moving(slopes, noise, rng, runs=4):
 @pytest.mark.parametrize("slopes", [(0.0, 0.0, 0.0), (0.3, -0.4, 0.0)])
 def test_slopes_are_those_that_were_planted_however_much_runs_differ(slopes):
     rng = np.random.default_rng(3)
-    squares = [measures.squared_slopes(moving(slopes, 0.5, rng), 2, 1).sum() for _ in range(400)]
+    squares = [measures.squared_slopes(moving(slopes, 0.5, rng), 2, 1).sum() for _ in range(300)]
     error = np.std(squares) / math.sqrt(len(squares))
     assert np.mean(squares) == pytest.approx(np.dot(slopes, slopes), abs=3 * error)
     exact = measures.squared_slopes(moving(slopes, 0.0, rng, runs=1), 2, 1)
