@@ -222,25 +222,3 @@ def instance_gaps(study: Study) -> pd.DataFrame:
                 for name, (runs,) in zip(names, scores, strict=True)
             ]  # fmt: skip
     return pd.DataFrame(rows)
-
-
-@cached
-def instance_gains(study: Study) -> pd.DataFrame:
-    """What one condition gains over another on every instance, beside the mean of its family.
-
-    Pairs of the paper's conditions, as shares of the best known reward. Columns ``method`` (the
-    pair), ``family``, ``task``, ``gain``, ``mean[]``.
-    """
-    instances = sample(study)
-    rows: list[Row] = []
-    for first, second in CONTRASTS if instances else ():
-        assert instances is not None
-        names = instances.shared(first, second) if second != INITIAL else {}
-        for family, scores in gains(instances, first, second, names).items():
-            row: Row = {"method": f"{name_of(first)} over {name_of(second)}", "family": family}
-            row |= interval("mean", other_tasks({family: scores}))
-            rows += [
-                {**row, "task": name, "gain": value(runs)}
-                for name, runs in zip(names[family], scores, strict=True)
-            ]
-    return pd.DataFrame(rows)
