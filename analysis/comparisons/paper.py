@@ -29,8 +29,8 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     the whole cell), ``published`` and its ``published_sd``, ``published_runs`` (of hands 0 only
     where all others are printed), ``pooled`` (whether the printed mean is one over several hand
     sequences) and the ``margin`` of equivalence, ``ours``, ``ours_sd`` and ``runs`` of our runs
-    with a solution, ``of_runs`` of the cell. Where both are there, it has ``difference[]``, ours less
-    published, and a ``verdict`` if our runs have as many trials as the paper's.
+    with a solution, ``of_runs`` of the cell. Where both are there, it has ``difference[]``, ours
+    less published, and a ``verdict`` if our runs have as many trials as the paper's.
     """
     rows = []
     for cell in study.cells.values():
