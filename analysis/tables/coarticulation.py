@@ -14,7 +14,7 @@ from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 
 _MEANS = {
@@ -28,14 +28,7 @@ _MEANS = {
 """Columns of :func:`signatures` and the signatures whose means over goals they have."""
 
 
-@table(
-    "method, place, runs, distance, dependence, p_holm, equivalent, other, lead",
-    distance=Column("postures apart", 2),
-    dependence=Column("in SD of the runs", 1),
-    equivalent=Column("part that leaves the hand", 3),
-    other=Column("part that moves it", 3),
-    lead=Column("lead (ticks)"),
-)
+@table("method, place, runs, distance, dependence, p_holm, equivalent, other, lead")
 def contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors."""
     frame = signature_values(study)
@@ -69,15 +62,7 @@ def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
         yield name, row | {"p_holm": p}
 
 
-@table(
-    "method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving",
-    goal=Column(page=False),
-    moving=Column(page=False),
-    kind=Column("direction"),
-    norm=Column("slope of the whole posture", 2),
-    joint=Column("steepest joint"),
-    slope=Column("its slope", 2),
-)
+@table("method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving")
 def slopes(study: Study) -> Rows:
     """How the posture at a goal follows a neighbouring goal that moves."""
     frame = signature_values(study)
@@ -117,15 +102,7 @@ def slopes(study: Study) -> Rows:
     yield from corrected(rows)
 
 
-@table(
-    "task, method, runs, first, total, as_in_isolation, preshaping, turning, travel",
-    first=Column("first movement (ticks)", 1),
-    total=Column("whole task (ticks)", 1),
-    as_in_isolation=Column("hand as for the goal alone (share)", 2),
-    preshaping=Column("waiting hand nearer (share)", 2),
-    turning=Column("turning (rad)", 2),
-    travel=Column("waiting arm's travel (rad)", 2),
-)
+@table("task, method, runs, first, total, as_in_isolation, preshaping, turning, travel")
 def signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals."""
     frame = signature_values(study)

@@ -13,7 +13,7 @@ from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import RUNS, TRIALS, published_cell, published_initial
 from coartic.analysis.statistics.estimates import interval, mean
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 
 
@@ -27,12 +27,7 @@ def best_condition(study: Study, task: str) -> str | None:
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 
 
-@table(
-    "task, arms, base, initial, condition, learned[], published, optimum, bound",
-    initial=Column(digits=1),
-    learned=Column(digits=1),
-    bound=Column("proven bound"),
-)
+@table("task, arms, base, initial, condition, learned[], published, optimum, bound")
 def tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
@@ -61,12 +56,6 @@ def tasks(study: Study) -> Rows:
 @table(
     "task, condition, published±, ours±, runs, difference[], margin, verdict, published_initial, "
     "ours_initial",
-    published=Column("published ± SD", 1),
-    ours=Column("ours ± SD", 1),
-    difference=Column(digits=1),
-    margin=Column(digits=1),
-    published_initial=Column("published initial", 1, page=False),
-    ours_initial=Column("our initial", 1, page=False),
 )
 def published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
@@ -80,12 +69,7 @@ def published(study: Study) -> Rows:
             yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
 
 
-@table(
-    "task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]",
-    published_runs=Column("published runs"),
-    of_runs=Column("of"),
-    hands=Column("hands (runs)"),
-)
+@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
 def hands(study: Study) -> Rows:
     """Learned rewards by hand sequence, published and ours, where there are several."""
     for row in beside_paper(study):
@@ -104,14 +88,6 @@ def named(study: Study, cell: CellRuns) -> Row:
 
 @table(
     "statement, verdict, evidence, test, p_holm, opposite_p_holm, ensemble, place, quote, section",
-    statement=Column("claim"),
-    evidence=Column(page=False),
-    test=Column(page=False),
-    opposite_p_holm=Column("p of the opposite", p=True, page=False),
-    ensemble=Column("sets of goals in which it holds"),
-    place=Column("where"),
-    quote=Column(page=False),
-    section=Column(page=False),
 )
 def claims(study: Study) -> Rows:
     """Claims with their verdicts: the paper's, and others, which say so."""
