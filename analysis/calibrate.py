@@ -49,7 +49,6 @@ def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dic
     """What the procedures for rewards make of two samples from one population."""
     a, b = draw(rng, n), draw(rng, n)
     sd = float(b.std(ddof=1))
-    improvement = estimates.probability_of_improvement(a, b, resamples=RESAMPLES)
     return {
         "interval of a mean (BCa)": holds(estimates.mean(a, resamples=RESAMPLES), mean),
         "interval of a difference (BCa)": holds(
@@ -58,7 +57,6 @@ def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dic
         "interval of paired differences (BCa)": holds(
             estimates.mean(a - b, resamples=RESAMPLES), 0
         ),
-        "interval of P(better) (BCa, Newcombe)": holds(improvement, 0.5),
         "interval to a printed mean (Welch)": holds(difference(a, float(b.mean()), sd, n), 0),
         "interval of a mean (Student)": holds(estimates.student_mean(a), mean),
         "test of a mean (bootstrap)": bootstrap_test(a, mean, resamples=RESAMPLES).p <= LEVEL,

@@ -19,8 +19,7 @@ from coartic.text import did_you_mean, one_line
 
 PAPER = "shah2013"
 STATISTICS = (
-    *("efron1993", "davison1997", "agarwal2021", "newcombe2006", "holm1979"),
-    *("chung2013", "schuirmann1987", "cohen1988"),
+    *("efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"),
 )
 SPECIAL = {
     "\\": r"\textbackslash{}",

@@ -159,7 +159,7 @@ def test_animate(coartic, tmp_path):
     assert coartic(*SMALL, "--out", out)[0] == 0
     run_id = load(out).runs.run_id[0]
     film = tmp_path / "film.gif"
-    small = ("--speed", 900, "--width", 200)
+    small = ("--width", 200)
     assert coartic("animate", run_id, "--in", out, "--out", film, *small)[0] == 0
     assert film.read_bytes().startswith(b"GIF89a")
 
@@ -198,15 +198,3 @@ def test_a_mistake_gets_a_sentence(coartic, arguments, words, tmp_path, monkeypa
     assert words in out + error
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
-
-
-def test_completion(coartic, monkeypatch):
-    def completed(*words):
-        monkeypatch.setenv("_COARTIC_COMPLETE", "complete_bash")
-        monkeypatch.setenv("COMP_WORDS", " ".join(["coartic", *words]))
-        monkeypatch.setenv("COMP_CWORD", str(len(words)))
-        return coartic()[1].split()
-
-    offered = completed("run", "paper", "--out", "x", "--tasks", "ascending,d")
-    assert offered == ["ascending,descending"]
-    assert {"EC1", "EC4"} <= set(completed("run", "paper", "--out", "x", "--methods", "EC"))

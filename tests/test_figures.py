@@ -4,21 +4,17 @@ import re
 from importlib import import_module
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.cells import typical_run
 from coartic.analysis.figures import FIGURES, save
-from coartic.analysis.figures.style import looks, stars
+from coartic.analysis.figures.style import looks
 from coartic.analysis.figures.tasks import draw_tasks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
-from coartic.analysis.signatures.register import signatures
-from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
-from tests.support import made_up
 from tests.support.suites import KNOWN, ROOT, run_and_write
 
 
@@ -35,7 +31,7 @@ def figures(study):
 
 
 def test_every_figure_of_the_papers_cells(figures):
-    assert {"tasks", "recruitment", "context"} <= set(figures)
+    assert {"tasks", "recruitment", "postures"} <= set(figures)
     assert "published" not in figures  # printed means are of 10,000 trials, these runs of 120
     for name, plot in figures.items():
         assert plot.id == name
@@ -86,36 +82,6 @@ def test_shares_of_hand_sequences(study):
     assert data.groupby(["task", "method", "source"]).share.sum().to_numpy() == pytest.approx(1)
     paper = data[(data.source == "published") & (data.method == "dual-process/EC2")]
     assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
-
-
-def test_stars_of_contexts_are_adjusted_over_the_figure(study):
-    """Signatures planted for several methods, with p that Holm's correction moves."""
-    frame, labels = signatures(study), [f"own-{k}" for k in range(3)]
-    parts = frame[frame.signature.isin(["motor-equivalent part", "non-motor-equivalent part"])]
-    parts = parts[parts.value.notna()]
-    raw = {"motor-equivalent part": [0.0005, 0.02, 0.008],
-           "non-motor-equivalent part": [0.03, 0.6, 0.001]}  # fmt: skip
-    planted = pd.concat(
-        [
-            parts.assign(label=label, p=[raw[name][k] for name in parts.signature])
-            for k, label in enumerate(labels)
-        ],
-        ignore_index=True,
-    )
-    of = made_up.MadeUp(study)
-    of._computed[signatures.__wrapped__] = planted
-    plot = FIGURES["context"](of)
-    data = plot.data.set_index("method").loc[labels]
-    values = parts.set_index("signature").value
-    assert (data.equivalent == values["motor-equivalent part"]).all()
-    assert (data.other == values["non-motor-equivalent part"]).all()
-    adjusted = np.reshape(
-        holm([p for pair in zip(*raw.values(), strict=True) for p in pair]), (3, 2)
-    )
-    np.testing.assert_allclose(data[["holm_equivalent", "holm_other"]], adjusted)
-    shown = [text.get_text() for text in plot.figure.axes[0].texts if text.get_text()]
-    assert shown == list(map(stars, adjusted[:, 0]))
-    assert shown != [stars(p) for p in raw["motor-equivalent part"]]
 
 
 def test_published_differences(tmp_path):

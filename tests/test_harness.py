@@ -16,7 +16,7 @@ from coartic import (
     hand_sequences,
     load_task,
 )
-from coartic.analysis.comparisons.paper import paper_rows
+from coartic.analysis.comparisons.paper import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
@@ -197,7 +197,7 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
     study = run_and_write(tmp_path / "out", cells, runs=3, trials=30)
     assert study.runs.run_id.is_unique
     assert set(study.runs.groupby(["task", "variant"]).size()) == {3}
-    compared = {(row.cell.task, row.cell.label) for row in paper_rows(study)}
+    compared = {(row["cell"].task, row["cell"].label) for row in beside_paper(study)}
     assert ("ascending", "dual-process/EC1") in compared
     assert all(variant == "" or f"EC1 {variant}" not in str(compared) for _, variant in labels)
 
@@ -206,7 +206,7 @@ def test_verdicts_only_for_runs_as_long_as_the_papers(tmp_path):
     cells = paper_cells(tasks=["ascending"])
     long = run_and_write(tmp_path / "long", cells, runs=2, trials=10_000)
     short = run_and_write(tmp_path / "short", cells, runs=2, trials=10_000, trial_budget=40)
-    verdicts = [[row.verdict for row in paper_rows(study)] for study in (long, short)]
+    verdicts = [[row["verdict"] for row in beside_paper(study)] for study in (long, short)]
     assert None not in verdicts[0]
     assert verdicts[1] == [None]
 

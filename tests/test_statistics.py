@@ -107,9 +107,6 @@ def test_intervals_of_very_many_values_are_the_usual_ones():
     between = statistics.difference_of_means(a, b)
     expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval(0.95)
     assert (between.low, between.high) == pytest.approx((expected.low, expected.high), abs=0.015)
-    better = statistics.probability_of_improvement(a, b)
-    assert better.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / a.size / b.size)
-    assert better.low < better.estimate < better.high < better.low + 0.06
 
 
 def test_a_difference_to_a_known_number_is_of_one_sample():
@@ -127,9 +124,6 @@ def test_degenerate_samples():
     interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
     assert interval.low == interval.high == interval.estimate
     assert interval.note == "the interval is a point: no spread"
-    apart = statistics.probability_of_improvement([4.0, 5.0], [1.0] * 9)
-    assert apart.estimate == 1.0
-    assert math.isnan(apart.low)
 
 
 def test_tests_that_cannot_be_made():
@@ -145,26 +139,6 @@ def test_tests_that_cannot_be_made():
 def test_samples_are_vectors_of_finite_numbers(values):
     with pytest.raises(ValueError, match="a sample"):
         statistics.mean(values)
-
-
-@given(rewards, rewards)
-def test_probability_of_improvement_is_mann_whitneys(a, b):
-    better = statistics.probability_of_improvement(a, b, resamples=99)
-    assert better.estimate == pytest.approx(stats.mannwhitneyu(a, b).statistic / (len(a) * len(b)))
-
-
-def test_interval_of_samples_that_do_not_overlap():
-    """Newcombe's method 5 by Hanley & McNeil's variance, with one n for both samples."""
-    n, z = 20, stats.norm.ppf(0.975)
-    apart = statistics.probability_of_improvement(np.arange(n) + 100, np.arange(n))
-    assert apart.estimate == apart.high == 1.0
-    low = apart.low
-    q1, q2 = low / (2 - low), 2 * low**2 / (1 + low)
-    variance = (low * (1 - low) + (n - 1) * (q1 - low**2 + q2 - low**2)) / n**2
-    assert (1 - low) / math.sqrt(variance) == pytest.approx(z)
-    to_number = statistics.probability_of_improvement(np.arange(n), -1)
-    wilson = stats.binomtest(n, n).proportion_ci(method="wilson")
-    assert (to_number.low, to_number.high) == pytest.approx((wilson.low, wilson.high))
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=6))

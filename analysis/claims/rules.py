@@ -30,7 +30,6 @@ from coartic.analysis.statistics.estimates import (
     Inference,
     difference_of_means,
     mean,
-    probability_of_improvement,
 )
 from coartic.analysis.statistics.hypotheses import (
     Alternative,
@@ -308,9 +307,6 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
         seen += (
             f" against {in_words(second.what, b)} ({second}), a difference of {difference} ticks"
         )
-        if first.what in REWARDS:
-            better = estimate(probability_of_improvement(a, b), 2)
-            seen += f"; the first is better with probability {better}"
     printed = [as_printed(task, each) for each in (first, second)]
     return f"{seen}; published {printed[0]} and {printed[1]}" if None not in printed else seen
 

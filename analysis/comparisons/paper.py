@@ -2,47 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+import math
+from typing import Any
 
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import LEARNER
-from coartic.analysis.published import RUNS, TRIALS, PublishedCell, Summary, published_cell
-from coartic.analysis.statistics.equivalence import Equivalence, difference
+from coartic.analysis.published import RUNS, TRIALS, PublishedCell, published_cell
+from coartic.analysis.statistics.equivalence import MARGIN, difference
+from coartic.analysis.statistics.estimates import interval, standard_deviation
 from coartic.analysis.study import Study, cached
-from coartic.robot import Array
-
-
-@dataclass(frozen=True)
-class PaperRow:
-    """A cell of the paper, or its runs that learned one hand sequence, beside our runs."""
-
-    cell: CellRuns
-    hands: str
-    """Empty for the whole cell."""
-    published: Summary | None
-    published_runs: int | None
-    """Printed number; of hands 0 only where all others are printed."""
-    rewards: Array
-    """Learned, of our runs with a solution, shape ``(n,)``."""
-
-    @cached_property
-    def difference(self) -> Equivalence | None:
-        """Ours less published; None where either is missing."""
-        paper = self.published
-        if paper is None or not len(self.rewards):
-            return None
-        return difference(self.rewards, paper.mean, paper.sd, paper.runs)
-
-    @property
-    def comparable(self) -> bool:
-        """Whether all our runs have as many trials as the paper's."""
-        return bool((self.cell.good.trials == TRIALS).all())
-
-    @property
-    def verdict(self) -> str | None:
-        """Of :class:`Equivalence`, for runs that are comparable."""
-        return self.difference.verdict if self.difference and self.comparable else None
 
 
 def published_of(cell: CellRuns) -> PublishedCell | None:
@@ -53,34 +21,46 @@ def published_of(cell: CellRuns) -> PublishedCell | None:
 
 
 @cached
-def paper_rows(study: Study) -> list[PaperRow]:
-    """Every cell that the paper has too, in the order of the plan."""
-    rows = []
-    for cell in study.cells.values():
-        paper = published_of(cell)
-        if paper is not None:
-            runs = paper.summary and paper.summary.runs
-            rows.append(PaperRow(cell, "", paper.summary, runs, cell.rewards))
-    return rows
+def beside_paper(study: Study) -> list[dict[str, Any]]:
+    """Every cell that the paper has too, in the order of the plan, and its hand sequences.
 
-
-@cached
-def sequence_rows(study: Study) -> list[PaperRow]:
-    """The same by hand sequence, where the paper or our runs tell several apart.
-
-    Those that the paper prints come first, then ours by their number of runs.
+    Sequences follow their cell where the paper or our runs tell several apart: those that the paper
+    prints come first, then ours by their number of runs. A row has ``cell``, ``hands`` (empty for
+    the whole cell), ``published`` and its ``published_sd``, ``published_runs`` (of hands 0 only
+    where all others are printed), ``pooled`` (whether the printed mean is one over several hand
+    sequences) and the ``margin`` of equivalence, ``ours``, ``ours_sd`` and ``runs`` of our runs
+    with a solution, ``of_runs`` of the cell. Where both are there, it has ``difference[]``, ours
+    less published, and a ``verdict`` if our runs have as many trials as the paper's.
     """
     rows = []
     for cell in study.cells.values():
         paper, hands = published_of(cell), cell.good.hands
-        if paper is None or not (paper.sequences or hands.nunique() > 1):
+        if paper is None:
             continue
         printed = paper.sequences
         complete = sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS
-        for name in dict.fromkeys([*printed, *map(str, hands.value_counts().index)]):
-            rewards = cell.rewards[(hands == name).to_numpy(bool)]
-            summary, runs = None, 0 if complete else None
-            if name in printed:
-                summary, runs = printed[name], printed[name].printed_runs
-            rows.append(PaperRow(cell, name, summary, runs, rewards))
+        ours = map(str, hands.value_counts().index) if printed or hands.nunique() > 1 else ()
+        for name in dict.fromkeys(["", *printed, *ours]):
+            rewards = cell.rewards[(hands == name).to_numpy(bool)] if name else cell.rewards
+            summary = printed.get(name) if name else paper.summary
+            row: dict[str, Any] = {
+                "cell": cell,
+                "hands": name,
+                "published": summary.mean if summary else None,
+                "published_sd": summary.sd if summary else None,
+                "published_runs": summary.printed_runs if summary else 0 if complete else None,
+                "pooled": summary.derived if summary else False,
+                "margin": MARGIN * abs(summary.mean) if summary else None,
+                "ours": rewards.mean() if len(rewards) else math.nan,
+                "ours_sd": standard_deviation(rewards),
+                "runs": len(rewards),
+                "of_runs": len(cell.good),
+                "verdict": None,
+            }
+            if summary and len(rewards):
+                apart = difference(rewards, summary.mean, summary.sd, summary.runs)
+                row |= interval("difference", apart)
+                if (cell.good.trials == TRIALS).all():
+                    row["verdict"] = apart.verdict
+            rows.append(row)
     return rows

@@ -26,7 +26,7 @@ from coartic.files import check_output, write_output
 
 FORMATS = (".gif", ".mp4")
 LASTS_S = 10.0
-"""Seconds that the longest movement takes unless a speed is given."""
+"""Seconds that the longest movement takes."""
 HOLD_S = 2.0
 """Seconds that the last frame stands."""
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
@@ -39,14 +39,13 @@ Panel = tuple[str, Trajectory]
 """A title and a movement."""
 
 
-def timing(ticks: int, speed: float | None = None) -> tuple[int, float]:
+def timing(ticks: int) -> tuple[int, float]:
     """Ticks from one frame to the next, and seconds that a frame stands, in whole hundredths as
-    GIF has them, of a movement of ``ticks`` rows at ``speed`` (ticks per second).
+    GIF has them, of a movement of ``ticks`` rows.
 
-    Without a speed it lasts :data:`LASTS_S`, or less where that would be slower than a tick a
-    frame.
+    It lasts :data:`LASTS_S`, or less where that would be slower than a tick a frame.
     """
-    speed = speed or max(ticks / LASTS_S, RATE)
+    speed = max(ticks / LASTS_S, RATE)
     stride = max(1, math.ceil(speed / RATE - 1e-9))
     return stride, max(2, round(100 * stride / speed)) / 100
 
@@ -55,7 +54,6 @@ def animate(
     panels: Sequence[Panel],
     path: Path,
     *,
-    speed: float | None = None,
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
@@ -63,16 +61,15 @@ def animate(
 
     Returns the number of frames that differ, and the ticks that are shown in a second.
 
-    ``speed`` is in ticks per second, ``width`` of the picture in pixels. A movement that ends
-    before the others stands still. Without ``replace`` no file is written over. Raises
-    CoarticError for an ending that is not in :data:`FORMATS`, for MP4 without ffmpeg, and where
-    the file cannot be written.
+    ``width`` of the picture is in pixels. A movement that ends before the others stands still.
+    Without ``replace`` no file is written over. Raises CoarticError for an ending that is not in
+    :data:`FORMATS`, for MP4 without ffmpeg, and where the file cannot be written.
     """
     check_film(path, replace=replace)
     if not any(movement.ticks for _, movement in panels):
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     ticks = max(len(movement.configurations) for _, movement in panels)
-    stride, interval_s = timing(ticks, speed)
+    stride, interval_s = timing(ticks)
     rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
     held = max(1, round(HOLD_S / interval_s))
     figure, scenes = figure_of(panels, width)

@@ -12,7 +12,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
-from coartic.analysis.tables.families import instance_gains, instance_gaps
+from coartic.analysis.tables.families import instance_gaps
 
 _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 _MEANS = (
@@ -51,38 +51,6 @@ def gaps_by_family(study: Study) -> Parts:
     panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
     style.letters(panels)
     return drawing, data, f"Gaps of instances by method and family. {means_of(data)}.", ()
-
-
-@figure(
-    "exploration-by-family",
-    "More exploration against less, instance by instance",
-    "Dots: instances, mean reward of the first condition minus that of the second, as a share of "
-    "the best known reward. Right of the line more exploration is better. The axis is linear up to "
-    f"5 % and logarithmic beyond. {_MEANS}",
-)
-def exploration_by_family(study: Study) -> Parts:
-    """What one condition gains over another on each instance, by family."""
-    data = instance_gains(study)
-    if not len(data):
-        raise missing(study, "no two of the paper's conditions on an instance of a family")
-    families = list(dict.fromkeys(data.family))
-    pairs = list(dict.fromkeys(data.method))
-    shape = (1, len(pairs))
-    drawing, panels = style.figure_of(shape, (style.TWO, 2.0), sharey=True, sharex=True)
-    for axes, pair in zip(panels, pairs, strict=True):
-        axes.axvline(0, **style.INITIAL)
-        for place, family in enumerate(families):
-            rows = data[(data.method == pair) & (data.family == family)]
-            color = style.PALETTE[place % len(style.PALETTE)]
-            draw_instances(axes, -place, rows, "gain", color)
-        axes.set_xscale("symlog", linthresh=0.05, linscale=1.0)
-        axes.minorticks_off()
-        axes.set_xticks([-0.5, -0.1, 0, 0.1, 0.5], ["−50", "−10", "0", "10", "50"])
-        axes.set_title(pair)
-    style.name_rows(panels[0], [family.partition("/")[0] for family in families])
-    panels[len(panels) // 2].set_xlabel("gain (% of the best known reward)")
-    style.letters(panels)
-    return drawing, data, f"Gains of instances by family. {means_of(data)}.", ()
 
 
 def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: str) -> None:

@@ -40,7 +40,6 @@ RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
 CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Of all intervals, for captions."""
-STARS = "*** p < 0.001, ** p < 0.01, * p < 0.05, n.s. not significant"
 PAPER = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""
@@ -94,13 +93,6 @@ def look_of(label: str) -> Look:
     """Look of one method, the learner over all tasks like its two-armed condition."""
     alike = look_alike(label)
     return looks([alike])[alike]
-
-
-def stars(p: float) -> str:
-    """Significance as :data:`STARS` says; a dash where there is no test."""
-    if math.isnan(p):
-        return "–"
-    return "***" if p < 0.001 else "**" if p < 0.01 else "*" if p < 0.05 else "n.s."
 
 
 def heading(task: Task) -> str:

@@ -9,13 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
-from coartic.analysis.human.measures import (
-    MEASURES,
-    MODELS,
-    PLANNERS_AHEAD,
-    PLANNERS_BLIND,
-    Values,
-)
+from coartic.analysis.human.measures import GROUPS, MEASURES, MODELS, Values, mean_of
 from coartic.analysis.statistics.estimates import LEVEL, SEED
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import read_beside
@@ -72,13 +66,13 @@ class Finding(BaseModel):
 def read_findings() -> dict[str, Finding]:
     """The findings by id, with the models in the place of the names of their groups."""
     data = read_beside(__file__, "human")
-    groups: dict[str, list[str]] = data.pop("groups")
-    findings = TypeAdapter(dict[str, Finding]).validate_python(data)
+    rows = {name: row for name, row in data.items() if name not in ("models", "groups")}
+    findings = TypeAdapter(dict[str, Finding]).validate_python(rows)
     for name, finding in findings.items():
         for field in ("silent", "built_in"):
             by_name: dict[str, str] = getattr(finding, field)
             by_model = {
-                model: what for key, what in by_name.items() for model in groups.get(key, [key])
+                model: what for key, what in by_name.items() for model in GROUPS.get(key, [key])
             }
             if unknown := by_model.keys() - MODELS.keys():
                 raise ValueError(f"{name}: {field} has {sorted(unknown)}, no models of measures.py")
@@ -106,12 +100,11 @@ def judged(study: Study) -> pd.DataFrame:
         for model in MODELS:
             silent = finding.silent.get(model, "")
             values = [
-                None if silent else MEASURES[test.measure](study, MODELS[model])
+                mean_of([]) if silent else MEASURES[test.measure](study, MODELS[model])
                 for test in finding.tests
             ]
-            level = LEVEL / len(finding.tests)
-            ends = [(math.nan,) * 3 if of is None else bootstrapped(of, level) for of in values]
-            counts = [0 if of is None else len(of.by_task) for of in values]
+            ends = [bootstrapped(of, LEVEL / len(finding.tests)) for of in values]
+            counts = [len(of.by_task) for of in values]
             verdict = SILENT if silent else verdict_of(finding, ends, counts)
             built_in = finding.built_in.get(model) == verdict
             for test, end, count in zip(finding.tests, ends, counts, strict=True):
@@ -123,10 +116,13 @@ def judged(study: Study) -> pd.DataFrame:
 def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
     """A statistic of all tasks, and its interval over tasks drawn with replacement.
 
-    Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread.
+    Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without
+    tasks, and without an interval of one.
     """
-    estimate = values.statistic(np.concatenate(values.by_task))
     count = len(values.by_task)
+    if not count:
+        return math.nan, math.nan, math.nan
+    estimate = values.statistic(np.concatenate(values.by_task))
     if count < 2:
         return estimate, math.nan, math.nan
     rng = np.random.default_rng(SEED)
@@ -167,9 +163,10 @@ def separating(study: Study) -> dict[str, list[str]]:
     ``look_ahead``: planners with one goal in view from all with more.
     """
     verdicts = judged(study).drop_duplicates(["finding", "model"])
+    blind, ahead = GROUPS["planners with one goal in view"], GROUPS["planners with more"]
     kinds = {
-        "learner_from_planners": (["learner"], [*PLANNERS_BLIND, *PLANNERS_AHEAD]),
-        "look_ahead": (list(PLANNERS_BLIND), list(PLANNERS_AHEAD)),
+        "learner_from_planners": (["learner"], blind + ahead),
+        "look_ahead": (blind, ahead),
     }
     apart: dict[str, list[str]] = {kind: [] for kind in kinds}
     for finding, rows in verdicts.groupby("finding", sort=False):

@@ -1,7 +1,7 @@
 """What the findings of ``human.toml`` are put to: one function for each measure.
 
 A measure takes a study of suite ``human`` and a model, and returns its values on each task with the
-statistic that is made of them, or None where nothing follows for the model.
+statistic that is made of them. There are none where nothing follows for the model.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from coartic import Trajectory
 from coartic.analysis.cells import CellRuns
-from coartic.analysis.methods import EC2, EC3, INITIAL, most_exploring
+from coartic.analysis.methods import EC2, EC3, most_exploring
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import (
     isolated_agreement,
@@ -26,6 +26,7 @@ from coartic.analysis.signatures.subtasks import (
 )
 from coartic.analysis.study import Study, cached
 from coartic.analysis.trajectories import Trajectories, postures
+from coartic.analysis.words import read_beside
 from coartic.robot import BASE_DOF, Array
 
 STATIONS = 100
@@ -50,42 +51,15 @@ class Model(NamedTuple):
     """One model: a method with its parameters; no id for the learner that explores most."""
 
     method: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, Any] = {}
 
 
 PLANNER = "receding-horizon"
-_FREE = {"timing": "free"}
-MODELS = {
-    "learner": Model("", {"trials": PRACTISED}),
-    "learner EC2": Model(EC2, {}),
-    "learner EC3": Model(EC3, {}),
-    "CMA-ES": Model("cma-es/bandit", {}),
-    "corrective process": Model(INITIAL, {}),
-    "no goal ahead": Model(PLANNER, {"horizon": 0}),
-    "one goal ahead": Model(PLANNER, {"horizon": 1}),
-    "two goals ahead": Model(PLANNER, {"horizon": 2}),
-    "all goals ahead": Model(PLANNER, {"horizon": 7}),
-    "null-space control, this goal": Model("nullspace-qp/none", {}),
-    "null-space control, next goals": Model("nullspace-qp/next-goal", {}),
-    "posture-based, two goals": Model("posture-based/two-goals", {}),
-    "shortest path": Model("trajectory-optimisation/path-length", {}),
-    "least acceleration": Model("trajectory-optimisation/acceleration", {**_FREE, "stop": 0}),
-    "least jerk": Model("trajectory-optimisation/jerk", {**_FREE, "stop": 0}),
-}
+_FILE = read_beside(__file__, "human")
+MODELS = {name: Model(**row) for name, row in _FILE["models"].items()}
 """What is compared with people, by name."""
-PLANNERS_BLIND = ("no goal ahead", "null-space control, this goal")
-"""Planners that heed one goal at a time."""
-PLANNERS_AHEAD = (
-    "one goal ahead",
-    "two goals ahead",
-    "all goals ahead",
-    "null-space control, next goals",
-    "posture-based, two goals",
-    "shortest path",
-    "least acceleration",
-    "least jerk",
-)
-"""Planners that heed later goals."""
+GROUPS: dict[str, list[str]] = _FILE["groups"]
+"""Names of models that have something in common."""
 
 
 class Values(NamedTuple):
@@ -95,13 +69,13 @@ class Values(NamedTuple):
     statistic: Callable[[Array], float]
 
 
-Measure = Callable[[Study, Model], Values | None]
+Measure = Callable[[Study, Model], Values]
 
 
-def mean_of(by_task: list[Array]) -> Values | None:
-    """The mean over tasks of one value each; None without any."""
+def mean_of(by_task: list[Array]) -> Values:
+    """The mean over tasks of one value each, of those that there are."""
     there = [np.reshape(v, (1, -1)) for v in by_task if np.isfinite(v).all()]
-    return Values(there, lambda rows: float(rows.mean())) if there else None
+    return Values(there, lambda rows: float(rows.mean()))
 
 
 @cached
@@ -204,14 +178,12 @@ def slope_norms(
     return norms
 
 
-def slope_norm(
-    study: Study, model: Model, distance: int, joints: slice = slice(None)
-) -> Values | None:
+def slope_norm(study: Study, model: Model, distance: int, joints: slice = slice(None)) -> Values:
     """Mean slope norm over tasks."""
     return mean_of([*map(np.array, slope_norms(study, model, distance, joints).values())])
 
 
-def nearer_goal_more(study: Study, model: Model) -> Values | None:
+def nearer_goal_more(study: Study, model: Model) -> Values:
     """Slope norm at distance 1 less that at distance 2."""
     near, far = (slope_norms(study, model, distance) for distance in (1, 2))
     return mean_of([np.array(near[task] - far[task]) for task in near if task in far])
@@ -231,15 +203,13 @@ def practice(study: Study, model: Model) -> list[Array]:
     ]
 
 
-def horizon_rise(study: Study, model: Model) -> Values | None:
+def horizon_rise(study: Study, model: Model) -> Values:
     """Rise of the slope norm at distance 2 with practice."""
     by_task = practice(study, model)
-    return (
-        Values(by_task, lambda rows: float((rows[:, 1] - rows[:, 3]).mean())) if by_task else None
-    )
+    return Values(by_task, lambda rows: float((rows[:, 1] - rows[:, 3]).mean()))
 
 
-def ratio_rise(study: Study, model: Model) -> Values | None:
+def ratio_rise(study: Study, model: Model) -> Values:
     """Rise of the ratio of the mean slope norms at distance 2 and 1 with practice."""
     by_task = practice(study, model)
 
@@ -247,10 +217,10 @@ def ratio_rise(study: Study, model: Model) -> Values | None:
         near, far, near_before, far_before = rows.mean(axis=0)
         return float(far / near - far_before / near_before)
 
-    return Values(by_task, statistic) if by_task else None
+    return Values(by_task, statistic)
 
 
-def benefit_correlation(study: Study, model: Model) -> Values | None:
+def benefit_correlation(study: Study, model: Model) -> Values:
     """Kendall's τ of what preparing can save and of the slope norm at distance 1, over tasks.
 
     What can be saved: ticks with no goal ahead less the fewest of any run, where no goal moved.
@@ -263,7 +233,7 @@ def benefit_correlation(study: Study, model: Model) -> Values | None:
         for task, norm in norms.items()
         if task in alone
     ]
-    return Values(rows, rank_correlation) if rows else None
+    return Values(rows, rank_correlation)
 
 
 def rank_correlation(pairs: Array) -> float:
@@ -309,7 +279,7 @@ def bows(run: Trajectory) -> Iterator[tuple[float, float, float]]:
         yield float(side.mean()), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])
 
 
-def bow_slope(study: Study, model: Model) -> Values | None:
+def bow_slope(study: Study, model: Model) -> Values:
     """Slope of the bow on the next turn, given the last one, over the reaches of all tasks."""
     by_task = [
         np.array([row for run in runs.runs for row in bows(run)])
@@ -321,7 +291,7 @@ def bow_slope(study: Study, model: Model) -> Values | None:
         columns = np.column_stack([to_next, from_last, np.ones(len(bow))])
         return float(np.linalg.lstsq(columns, bow)[0][0])
 
-    return Values(by_task, statistic) if by_task else None
+    return Values(by_task, statistic)
 
 
 def turn_at_goals(run: Trajectory) -> float:
@@ -335,7 +305,7 @@ def turn_at_goals(run: Trajectory) -> float:
     return float(np.mean(angles))
 
 
-def turn_saved(study: Study, model: Model) -> Values | None:
+def turn_saved(study: Study, model: Model) -> Values:
     """Turn at goals under the corrective process alone less that of the model, on one arm."""
     alone = still(study, MODELS["corrective process"], 1)
     return mean_of([
@@ -345,10 +315,10 @@ def turn_saved(study: Study, model: Model) -> Values | None:
     ])  # fmt: skip
 
 
-def stop_ratio(study: Study, model: Model) -> Values | None:
+def stop_ratio(study: Study, model: Model) -> Values:
     """How far apart hand paths to goal 1 lie before two places of goal 2: stopping by passing."""
     if "stop" not in model.parameters:
-        return None
+        return mean_of([])
     apart = []
     for stop in (1, 0):
         apart.append({
@@ -357,8 +327,6 @@ def stop_ratio(study: Study, model: Model) -> Values | None:
             if (ends := [stations(hand_path(group[k].runs[0], 1)) for k in (0, -1)])
         })  # fmt: skip
     rows = [np.array([[apart[0][task], apart[1][task]]]) for task in apart[0] if task in apart[1]]
-    if not rows:
-        return None
     return Values(rows, lambda pairs: float(pairs[:, 0].mean() / pairs[:, 1].mean()))
 
 
@@ -371,10 +339,10 @@ def path_excess(run: Trajectory) -> float:
 
 def changed_by_practice(
     study: Study, model: Model, measured: Callable[[Trajectory], float], sign: int
-) -> Values | None:
+) -> Values:
     """What the learner changes from the corrective process alone, its first trial."""
     if model.method not in ("", EC2, EC3):
-        return None
+        return mean_of([])
     values = []
     for arms in (1, 2):
         alone = still(study, MODELS["corrective process"], arms)
@@ -388,7 +356,7 @@ def changed_by_practice(
 # Which hand, and what the other does
 
 
-def first_movement(study: Study, model: Model) -> Values | None:
+def first_movement(study: Study, model: Model) -> Values:
     """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
     values = []
     for runs in still(study, model, 2).values():
@@ -413,7 +381,7 @@ def needs_other_hands(study: Study) -> set[str]:
     return {task for task, run in best.items() if np.mean(isolated_agreement(run)[:-1]) < SERIAL}
 
 
-def late_less_early(study: Study, model: Model) -> Values | None:
+def late_less_early(study: Study, model: Model) -> Values:
     """Share of goals hit with the quicker hand for them: the last but one, less those before."""
     return mean_of([
         np.array(np.mean([agree[-2] - np.mean(agree[:-2]) for agree in agreements]))
@@ -423,7 +391,7 @@ def late_less_early(study: Study, model: Model) -> Values | None:
     ])  # fmt: skip
 
 
-def near_tie_repeats(study: Study, model: Model) -> Values | None:
+def near_tie_repeats(study: Study, model: Model) -> Values:
     """Share of near ties in which the hand stays the same."""
     by_task = []
     for runs in still(study, model, 2).values():
@@ -434,8 +402,6 @@ def near_tie_repeats(study: Study, model: Model) -> Values | None:
         ]
         if repeats:
             by_task.append(np.array(repeats, dtype=np.float64)[:, None])
-    if not by_task:
-        return None
     enough = sum(map(len, by_task)) >= FEWEST_TIES
     return Values(by_task, lambda rows: float(rows.mean()) if enough else math.nan)
 
@@ -451,16 +417,16 @@ def near_ties(run: Trajectory) -> Iterator[int]:
             yield goal
 
 
-def waiting_hand(study: Study, model: Model) -> Values | None:
+def waiting_hand(study: Study, model: Model) -> Values:
     """Share of the way to its next goal that the waiting hand covers, mean over goals."""
     of_tasks = [SIGNS["other arm"].of(runs) for runs in still(study, model, 2).values()]
     return mean_of([np.array(values.mean()) for values in of_tasks if len(values)])
 
 
-def sufficient_horizon(study: Study, model: Model) -> Values | None:
+def sufficient_horizon(study: Study, model: Model) -> Values:
     """The fewest goals ahead with which the planner is within 1 % of all goals in view."""
     if model != MODELS["all goals ahead"]:
-        return None
+        return mean_of([])
     ticks: dict[str, dict[int, int]] = {}
     for cell, parameters in cells_by_method(study).get(PLANNER, []):
         if len(study.tasks[cell.task].goals) >= LONG:

@@ -8,7 +8,6 @@ headline numbers as macros.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
@@ -69,12 +68,11 @@ def write_report(
     folder: Path,
     *,
     for_paper: bool = True,
-    begin: Callable[[], object] = lambda: None,
 ) -> list[str]:
     """Write a report into ``folder``, in the place of an earlier one; the paths of its files.
 
-    ``begin`` is called when everything is computed and nothing written. Raises CoarticError where
-    the folder holds the results themselves or anything that no report wrote.
+    Raises CoarticError where the folder holds the results themselves or anything that no report
+    wrote.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -83,7 +81,6 @@ def write_report(
         )
     check_folder(folder, ["report.html"])
     files = report_files(study, for_paper=for_paper)
-    begin()
     publish(folder, files)
     return list(files)
 

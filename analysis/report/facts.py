@@ -14,7 +14,7 @@ from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.claims.register import MARGINS
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
-from coartic.analysis.comparisons.paper import paper_rows
+from coartic.analysis.comparisons.paper import beside_paper
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import leaders
 from coartic.analysis.generality.sample import one_by_one, sample
@@ -101,9 +101,9 @@ def gain(study: Study) -> Facts | None:
 def paper(study: Study) -> Facts | None:
     """What became of the paper's rewards and claims; None without its tasks and families."""
     entries = [entry for entry in judged(study) if entry.claim.place]
-    if not entries or not (paper_rows(study) or any(entry.run_ids for entry in entries)):
+    if not entries or not (beside_paper(study) or any(entry.run_ids for entry in entries)):
         return None
-    rewards = Counter(row.verdict for row in paper_rows(study) if row.verdict is not None)
+    rewards = Counter(row["verdict"] for row in beside_paper(study) if not row["hands"])
     return {
         "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
         **verdicts_of(entries),

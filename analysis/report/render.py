@@ -41,8 +41,10 @@ _LATEX = str.maketrans(
 
 
 def column_of(name: str) -> Column:
-    """How a column is shown; those of tasks and families go by these."""
+    """How a column is shown; those of tasks, families and models go by these."""
     kind, _, what = name.partition(" ")
+    if kind == "of":
+        return Column(what)
     if kind in ("on", "in"):
         return Column(f"{what.partition('/')[0]} (%)", 1, percent=True)
     return COLUMNS.get(name, Column())

@@ -5,9 +5,7 @@ taken as known without error. Intervals are of the BCa bootstrap, and the edge c
 all in :func:`bootstrap_estimate`. Signatures have :func:`student` intervals, shares of runs
 Wilson's. Resampling has one seed, :data:`SEED`, which has nothing to do with the seeds of the runs.
 
-Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14;
-R. Agarwal et al. (2021), NeurIPS 34 (probability of improvement); R. G. Newcombe (2006),
-Statistics in Medicine 25.
+Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy import optimize, special, stats
+from scipy import special, stats
 
 from coartic.robot import Array
 
@@ -139,70 +137,6 @@ def difference_of_means(
         return np.asarray(a.mean(axis) - b.mean(axis))
 
     return bootstrap_estimate("difference of means", samples, difference, resamples)
-
-
-def probability_of_improvement(
-    first: ArrayLike, second: ArrayLike | float, *, resamples: int = RESAMPLES
-) -> Inference:
-    """P(a run of ``first`` is higher than one of ``second``), a tie counting half.
-
-    From 0 to 1; 0.5 where neither is higher (Agarwal et al. 2021; the Mann-Whitney
-    statistic over its maximum). Where every run of one sample is higher than every run of the
-    other, no resample differs and the bootstrap is silent: the interval then is Newcombe's
-    (2006, method 5), with the estimate as one of its ends.
-    """
-    name, samples = "probability of improvement", samples_of(first, second)
-    statistic: Callable[..., Any] = share_positive
-    if len(samples) == 2:  # its rank among the values of both tells as much of a value
-        _, ranks = np.unique(np.concatenate(samples), return_inverse=True)
-        samples, statistic = tuple(np.split(ranks, [len(samples[0])])), share_higher
-    estimate, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
-    if 0.0 < estimate < 1.0 or min(n) < FEWEST:
-        return bootstrap_estimate(name, samples, statistic, resamples)
-    far = farthest_improvement(n)
-    low, high = (far, 1.0) if estimate == 1.0 else (0.0, 1 - far)
-    method = f"{name}, score interval (Newcombe 2006, method 5)"
-    return Inference(estimate, n, method, low, high, note="the samples do not overlap")
-
-
-def share_positive(values: Array, axis: int = -1) -> Array:
-    """Share of values above 0, zeros counting half."""
-    return np.asarray((values > 0).mean(axis) + 0.5 * (values == 0).mean(axis))
-
-
-def share_higher(first: Array, second: Array, axis: int = -1) -> Array:
-    """Share of pairs over the last axes in which ``first`` is higher, ties counting half.
-
-    Whole numbers from 0, shapes ``(..., n)`` and ``(..., m)``: how often each occurs is counted.
-    """
-    shape, size = first.shape[:-1], 1 + max(first.max(), second.max())
-    rows = np.arange(math.prod(shape))[:, None] * size
-    a, b = (
-        np.bincount((values.reshape(len(rows), -1) + rows).ravel(), minlength=len(rows) * size)
-        .reshape(len(rows), size)
-        for values in (first, second)
-    )  # fmt: skip
-    pairs = first.shape[-1] * second.shape[-1]
-    above, tied = (a * (b.cumsum(axis=1) - b)).sum(axis=1), (a * b).sum(axis=1)
-    return np.asarray(above / pairs + 0.5 * (tied / pairs)).reshape(shape)
-
-
-def farthest_improvement(n: tuple[int, ...]) -> float:
-    """Low end of Newcombe's interval (method 5) where the probability of improvement is 1.
-
-    ``n``: runs of one sample or of two. A number taken as known counts as a sample so large that
-    it adds no variance: what remains is Wilson's interval of a proportion.
-    """
-    z2 = float(special.ndtri(TAILS[1])) ** 2
-
-    def excess(theta: float) -> float:
-        """Distance to the estimate 1, squared, less z² variances, over 1 − θ."""
-        if len(n) == 1:
-            return (1 - theta) - z2 * theta / n[0]
-        spread = (sum(n) / 2 - 1) * ((1 - theta) / (2 - theta) + theta / (1 + theta))
-        return (1 - theta) - z2 * theta * (1 + spread) / (n[0] * n[1])
-
-    return float(optimize.brentq(excess, 0.0, 1.0))
 
 
 def bootstrap_estimate(

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.generality.sample import one_by_one
@@ -14,8 +13,8 @@ from coartic.analysis.methods import in_order, is_search, main_methods
 from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.hypotheses import holm
-from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.study import Study
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 
 _MEANS = {
@@ -29,14 +28,7 @@ _MEANS = {
 """Columns of :func:`signatures` and the signatures whose means over goals they have."""
 
 
-@table(
-    "method, place, runs, distance, dependence, p_holm, equivalent, other, lead",
-    distance=Column("postures apart", 2),
-    dependence=Column("in SD of the runs", 1),
-    equivalent=Column("part that leaves the hand", 3),
-    other=Column("part that moves it", 3),
-    lead=Column("lead (ticks)"),
-)
+@table("method, place, runs, distance, dependence, p_holm, equivalent, other, lead")
 def contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors."""
     frame = signature_values(study)
@@ -70,15 +62,7 @@ def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
         yield name, row | {"p_holm": p}
 
 
-@table(
-    "method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving",
-    goal=Column(page=False),
-    moving=Column(page=False),
-    kind=Column("direction"),
-    norm=Column("slope of the whole posture", 2),
-    joint=Column("steepest joint"),
-    slope=Column("its slope", 2),
-)
+@table("method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving")
 def slopes(study: Study) -> Rows:
     """How the posture at a goal follows a neighbouring goal that moves."""
     frame = signature_values(study)
@@ -118,15 +102,7 @@ def slopes(study: Study) -> Rows:
     yield from corrected(rows)
 
 
-@table(
-    "task, method, runs, first, total, as_in_isolation, preshaping, turning, travel",
-    first=Column("first movement (ticks)", 1),
-    total=Column("whole task (ticks)", 1),
-    as_in_isolation=Column("hand as for the goal alone (share)", 2),
-    preshaping=Column("waiting hand nearer (share)", 2),
-    turning=Column("turning (rad)", 2),
-    travel=Column("waiting arm's travel (rad)", 2),
-)
+@table("task, method, runs, first, total, as_in_isolation, preshaping, turning, travel")
 def signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals."""
     frame = signature_values(study)
@@ -161,31 +137,3 @@ def all_signatures(study: Study) -> Rows:
         names = [task, *sorted(others - {task, ""})]
         cells = [study.cells[name, label] for name in names if (name, label) in study.cells]
         yield f"{task} {label}, {row['signature']} {row['where']}".strip(), row | runs_of(*cells)
-
-
-@cached
-def context_parts(study: Study) -> pd.DataFrame:
-    """What of the difference between two contexts leaves the hand in place, of main methods.
-
-    One row a place and method: ``task``, ``where``, ``method``, ``runs``, ``equivalent`` and
-    ``other`` (per root of the dimension of their spaces), their p-values ``p_equivalent`` and
-    ``p_other``, and these adjusted over the table (Holm), ``holm_equivalent`` and ``holm_other``.
-    """
-    frame = signature_values(study)
-    frame = frame[frame.value.notna()].assign(method=frame.label, runs=frame.n)
-    keys = ["task", "where", "method", "runs"]
-    equivalent, other = (
-        frame.loc[frame.signature == name, [*keys, "value", "p"]]
-        for name in ("motor-equivalent part", "non-motor-equivalent part")
-    )
-    both = equivalent.merge(other, on=keys, suffixes=("_equivalent", "_other"))
-    both = both.rename(columns={"value_equivalent": "equivalent", "value_other": "other"})
-    order = {label: place for place, label in enumerate(main_methods(both.method))}
-    both = both[both.method.isin(order)].sort_values(
-        ["task", "where", "method"],
-        key=lambda values: values.map(order) if values.name == "method" else values,
-        ignore_index=True,
-    )
-    p = both[["p_equivalent", "p_other"]].to_numpy(dtype=float)
-    adjusted = np.reshape(holm(p.ravel().tolist()) if len(p) else [], p.shape)
-    return both.assign(holm_equivalent=adjusted[:, 0], holm_other=adjusted[:, 1])

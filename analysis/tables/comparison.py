@@ -27,7 +27,7 @@ from coartic.analysis.methods import (
 from coartic.analysis.statistics.estimates import interval
 from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
@@ -43,11 +43,7 @@ _POINTS = 120  # trials of a learning curve
 _STEPS = 150  # of a price curve, at most
 
 
-@table(
-    "method, knows, gap[], on *, runs",
-    knows=Column("use of the reward"),
-    gap=Column("gap (%)", 1, percent=True),
-)
+@table("method, knows, gap[], on *, runs")
 def ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each, grouped by what methods know."""
     rows = standings(study)
@@ -72,10 +68,7 @@ def ranking(study: Study) -> Rows:
     yield from sorted(named, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
-@table(
-    "method, runs, gap[], on *, instances, gap_in_general[], trials, movement_ticks, solve_s",
-    gap_in_general=Column("gap on random tasks (%)", 1, percent=True),
-)
+@table("method, runs, gap[], on *, instances, gap_in_general[], trials, movement_ticks, solve_s")
 def variants(study: Study) -> Rows:
     """Every method with each of its settings: gap over single tasks and over random ones, and cost.
 
@@ -123,11 +116,6 @@ def labels_of(study: Study, method: str) -> dict[str, str]:
 @table(
     "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
     "seconds_to_half[]",
-    reached=Column("targets reached (%)", 0, percent=True),
-    trials_to_quarter=Column("trials to a quarter"),
-    trials_to_half=Column("trials to half"),
-    kinematics_to_half=Column("kinematics to half"),
-    seconds_to_half=Column("seconds to half"),
 )
 def price(study: Study) -> Rows:
     """What it costs to reach a quarter and half of the targets."""
@@ -159,13 +147,7 @@ def price_curves(study: Study) -> pd.DataFrame:
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-@table(
-    "task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]",
-    after_100=Column("after 100 trials", 1),
-    after_1000=Column("after 1000", 1),
-    after_10000=Column("after 10 000", 1),
-    half_gain=Column("trials to half of the gain [middle half of runs]"),
-)
+@table("task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]")
 def learning(study: Study) -> Rows:
     """Best reward after so many trials, and when half of a run's gain was there."""
     for (task, label), cell in study.cells.items():
@@ -246,15 +228,6 @@ def learning_curve(runs: Sequence[Array]) -> dict[str, Array]:
 @table(
     "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, told, "
     "corrections, jacobians, movement_ticks, other_arm",
-    solved=Column(page=False),
-    reward=Column("reward ± SD", 1),
-    forward_kinematics=Column("kinematics"),
-    solve_s=Column("seconds"),
-    told=Column(page=False),
-    corrections=Column(page=False),
-    jacobians=Column("Jacobians", page=False),
-    movement_ticks=Column("ticks of all trials", page=False),
-    other_arm=Column("other arm", page=False),
 )
 def methods(study: Study) -> Rows:
     """Every method on every task: reward, gap, hands and what a run spends."""

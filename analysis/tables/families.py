@@ -27,7 +27,7 @@ from coartic.analysis.statistics.estimates import LEVEL, interval
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.robot import Array
 
 Part = TypeVar("Part")
@@ -45,10 +45,7 @@ ALL = "all"
 """In the column of families: the mean over all of them, each counting alike."""
 
 
-@table(
-    "method, instances, gap[], to_bound[], in *",
-    to_bound=Column("gap to the proven bound (%)", 1, percent=True),
-)
+@table("method, instances, gap[], to_bound[], in *")
 def family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
     instances = sample(study)
@@ -139,16 +136,7 @@ def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
     )
 
 
-@table(
-    "contrast, family, instances, gain[], median, by_hands[], better, worse, told_apart",
-    contrast=Column("comparison"),
-    gain=Column("gain (%)", 1, percent=True),
-    median=Column("median (%)", 1, percent=True),
-    by_hands=Column("of it by hands (%)", 1, percent=True),
-    better=Column("better on"),
-    worse=Column("worse on"),
-    told_apart=Column("significant on"),
-)
+@table("contrast, family, instances, gain[], median, by_hands[], better, worse, told_apart")
 def exploration(study: Study) -> Rows:
     """More exploration against less, by family and over all of them."""
     instances = sample(study)
@@ -178,11 +166,7 @@ def exploration(study: Study) -> Rows:
             yield f"{contrast}, {family}", row
 
 
-@table(
-    "sign, method, family, instances, there, mean[]",
-    there=Column("seen on"),
-    mean=Column(digits=2),
-)
+@table("sign, method, family, instances, there, mean[]")
 def family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, by condition and family."""
     instances = sample(study)
@@ -221,26 +205,4 @@ def instance_gaps(study: Study) -> pd.DataFrame:
                  **mean, "instances": len(scores)}
                 for name, (runs,) in zip(names, scores, strict=True)
             ]  # fmt: skip
-    return pd.DataFrame(rows)
-
-
-@cached
-def instance_gains(study: Study) -> pd.DataFrame:
-    """What one condition gains over another on every instance, beside the mean of its family.
-
-    Pairs of the paper's conditions, as shares of the best known reward. Columns ``method`` (the
-    pair), ``family``, ``task``, ``gain``, ``mean[]``.
-    """
-    instances = sample(study)
-    rows: list[Row] = []
-    for first, second in CONTRASTS if instances else ():
-        assert instances is not None
-        names = instances.shared(first, second) if second != INITIAL else {}
-        for family, scores in gains(instances, first, second, names).items():
-            row: Row = {"method": f"{name_of(first)} over {name_of(second)}", "family": family}
-            row |= interval("mean", other_tasks({family: scores}))
-            rows += [
-                {**row, "task": name, "gain": value(runs)}
-                for name, runs in zip(names[family], scores, strict=True)
-            ]
     return pd.DataFrame(rows)

@@ -7,15 +7,11 @@ import pandas as pd
 from coartic.analysis.human.judge import FINDINGS, judged
 from coartic.analysis.human.measures import MODELS, run_ids
 from coartic.analysis.study import Study
-from coartic.analysis.tables.table import Column, Row, Rows, table
+from coartic.analysis.tables.table import Row, Rows, table
 from coartic.analysis.words import in_brackets, number
 
 
-@table(
-    "finding, of *",
-    finding=Column("people"),
-    **{f"of {name}": Column(name) for name in MODELS},
-)
+@table("finding, of *")
 def human(study: Study) -> Rows:
     """Whether each model agrees with each finding, by how much; a star: it is built so."""
     for name, rows in judged(study).groupby("finding", sort=False):

@@ -6,15 +6,10 @@ from coartic.analysis.studies import objectives as regrets
 from coartic.analysis.studies.objectives import TERMS, WHO, advantage, on_random_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import mean_of
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 
 
-@table(
-    "term, weight, who, tasks, regret[], helps[]",
-    weight=Column("weight (ticks)", 0),
-    regret=Column("regret (%)", 1),
-    helps=Column("less than without the plan (%)", 1),
-)
+@table("term, weight, who, tasks, regret[], helps[]")
 def objectives(study: Study) -> Rows:
     """Regret under the true reward by penalty, its weight and who, means over random tasks.
 
@@ -37,10 +32,7 @@ def objectives(study: Study) -> Rows:
             yield f"{term} {weight:g} {who}", row | runs_of(*rows.cell)
 
 
-@table(
-    "term, who, tasks, crossing[]",
-    crossing=Column("overtakes the planner of ticks at (ticks)", 0),
-)
+@table("term, who, tasks, crossing[]")
 def crossings(study: Study) -> Rows:
     """The weight from which trial and error regrets less than the planner that believes in ticks.
 

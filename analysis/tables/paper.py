@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import pandas as pd
 
+from coartic.analysis.cells import CellRuns
 from coartic.analysis.claims.ensemble import held_in_words
 from coartic.analysis.claims.judge import judged, test_in_words
-from coartic.analysis.comparisons.paper import PaperRow, paper_rows, published_of, sequence_rows
+from coartic.analysis.comparisons.paper import beside_paper, published_of
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, LEARNER
-from coartic.analysis.published import RUNS, Summary, published_cell, published_initial
-from coartic.analysis.statistics.equivalence import MARGIN
-from coartic.analysis.statistics.estimates import (
-    interval,
-    mean,
-    standard_deviation,
-)
+from coartic.analysis.published import RUNS, TRIALS, published_cell, published_initial
+from coartic.analysis.statistics.estimates import interval, mean
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 
 
@@ -34,12 +27,7 @@ def best_condition(study: Study, task: str) -> str | None:
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 
 
-@table(
-    "task, arms, base, initial, condition, learned[], published, optimum, bound",
-    initial=Column(digits=1),
-    learned=Column(digits=1),
-    bound=Column("proven bound"),
-)
+@table("task, arms, base, initial, condition, learned[], published, optimum, bound")
 def tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
@@ -68,81 +56,38 @@ def tasks(study: Study) -> Rows:
 @table(
     "task, condition, published±, ours±, runs, difference[], margin, verdict, published_initial, "
     "ours_initial",
-    published=Column("published ± SD", 1),
-    ours=Column("ours ± SD", 1),
-    difference=Column(digits=1),
-    margin=Column(digits=1),
-    published_initial=Column("published initial", 1, page=False),
-    ours_initial=Column("our initial", 1, page=False),
 )
 def published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
-    for row in paper_rows(study):
-        task, condition = row.cell.task, row.cell.label.removeprefix(LEARNER)
-        values: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
-            "condition": condition,
-            **printed_mean(row.published),
-            "published_initial": getattr(published_initial(task), "number", None),
-            **our_mean(row.rewards),
-            "ours_initial": row.cell.good.initial_reward.dropna().mean(),
-            "verdict": row.verdict,
-            **interval("difference", row.difference),
-            "margin": row.difference.margin if row.difference else None,
-            **runs_of(row.cell),
-        }
-        yield f"{task} {condition}", values
+    for row in beside_paper(study):
+        cell, name = row["cell"], named(study, row["cell"])
+        if not row["hands"]:
+            initial = {
+                "published_initial": getattr(published_initial(cell.task), "number", None),
+                "ours_initial": cell.good.initial_reward.dropna().mean(),
+            }
+            yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
 
 
-@table(
-    "task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]",
-    published_runs=Column("published runs"),
-    of_runs=Column("of"),
-    hands=Column("hands (runs)"),
-)
+@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
 def hands(study: Study) -> Rows:
     """Learned rewards by hand sequence, published and ours, where there are several."""
-    for row in sequence_rows(study):
-        task, condition = row.cell.task, row.cell.label.removeprefix(LEARNER)
-        good = row.cell.good
-        values: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
-            "condition": condition,
-            "hands": row.hands,
-            "published_runs": row.published_runs,
-            "of_runs": len(good),
-            **printed_mean(row.published),
-            **our_mean(row.rewards),
-            **interval("difference", row.difference),
-            "run_ids": " ".join(map(str, good.run_id[good.hands == row.hands])),
-        }
-        yield f"{task} {condition} {row.hands}", values
+    for row in beside_paper(study):
+        cell, name = row["cell"], named(study, row["cell"])
+        if row["hands"]:
+            ids = cell.good.run_id[cell.good.hands == row["hands"]]
+            behind = {"run_ids": " ".join(map(str, ids))}
+            yield f"{cell.task} {name['condition']} {row['hands']}", row | name | behind
 
 
-def printed_mean(summary: Summary | None) -> Row:
-    """Mean and SD that the paper prints."""
-    return {
-        "published": summary.mean if summary else None,
-        "published_sd": summary.sd if summary else None,
-    }
-
-
-def our_mean(rewards: Any) -> Row:
-    """Number, mean and SD of rewards (n,)."""
-    average = rewards.mean() if len(rewards) else math.nan
-    return {"ours": average, "ours_sd": standard_deviation(rewards), "runs": len(rewards)}
+def named(study: Study, cell: CellRuns) -> Row:
+    """The task of a cell by its title, and its condition."""
+    task = study.tasks[cell.task]
+    return {"task": marked(task.label, task), "condition": cell.label.removeprefix(LEARNER)}
 
 
 @table(
     "statement, verdict, evidence, test, p_holm, opposite_p_holm, ensemble, place, quote, section",
-    statement=Column("claim"),
-    evidence=Column(page=False),
-    test=Column(page=False),
-    opposite_p_holm=Column("p of the opposite", p=True, page=False),
-    ensemble=Column("sets of goals in which it holds"),
-    place=Column("where"),
-    quote=Column(page=False),
-    section=Column(page=False),
 )
 def claims(study: Study) -> Rows:
     """Claims with their verdicts: the paper's, and others, which say so."""
@@ -168,40 +113,19 @@ def claims(study: Study) -> Rows:
 def published_differences(study: Study) -> pd.DataFrame:
     """Our mean reward less the published one: of cells, then of their hand sequences.
 
-    Of the paper's conditions with the paper's number of trials. Columns ``task``, ``method``,
-    ``hands`` (empty for a cell), ``runs`` and ``of_runs``, ``published``, ``published_sd``,
-    ``published_runs``, ``pooled`` (whether the printed mean is one over several hand sequences),
-    ``margin``, ``difference[]``, ``verdict``.
+    Of the paper's conditions with the paper's number of trials: rows of
+    :func:`~coartic.analysis.comparisons.paper.beside_paper` with ``task`` and ``method``.
     """
-    shown: list[PaperRow] = []
-    parts = sequence_rows(study)
-    for row in sorted(paper_rows(study), key=lambda row: CONDITIONS.index(row.cell.label)):
-        if row.comparable and len(row.rewards):
-            paper = published_of(row.cell)
-            several = paper is not None and len(paper.sequences) > 1
-            shown += [row, *(part for part in parts if several and part.cell is row.cell)]
+    shown: list[Row] = []
+    for row in beside_paper(study):
+        cell, paper = row["cell"], published_of(row["cell"])
+        comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
+        several = paper is not None and len(paper.sequences) > 1
+        if comparable and row["published"] is not None and (several or not row["hands"]):
+            shown.append(row | {"task": cell.task, "method": cell.label})
     order = list(study.tasks)
-    return pd.DataFrame(
-        [
-            {
-                "task": row.cell.task,
-                "method": row.cell.label,
-                "hands": row.hands,
-                "of_runs": len(row.cell.good),
-                **our_mean(row.rewards),
-                **printed_mean(row.published),
-                "published_runs": row.published_runs,
-                "pooled": row.published.derived,
-                "margin": MARGIN * abs(row.published.mean),
-                **interval("difference", row.difference),
-                "verdict": row.difference.verdict
-                if row.difference and not math.isnan(row.difference.low)
-                else "",
-            }
-            for row in sorted(shown, key=lambda row: order.index(row.cell.task))
-            if row.published is not None
-        ]
-    )
+    shown.sort(key=lambda row: (order.index(row["task"]), CONDITIONS.index(row["method"])))
+    return pd.DataFrame(shown)
 
 
 @cached

@@ -22,7 +22,7 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import turning_angles
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables.table import Column, Row, Rows, runs_of, table
+from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.robot import Array
 from coartic.tasks.task import MOST_GOALS
 
@@ -92,13 +92,7 @@ def groups(study: Study) -> Iterator[tuple[str, str, pd.DataFrame]]:
             yield kind, planner, part
 
 
-@table(
-    "group, value, h, tasks, gap[], gain[], seconds",
-    group=Column("kind of tasks"),
-    value=Column("which"),
-    h=Column("goals ahead"),
-    seconds=Column("CPU seconds a task", 1),
-)
+@table("group, value, h, tasks, gap[], gain[], seconds")
 def horizon(study: Study) -> Rows:
     """Gap of the planner by goals ahead, and what the last of these goals gains, as shares."""
     for group, value, every in groups(study):
@@ -115,11 +109,7 @@ def horizon(study: Study) -> Rows:
             yield f"{group} {value} h={h}", row | runs_of(*cells)
 
 
-@table(
-    "method, arms, tasks, gap[], horizon[], lies",
-    horizon=Column("goals ahead of the planner with the same gap", 1),
-    lies=Column("as the planner with"),
-)
+@table("method, arms, tasks, gap[], horizon[], lies")
 def horizon_beside(study: Study) -> Rows:
     """Gaps of other methods, as shares, and the horizon at which the planner has the same.
 
@@ -166,11 +156,7 @@ def between(curve: Array, gap: float) -> str:
     return f"{worse} to {worse + 1}" if worse < len(curve) - 1 else f"{worse} or more"
 
 
-@table(
-    "sign, words, h, tasks, mean[], to_come[]",
-    words=Column(page=False),
-    to_come=Column("more with all goals", 2),
-)
+@table("sign, words, h, tasks, mean[], to_come[]")
 def horizon_signs(study: Study) -> Rows:
     """Signs of coarticulation of the planner by goals ahead, means over tasks."""
     gaps = gaps_by_horizon(study)
@@ -258,12 +244,6 @@ def turns(run: Trajectory) -> Array:
 
 @table(
     "group, method, timing, stop, goals_per_stop, tasks, nearer[], less[], first[], turn[], apart",
-    timing=Column("times"),
-    goals_per_stop=Column("goals a stop"),
-    nearer=Column("posture leaves the next goal nearer (ticks)", 1),
-    less=Column("less near than when passing (ticks)", 1),
-    turn=Column("turn of the path at goals (rad)", 2),
-    apart=Column("postures at goal 1 apart", 2),
 )
 def stops(study: Study) -> Rows:
     """What of coarticulation is left where a smooth plan stops at goals: means over tasks."""

@@ -10,6 +10,7 @@ import pandas as pd
 
 from coartic.analysis.cells import CellRuns
 from coartic.analysis.study import Study, cached
+from coartic.analysis.words import read_beside
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -19,39 +20,28 @@ TABLES: dict[str, Callable[[Study], pd.DataFrame]] = {}
 
 
 class Column(NamedTuple):
-    """How a column is called and shown."""
+    """How a column is called and shown; ``columns.toml`` says what the fields are."""
 
     header: str = ""
-    """What stands above it; its name where nothing is given."""
     digits: int | None = None
-    """Decimals; without them integers are whole and others have three figures."""
     percent: bool = False
-    """Whether it is a share that is shown in per cent."""
     p: bool = False
-    """Whether it is a p-value."""
     method: bool = False
-    """Whether it is a method's label, shown by its name with the id in small print."""
     page: bool = True
-    """Whether the page shows it; the CSV file always has it."""
 
 
-COLUMNS = {
-    "method": Column(method=True),
-    "p_holm": Column("p (corrected)", p=True),
-    "run_ids": Column("run ids", page=False),
-}
+COLUMNS = {name: Column(**row) for name, row in read_beside(__file__, "columns").items()}
 """How columns are called and shown; those that are not here go by their names."""
 
 
 def table(
-    columns: str, **words: Column
+    columns: str,
 ) -> Callable[[Callable[[Study], Rows]], Callable[[Study], pd.DataFrame]]:
     """A decorator: what yields named rows for a study becomes a table of the report.
 
     ``columns`` are those of the CSV file in their order: ``gap[]`` has an interval (``gap_low``
     and ``gap_high``), ``ours±`` a standard deviation (``ours_sd``), and ``on *`` stands for all
-    columns that begin so. ``words`` say how columns are shown that no other table has. Every
-    table ends with the ids of the runs behind each row.
+    columns that begin so. Every table ends with the ids of the runs behind each row.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
@@ -60,7 +50,6 @@ def table(
         def frame(study: Study) -> pd.DataFrame:
             return frame_of(rows(study), f"{columns}, run_ids")
 
-        COLUMNS.update(words)
         TABLES[rows.__name__.replace("_", "-")] = frame
         return frame
 

@@ -1,8 +1,7 @@
-"""Arguments and options that commands share, what completes them, and how they are read."""
+"""Arguments and options that commands share, and how they are read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -12,56 +11,14 @@ from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_SECONDS
 
-
-def _suites() -> Iterable[str]:
-    from coartic import benchmarks
-
-    folder = Path(benchmarks.__file__).parent / "suites"
-    return sorted(path.stem for path in folder.glob("*.toml"))
-
-
-def _tasks() -> Iterable[str]:
-    from coartic import builtin_tasks
-
-    return builtin_tasks()
-
-
-def _methods() -> Iterable[str]:
-    from coartic import CONDITIONS, VARIANTS
-    from coartic.benchmarks.registry import built_in
-
-    return [*CONDITIONS, *VARIANTS, *built_in()]
-
-
-def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Completes the last of some names that stand between commas."""
-
-    def complete(incomplete: str) -> list[str]:
-        done, comma, begun = incomplete.rpartition(",")
-        return [f"{done}{comma}{name}" for name in names() if name.startswith(begun)]
-
-    return complete
-
-
-def _names_everywhere() -> Iterable[str]:
-    return [*_tasks(), *_suites(), *_methods()]
-
-
 SuiteName = Annotated[
     str,
     typer.Argument(
-        metavar="SUITE",
-        help="Suite to run (`coartic list` names them), or a TOML file.",
-        autocompletion=_completing(_suites),
+        metavar="SUITE", help="Suite to run (`coartic list` names them), or a TOML file."
     ),
 ]
 Something = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="NAME",
-        help="Task, suite, method or family.",
-        autocompletion=_completing(_names_everywhere),
-    ),
+    str | None, typer.Argument(metavar="NAME", help="Task, suite, method or family.")
 ]
 Results = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
@@ -92,21 +49,11 @@ Runs = Annotated[
 ]
 Trials = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
 Jobs = Annotated[int, typer.Option(min=-1, metavar="N", help="Processes; -1 is one for each core.")]
-Tasks = Annotated[
-    str | None,
-    typer.Option(metavar="A,B", help="Only these tasks.", autocompletion=_completing(_tasks)),
-]
-Methods = Annotated[
-    str | None,
-    typer.Option(metavar="X,Y", help="Only these methods.", autocompletion=_completing(_methods)),
-]
+Tasks = Annotated[str | None, typer.Option(metavar="A,B", help="Only these tasks.")]
+Methods = Annotated[str | None, typer.Option(metavar="X,Y", help="Only these methods.")]
 Subject = Annotated[
     str,
-    typer.Argument(
-        metavar="NAME",
-        help="A method, EC4 or 'optimum/*', or a task file (.toml).",
-        autocompletion=_completing(_methods),
-    ),
+    typer.Argument(metavar="NAME", help="A method, EC4 or 'optimum/*', or a task file (.toml)."),
 ]
 TaskFiles = Annotated[
     list[Path] | None,

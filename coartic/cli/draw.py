@@ -59,10 +59,6 @@ def animate(
     initial: Annotated[
         bool, typer.Option("--initial", help="Show the initial solution beside it.")
     ] = False,
-    speed: Annotated[
-        float | None,
-        typer.Option(metavar="N", help="Ticks per second."),
-    ] = None,
     width: Annotated[
         int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
     ] = 800,
@@ -75,8 +71,6 @@ def animate(
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
     check_film(out, replace=replace)
-    if speed is not None and not speed > 0:
-        raise CoarticError(f"--speed {speed:g}: give a number of ticks per second above 0.")
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []
@@ -91,7 +85,7 @@ def animate(
         movements = corrective_trial(task, hands, model=stored.model).movements
         initial_solution = trajectory(task, movements, model=stored.model)
         panels.insert(0, (f"{task.label}: initial solution", initial_solution))
-    frames, ticks_a_second = animate(panels, out, speed=speed, width=width, replace=replace)
+    frames, ticks_a_second = animate(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
 
