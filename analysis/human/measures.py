@@ -17,7 +17,6 @@ import numpy as np
 from scipy import stats
 
 from coartic import Trajectory
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import EC2, EC3, most_exploring
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import (
@@ -25,7 +24,7 @@ from coartic.analysis.signatures.subtasks import (
     isolated_reach,
     postures_before,
 )
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.analysis.words import read_beside
 from coartic.robot import BASE_DOF, Array
