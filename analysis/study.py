@@ -12,10 +12,10 @@ from functools import cached_property, lru_cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import pandas as pd
 
 from coartic import MotionModel, NotApplicableError, Task, hand_sequences, parse_task, trajectory
-from coartic.analysis.cells import CellKey, CellRuns
 from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
@@ -23,9 +23,44 @@ from coartic.files import folder_named
 from coartic.learner.rows import movements_from
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
-from coartic.runs.plan import Plan
+from coartic.runs.plan import Plan, label_of
 from coartic.runs.store import FILE, open_store
 from coartic.text import counted
+
+CellKey = tuple[str, str]
+"""Name of a task, and label of a method: its name with its variant."""
+
+
+@dataclass(frozen=True)
+class CellRuns:
+    """One method with parameters on one task, and its runs."""
+
+    task: str
+    method: str
+    variant: str
+    runs: pd.DataFrame
+
+    @property
+    def label(self) -> str:
+        """The method with its variant."""
+        return label_of(self.method, self.variant)
+
+    @cached_property
+    def good(self) -> pd.DataFrame:
+        """The runs that have a solution."""
+        solved = self.runs["status"] == "ok"
+        return self.runs if solved.all() else self.runs[solved]
+
+    @cached_property
+    def rewards(self) -> Array:
+        """Of those runs, shape ``(n,)``."""
+        return self.good.reward.to_numpy(dtype=np.float64)
+
+
+def typical_run(cell: CellRuns) -> int:
+    """Index among the solved runs of the one whose reward is nearest to their median."""
+    return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())
+
 
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 300

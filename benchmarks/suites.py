@@ -43,8 +43,8 @@ from coartic.inputs import (
 from coartic.learner.learning import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import label_of, variant_of
+from coartic.tasks.catalogue import members, task_of
 from coartic.tasks.families import named_by
-from coartic.tasks.members import members, task_of
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, Penalty, address_of
 from coartic.text import Line, unknown
 
@@ -108,7 +108,7 @@ class Block(FileData):
     def tasks_among(self, user_tasks: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
-        ``TASK-*`` are the members of a task (:mod:`coartic.tasks.members`),
+        ``TASK-*`` are the members of a task (:mod:`coartic.tasks.catalogue`),
         ``FAMILY/v1/i000..i039`` instances of a family (:mod:`coartic.tasks.families`).
         """
         every = [*builtin_tasks(), *user_tasks]

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.cells import typical_run
 from coartic.analysis.figures import FIGURES, save
 from coartic.analysis.figures.style import looks
 from coartic.analysis.figures.tasks import draw_tasks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
+from coartic.analysis.study import typical_run
 from coartic.analysis.tables.paper import hand_shares, published_differences
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write

@@ -8,8 +8,7 @@ from coartic import load_task
 from coartic.analysis import tables
 from coartic.analysis.claims import judge
 from coartic.analysis.claims.register import CLAIMS
-from coartic.analysis.generality.presence import signs
-from coartic.analysis.generality.sample import one_by_one, sample
+from coartic.analysis.generality.sample import one_by_one, sample, signs
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
 from coartic.analysis.optima import KnownOptimum
 from coartic.tasks.families import names_in

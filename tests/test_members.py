@@ -18,7 +18,7 @@ from coartic.analysis.reconstruction.scoring import printed_tests
 from coartic.analysis.reconstruction.search import search_for
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.plan import DeclaredMethod
-from coartic.tasks.members import MEMBERS_FOLDER, members, task_of, with_members
+from coartic.tasks.catalogue import MEMBERS_FOLDER, members, task_of, with_members
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN
 

@@ -15,9 +15,11 @@ from coartic.baselines.cascade import (
     CascadeError,
 )
 from coartic.baselines.modelled_cascade import ModelledCascade
-from coartic.baselines.nullspace_control import FACES, Aim, Controller
 from coartic.baselines.nullspace_qp import (
+    FACES,
     METHODS,
+    Aim,
+    Controller,
     NextGoal,
     NullspaceQP,
     Preshaping,

@@ -10,8 +10,8 @@ import pytest
 from coartic import execute, load_task
 from coartic.analysis import tables
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.objectives import less_regret
 from coartic.analysis.claims.register import CLAIMS, Claim
+from coartic.analysis.claims.studies import less_regret
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report import build, facts
 from coartic.analysis.report.text import sentence

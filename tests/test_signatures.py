@@ -18,14 +18,12 @@ from coartic.analysis.signatures.context import (
 )
 from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
-from coartic.analysis.signatures.other_arm import (
-    preshaping,
-    travel,
-)
 from coartic.analysis.signatures.register import REGISTER, signatures
 from coartic.analysis.signatures.subtasks import (
     isolated_agreement,
     isolated_reach,
+    preshaping,
+    travel,
     turning_angles,
 )
 from coartic.analysis.trajectories import best_sequences, change_from

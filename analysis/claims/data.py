@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic import Execution, Task
 from coartic.analysis.claims.register import Side, is_method
-from coartic.analysis.generality.presence import signs
+from coartic.analysis.generality.sample import signs
 from coartic.analysis.methods import LEARNER, most_exploring
 from coartic.analysis.published import TRIALS
 from coartic.analysis.signatures.signs import SIGNS

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from coartic.analysis.claims import objectives, rules, single, studies
+from coartic.analysis.claims import rules, single, studies
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import mostly_refuted
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
@@ -39,7 +39,7 @@ RULES: dict[str, Callable[[Data, Claim], Finding]] = {
         *(studies.first_goal_ahead_gains_most, studies.further_goals_gain_little),
         *(studies.most_of_the_loss_is_posture, studies.dear_joints_keep_the_horizon),
         *(studies.learner_behind_one_goal_ahead, studies.postures_serve_after_a_stop),
-        *(studies.stop_at_equal_times, objectives.less_regret),
+        *(studies.stop_at_equal_times, studies.less_regret),
     )
 }
 """The rules by their names in ``claims.toml``."""

@@ -1,4 +1,4 @@
-"""Rules of our own studies: how far ahead a planner looks, and stops at goals.
+"""Rules of our own studies: how far ahead a planner looks, stops at goals, and wrong objectives.
 
 Tests are over random tasks, each of which counts alike. Where a run that is compared is missing
 on a task, or failed, that task is left out.
@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import MARGINS, Claim, Finding
 from coartic.analysis.generality.sample import sample
@@ -23,7 +22,8 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST, Inference, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import gap_share
-from coartic.analysis.study import Study, cached
+from coartic.analysis.studies.objectives import TERMS, advantage
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import estimate
 from coartic.motion.costs import joint_costs, segment_lengths
 
@@ -219,3 +219,25 @@ def stop_at_equal_times(data: Data, _: Claim) -> Finding:
             "a full stop, at equal times:": (passing - stopping, 0.0, 1),
         }
     )
+
+
+def less_regret(data: Data, claim: Claim) -> Finding:
+    """one-tailed bootstrap tests over random tasks that the first regrets less than the second by \
+more than {regret:g} % of the best known reward"""
+    tests, parts = [], []
+    for where, pair in claim.cells.items():
+        terms, _, weight = where.partition(" ")
+        first, second = pair
+        for term in TERMS if terms == "every" else (terms,):
+            table = advantage(data.study, first, second, term)
+            if len(table) < FEWEST or float(weight) not in table.columns:
+                raise MissingError(f"this folder has too few tasks with {term} {weight}")
+            values = np.array(table[float(weight)], dtype=np.float64)
+            test = bootstrap_test(values, MARGINS["regret"], resamples=RESAMPLES_OF_STUDIES)
+            tests.append(test)
+            parts.append(
+                f"{term} {weight}: {first} {estimate(mean(values), 1)} % less regret than "
+                f"{second} on {len(values)} random tasks"
+            )
+    data.run_ids.extend(data.study.runs.run_id)
+    return Finding(all(test.estimate > 0 for test in tests), f"{'; '.join(parts)}.", tuple(tests))

@@ -11,7 +11,6 @@ from typing import Any
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.equivalence import MARGIN, equivalence
 from coartic.analysis.statistics.estimates import (
     FEWEST,
@@ -20,7 +19,7 @@ from coartic.analysis.statistics.estimates import (
     paired_by_seed,
 )
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
-from coartic.analysis.study import Study, load
+from coartic.analysis.study import CellRuns, Study, load
 from coartic.robot import Array
 
 _WORDS = {"title", "description", "provenance"}

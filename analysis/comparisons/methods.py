@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import EC1, TOGETHER
 from coartic.analysis.optima import locks_base
 from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.statistics.instances import gap_share
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.robot import Array

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import RUNS, TRIALS, PublishedCell, published_cell
 from coartic.analysis.statistics.equivalence import MARGIN, difference
 from coartic.analysis.statistics.estimates import interval, standard_deviation
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 
 
 def published_of(cell: CellRuns) -> PublishedCell | None:

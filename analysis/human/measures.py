@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic import Trajectory
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.methods import EC2, EC3, most_exploring
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import (
@@ -24,7 +23,7 @@ from coartic.analysis.signatures.subtasks import (
     isolated_reach,
     postures_before,
 )
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.analysis.words import read_beside
 from coartic.robot import BASE_DOF, Array

@@ -23,7 +23,7 @@ from coartic.analysis.processes import processes
 from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
 from coartic.runs.plan import variant_of
-from coartic.tasks.members import task_of, with_members
+from coartic.tasks.catalogue import task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coartic.analysis.signatures.other_arm import preshaping
-from coartic.analysis.signatures.subtasks import isolated_agreement, served
+from coartic.analysis.signatures.subtasks import isolated_agreement, preshaping, served
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
@@ -40,7 +39,7 @@ def mean_served(cell: Trajectories) -> Array:
 
 
 def waiting_hand_nearer(cell: Trajectories) -> Array:
-    """Preshaping of the waiting arm (:func:`~.other_arm.preshaping`), mean over goals."""
+    """Preshaping of the waiting arm (:func:`~.subtasks.preshaping`), mean over goals."""
     initial = cell.initial
     if len(cell.task.hands) < 2 or initial is None:
         return np.empty(0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.signatures.other_arm import preshaping, travel
 from coartic.analysis.signatures.rows import (
     REGISTER,
     WITHIN,
@@ -15,7 +14,12 @@ from coartic.analysis.signatures.rows import (
     row,
     without,
 )
-from coartic.analysis.signatures.subtasks import isolated_agreement, turning_angles
+from coartic.analysis.signatures.subtasks import (
+    isolated_agreement,
+    preshaping,
+    travel,
+    turning_angles,
+)
 from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array

@@ -14,9 +14,8 @@ import numpy as np
 import pandas as pd
 
 from coartic import Movement, Task, execute
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.learner.rows import movements_from
 from coartic.robot import Array
 from coartic.tasks.task import address_of

@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.comparisons.methods import method_rows
-from coartic.analysis.comparisons.progress import best_so_far
+from coartic.analysis.comparisons.reached import best_so_far, targets
 from coartic.analysis.comparisons.reached import price as price_by_method
-from coartic.analysis.comparisons.reached import targets
 from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps, standings
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import (

@@ -10,8 +10,7 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.generality.presence import THERE, scores_of
-from coartic.analysis.generality.sample import Sample, sample
+from coartic.analysis.generality.sample import THERE, Sample, sample, scores_of
 from coartic.analysis.methods import (
     CONDITIONS,
     EC1,

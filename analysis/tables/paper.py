@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pandas as pd
 
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.claims.ensemble import held_in_words
 from coartic.analysis.claims.judge import judged, test_in_words
 from coartic.analysis.comparisons.paper import beside_paper, published_of
@@ -12,7 +11,7 @@ from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.published import RUNS, TRIALS, published_cell, published_initial
 from coartic.analysis.statistics.estimates import interval, mean
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 

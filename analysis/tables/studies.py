@@ -1,4 +1,5 @@
-"""Tables of our own studies: how far ahead a planner looks, and stops at goals."""
+"""Tables of our own studies: how far ahead a planner looks, stops at goals, wrong objectives, and
+models beside people."""
 
 from __future__ import annotations
 
@@ -9,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from coartic import Task, Trajectory
-from coartic.analysis.cells import CellRuns
 from coartic.analysis.claims.studies import (
     ALL_GOALS,
     HORIZONS,
@@ -18,11 +18,16 @@ from coartic.analysis.claims.studies import (
     solved_cells,
 )
 from coartic.analysis.generality.sample import sample
+from coartic.analysis.human.judge import FINDINGS, judged
+from coartic.analysis.human.measures import MODELS, run_ids
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import turning_angles
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
-from coartic.analysis.study import Study, cached
+from coartic.analysis.studies import objectives as regrets
+from coartic.analysis.studies.objectives import TERMS, WHO, advantage, on_random_tasks
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
+from coartic.analysis.words import in_brackets, number
 from coartic.robot import Array
 from coartic.tasks.task import MOST_GOALS
 
@@ -270,3 +275,76 @@ def mean_of(name: str, values: pd.Series) -> Row:
     """The mean over tasks that have a value, with its interval, as columns of a table."""
     there = values.dropna().to_numpy(dtype=np.float64)
     return interval(name, mean(there)) if len(there) else {}
+
+
+@table("term, weight, who, tasks, regret[], helps[]")
+def objectives(study: Study) -> Rows:
+    """Regret under the true reward by penalty, its weight and who, means over random tasks.
+
+    In per cent of the best known reward. ``helps``: by how much less the learner from the plan of
+    ticks regrets than the learner from the corrective process.
+    """
+    frame = on_random_tasks(study)
+    if not (frame.weight > 0).any():
+        return
+    for term in TERMS:
+        helped = advantage(study, "from plan", "learner", term)
+        for (weight, who), rows in sorted(
+            frame[frame.term == term].groupby(["weight", "who"]),
+            key=lambda part: (part[0][0], WHO.index(part[0][1])),
+        ):
+            row: Row = {"term": term, "weight": weight, "who": who, "tasks": len(rows)}
+            row |= mean_of("regret", rows.regret)
+            if who == "from plan" and weight in helped.columns:
+                row |= mean_of("helps", helped[weight])
+            yield f"{term} {weight:g} {who}", row | runs_of(*rows.cell)
+
+
+@table("term, who, tasks, crossing[]")
+def crossings(study: Study) -> Rows:
+    """The weight from which trial and error regrets less than the planner that believes in ticks.
+
+    Infinite: beyond the largest weight, if at all.
+    """
+    frame = on_random_tasks(study)
+    for at in regrets.crossings(study).to_dict("records"):
+        row: Row = {str(name): value for name, value in at.items()}
+        of_both = frame[(frame.term == row["term"]) & frame.who.isin([row["who"], "ticks"])]
+        cells = {id(cell): cell for cell in of_both.cell}
+        yield f"{row['term']} {row['who']}", row | runs_of(*cells.values())
+
+
+@table("finding, of *")
+def human(study: Study) -> Rows:
+    """Whether each model agrees with each finding, by how much; a star: it is built so."""
+    for name, rows in judged(study).groupby("finding", sort=False):
+        finding = FINDINGS[str(name)]
+        verdicts: Row = {"finding": finding.statement}
+        for model, of_model in rows.groupby("model", sort=False):
+            verdicts[f"of {model}"] = in_words(of_model)
+        runs = (run_ids(study, model, finding.where) for model in MODELS)
+        yield str(name), verdicts | {"run_ids": " ".join(runs)}
+
+
+def in_words(tests: pd.DataFrame) -> str:
+    """A model's verdict on a finding, with the effect of each test."""
+    first = tests.iloc[0]
+    verdict = f"{first.verdict}{' *' if first.built_in else ''}"
+    there = tests[tests.tasks > 0].drop_duplicates("measure")
+    effects = [
+        f"{number(value, 2)} {in_brackets(low, high, 2)}".strip()
+        for value, low, high in zip(there.value, there.low, there.high, strict=True)
+    ]
+    return f"{verdict}: {'; '.join(effects)}" if effects else verdict
+
+
+@table("finding, model, measure, value[], tasks, verdict, built_in, because")
+def human_effects(study: Study) -> Rows:
+    """What each model shows of each finding, with its interval over tasks; why it is silent."""
+    frame = judged(study).drop_duplicates(["finding", "model", "measure"])
+    frame = frame.rename(columns={"low": "value_low", "high": "value_high"})
+    for row in frame.itertuples():
+        finding, model = str(row.finding), str(row.model)
+        values: Row = {column: getattr(row, column) for column in frame.columns}
+        ids = run_ids(study, model, FINDINGS[finding].where) if row.tasks else ""
+        yield f"{finding} {model} {row.measure}", values | {"run_ids": ids}

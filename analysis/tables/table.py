@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from coartic.analysis.cells import CellRuns
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import read_beside
 
 Row = dict[str, Any]
