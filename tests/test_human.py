@@ -21,6 +21,7 @@ from coartic.analysis.human.judge import (
     bootstrapped,
     judged,
     verdict_of,
+    verdict_of_test,
 )
 from coartic.analysis.human.measures import MODELS, Values
 from tests.support.suites import run_and_write, suite_of
@@ -49,8 +50,11 @@ ABOVE, BETWEEN, RATIO = (
     ],
 )
 def test_verdicts(finding, ends, tasks, verdict):
-    values = [(math.nan, *end) for end in ends]
-    assert verdict_of(finding, values, [tasks] * len(ends)) == verdict
+    of_tests = [
+        verdict_of_test(test, (math.nan, *end), tasks)
+        for test, end in zip(finding.tests, ends, strict=True)
+    ]
+    assert verdict_of(of_tests) == verdict
 
 
 def test_an_interval_covers_as_often_as_it_says(monkeypatch):

@@ -89,9 +89,10 @@ FINDINGS = read_findings()
 def judged(study: Study) -> pd.DataFrame:
     """A row for each finding, test and model, in their order; none for folders of other suites.
 
-    Columns ``finding``, ``model``, ``measure``, ``value`` with the ``low`` and ``high`` end of its
-    interval, ``tasks``, ``verdict`` of the finding (the same for all tests of one), ``built_in``:
-    whether it follows from how the model is built, ``because``: why a model is silent.
+    Columns ``finding``, ``model``, ``measure``, ``bound``, ``value`` with the ``low`` and ``high``
+    end of its interval, ``tasks``, ``of_test``: the verdict of the test alone, ``verdict`` of the
+    finding (the same for all tests of one), ``built_in``: whether it follows from how the model is
+    built, ``because``: why a model is silent.
     Intervals are of the bootstrap over tasks, 95 % for one test and wider for several
     (Bonferroni).
     """
@@ -105,11 +106,19 @@ def judged(study: Study) -> pd.DataFrame:
             ]
             ends = [bootstrapped(of, LEVEL / len(finding.tests)) for of in values]
             counts = [len(of.by_task) for of in values]
-            verdict = SILENT if silent else verdict_of(finding, ends, counts)
+            of_tests = [
+                SILENT if silent else verdict_of_test(test, end, count)
+                for test, end, count in zip(finding.tests, ends, counts, strict=True)
+            ]
+            verdict = verdict_of(of_tests)
             built_in = finding.built_in.get(model) == verdict
-            for test, end, count in zip(finding.tests, ends, counts, strict=True):
-                rows.append((name, model, test.measure, *end, count, verdict, built_in, silent))
-    columns = "finding model measure value low high tasks verdict built_in because"
+            for test, end, count, alone in zip(finding.tests, ends, counts, of_tests, strict=True):
+                bound = (
+                    f"above {test.above:g}" if test.above is not None else f"below {test.below:g}"
+                )
+                measured = (name, model, test.measure, bound, *end, count)
+                rows.append((*measured, alone, verdict, built_in, silent))
+    columns = "finding model measure bound value low high tasks of_test verdict built_in because"
     return pd.DataFrame(rows, columns=columns.split())
 
 
@@ -135,23 +144,26 @@ def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
     return estimate, float(low), float(high)
 
 
-def verdict_of(
-    finding: Finding, ends: Sequence[tuple[float, float, float]], tasks: Sequence[int]
-) -> str:
-    """Of a model on a finding, from the value of each test with its interval."""
-    if not all(tasks):
+def verdict_of_test(test: Test, ends: tuple[float, float, float], tasks: int) -> str:
+    """Of a value with its interval on one test; undecided where both verdicts fit."""
+    if not tasks:
         return NO_CASES
-    agrees, disagrees = [], []
-    for test, (_, low, high) in zip(finding.tests, ends, strict=True):
-        sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
-        assert bound is not None
-        wrong = bound if test.disagree is None else test.disagree
-        near, far = sorted((sign * low, sign * high))
-        agrees.append(near >= sign * bound)
-        disagrees.append(far < sign * wrong)
-    if min(tasks) < FEWEST_TASKS or all(agrees) == any(disagrees):
+    _, low, high = ends
+    sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
+    assert bound is not None
+    wrong = bound if test.disagree is None else test.disagree
+    near, far = sorted((sign * low, sign * high))
+    agrees, disagrees = near >= sign * bound, far < sign * wrong
+    if tasks < FEWEST_TASKS or agrees == disagrees:
         return UNDECIDED
-    return AGREES if all(agrees) else DISAGREES
+    return AGREES if agrees else DISAGREES
+
+
+def verdict_of(tests: Sequence[str]) -> str:
+    """Of a finding, from the verdicts of its tests."""
+    if len(set(tests)) == 1:
+        return tests[0]
+    return next((kind for kind in (NO_CASES, DISAGREES) if kind in tests), UNDECIDED)
 
 
 def separating(study: Study) -> dict[str, list[str]]:

@@ -106,7 +106,8 @@ def word(value: Any, column: Column) -> str:
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     """A table for the page. Its first column holds while the others scroll; rows are named."""
-    cells: dict[str, list[str]] = {}
+    cells: list[list[str]] = []
+    heads = []
     for column, header in columns_of(frame).items():
         texts = list(map(html.escape, texts_of(frame, column)))
         head = html.escape(header)
@@ -125,9 +126,13 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
             rows = (html.escape(str(row)) for row in frame.index)
             pairs = zip(rows, texts, strict=True)
             texts = [f'<span title="row {row}">{text}</span>' for row, text in pairs]
-        cells[head] = texts
-    table = pd.DataFrame(cells).to_html(
-        index=False, escape=False, border=0, table_id=f"table-{name}", justify="unset"
+        cells.append(texts)
+        heads.append(head)
+    # Two columns may have one header.
+    table = (
+        pd.DataFrame(dict(enumerate(cells)))
+        .set_axis(heads, axis="columns")
+        .to_html(index=False, escape=False, border=0, table_id=f"table-{name}", justify="unset")
     )
     head = f"<caption><span>{html.escape(caption)}</span></caption>\n  <thead>"
     return table.replace("<thead>", head, 1).replace("<th>", '<th scope="col">')
@@ -136,10 +141,9 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 def latex_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     """A table for a paper, with booktabs: what the page shows, numbers to the right."""
     columns = columns_of(frame)
-    cells = {
-        header: list(map(latex, texts_of(frame, column))) for column, header in columns.items()
-    }
-    styler = pd.DataFrame(cells).style.hide(axis="index").format_index(latex, axis="columns")
+    cells = {column: list(map(latex, texts_of(frame, column))) for column in columns}
+    shown = pd.DataFrame(cells).set_axis(list(columns.values()), axis="columns")
+    styler = shown.style.hide(axis="index").format_index(latex, axis="columns")
     body = styler.to_latex(
         hrules=True,
         column_format="".join("r" if is_number(frame[column]) else "l" for column in columns),

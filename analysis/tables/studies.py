@@ -338,13 +338,17 @@ def in_words(tests: pd.DataFrame) -> str:
     return f"{verdict}: {'; '.join(effects)}" if effects else verdict
 
 
-@table("finding, model, measure, value[], tasks, verdict, built_in, because")
+@table("finding, model, measure, bound, value[], tasks, of_test, verdict, built_in, because")
 def human_effects(study: Study) -> Rows:
-    """What each model shows of each finding, with its interval over tasks; why it is silent."""
-    frame = judged(study).drop_duplicates(["finding", "model", "measure"])
-    frame = frame.rename(columns={"low": "value_low", "high": "value_high"})
-    for row in frame.itertuples():
+    """What each model shows of each finding, with its interval over tasks; why it is silent.
+
+    The second test of one measure has its bound in the row's name.
+    """
+    frame = judged(study).rename(columns={"low": "value_low", "high": "value_high"})
+    second = frame.duplicated(["finding", "model", "measure"])
+    for row, again in zip(frame.itertuples(), second, strict=True):
         finding, model = str(row.finding), str(row.model)
         values: Row = {column: getattr(row, column) for column in frame.columns}
         ids = run_ids(study, model, FINDINGS[finding].where) if row.tasks else ""
-        yield f"{finding} {model} {row.measure}", values | {"run_ids": ids}
+        name = f"{finding} {model} {row.measure}{f' {row.bound}' if again else ''}"
+        yield name, values | {"run_ids": ids}
