@@ -92,7 +92,8 @@ def cells_by_method(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, An
 def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
     """A model's cells; ``others`` are parameters in the place of its own."""
     asked = {**model.parameters, **others}
-    methods = [model.method] if model.method else {*map(most_exploring, study.tasks.values())}
+    ours = dict.fromkeys(map(most_exploring, study.tasks.values()))
+    methods = [model.method] if model.method else [*ours]
     return [
         cell
         for method in methods
