@@ -91,7 +91,8 @@ def cells_by_method(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, An
 def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
     """A model's cells; ``others`` are parameters in the place of its own."""
     asked = {**model.parameters, **others}
-    methods = [model.method] if model.method else {*map(most_exploring, study.tasks.values())}
+    ours = dict.fromkeys(map(most_exploring, study.tasks.values()))
+    methods = [model.method] if model.method else [*ours]
     return [
         cell
         for method in methods
@@ -188,35 +189,28 @@ def nearer_goal_more(study: Study, model: Model) -> Values:
     return mean_of([np.array(near[task] - far[task]) for task in near if task in far])
 
 
-def practice(study: Study, model: Model) -> list[Array]:
+def practice(study: Study, model: Model, statistic: Callable[[Array], float]) -> Values:
     """Slope norms at distances 1 and 2 after all trials and after a hundredth, by task, (1, 4)."""
     if model.method:
-        return []
+        return Values([], statistic)
     norms = [
         slope_norms(study, model, distance, trials=trials)
         for trials in (PRACTISED, BEGUN)
         for distance in (1, 2)
     ]
-    return [
-        np.array([[of[task] for of in norms]]) for task in norms[0] if all(task in n for n in norms)
-    ]
+    tasks = [task for task in norms[0] if all(task in of for of in norms)]
+    return Values([np.array([[of[task] for of in norms]]) for task in tasks], statistic)
 
 
-def horizon_rise(study: Study, model: Model) -> Values:
+def horizon_rise(rows: Array) -> float:
     """Rise of the slope norm at distance 2 with practice."""
-    by_task = practice(study, model)
-    return Values(by_task, lambda rows: float((rows[:, 1] - rows[:, 3]).mean()))
+    return float((rows[:, 1] - rows[:, 3]).mean())
 
 
-def ratio_rise(study: Study, model: Model) -> Values:
+def ratio_rise(rows: Array) -> float:
     """Rise of the ratio of the mean slope norms at distance 2 and 1 with practice."""
-    by_task = practice(study, model)
-
-    def statistic(rows: Array) -> float:
-        near, far, near_before, far_before = rows.mean(axis=0)
-        return float(far / near - far_before / near_before)
-
-    return Values(by_task, statistic)
+    near, far, near_before, far_before = rows.mean(axis=0)
+    return float(far / near - far_before / near_before)
 
 
 def benefit_correlation(study: Study, model: Model) -> Values:
@@ -449,8 +443,8 @@ MEASURES: dict[str, Measure] = {
     "slope norm of the base": partial(slope_norm, distance=1, joints=slice(0, BASE_DOF)),
     "slope norm of the arm": partial(slope_norm, distance=1, joints=slice(BASE_DOF, None)),
     "slope norm at distance 1 less that at distance 2": nearer_goal_more,
-    "rise of the slope norm at distance 2": horizon_rise,
-    "rise of the ratio of slope norms": ratio_rise,
+    "rise of the slope norm at distance 2": partial(practice, statistic=horizon_rise),
+    "rise of the ratio of slope norms": partial(practice, statistic=ratio_rise),
     "benefit correlation": benefit_correlation,
     "sufficient horizon": sufficient_horizon,
     "bow slope": bow_slope,

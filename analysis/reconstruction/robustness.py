@@ -9,7 +9,10 @@ doi:10.1038/s41562-020-0912-z).
 from __future__ import annotations
 
 import math
+import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import repeat
 from typing import Any
@@ -19,12 +22,13 @@ import pandas as pd
 
 from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.processes import processes
 from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
+from coartic.learner.learning import threads_for
 from coartic.runs.plan import variant_of
 from coartic.tasks.catalogue import task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
+from coartic.threads import begin_worker, one_thread_each
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
@@ -166,3 +170,19 @@ def shares(table: pd.DataFrame) -> pd.DataFrame:
     order = list(dict.fromkeys(zip(table.claim, kind, strict=True)))
     counts["specifications"] = counts.sum(axis=1)
     return counts.loc[order].reset_index().rename_axis(columns=None)
+
+
+@contextmanager
+def processes(jobs: int, pieces: int) -> Iterator[Callable[..., Any]]:
+    """``map`` in ``jobs`` processes, -1 for one a core; in this one where one is enough."""
+    workers = min(threads_for(jobs), pieces)
+    if workers <= 1:
+        yield map
+        return
+    methods = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    with (
+        one_thread_each(),
+        ProcessPoolExecutor(workers, mp_context=context, initializer=begin_worker) as pool,
+    ):
+        yield pool.map
