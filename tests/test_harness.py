@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from fnmatch import fnmatch
 
 import numpy as np
@@ -30,6 +31,7 @@ from tests.support.strategies import as_released, tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
+    InProcess,
     paper_cells,
     planned,
     run_and_write,
@@ -357,3 +359,12 @@ def test_a_suite_can_move_one_goal(tmp_path):
             'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
             "move = { goal = 2, by = [[0, 9]] }",
         )
+
+
+def test_a_folder_of_another_suite_is_refused(tmp_path):
+    cells = paper_cells(tasks=["ascending"], methods=["EC1"])
+    plan = planned(cells, runs=1, trials=5)
+    plan.perform(tmp_path, executor=InProcess())
+    other = replace(plan, plan=replace(plan.plan, suite="quick"))
+    with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
+        other.perform(tmp_path, executor=InProcess())

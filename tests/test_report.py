@@ -121,6 +121,13 @@ def test_text_from_files_is_escaped():
     assert r"\textbackslash{}input\{x\}" in latex
 
 
+def test_columns_with_one_header_keep_their_values():
+    frame = pd.DataFrame({"on two-armed/v1/i000": [1.25], "on two-armed/v1/i001": [7.5]}, ["a"])
+    assert len(set(render.columns_of(frame).values())) == 1
+    for text in (render.html_table(frame, "name", ""), render.latex_table(frame, "name", "")):
+        assert re.search(r"125.*750", text, re.DOTALL)
+
+
 def test_a_page_stands_alone(report):
     """Every id is there once, every reference has its id, and ink is the page's."""
     text = (report / "report.html").read_text(encoding="utf-8")

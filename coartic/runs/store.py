@@ -198,7 +198,16 @@ class Store:
     # What was asked for.
 
     def ask(self, plan: Plan, environment: dict[str, Any], command: list[str], date: str) -> None:
-        """Say what is asked for from here on; runs of earlier plans stay, and are not shown."""
+        """Say what is asked for from here on; runs of earlier plans stay, and are not shown.
+
+        Raises CoarticError for a folder of another suite.
+        """
+        for row in self._db.execute("SELECT name FROM suite"):
+            if row["name"] != plan.suite:
+                raise CoarticError(
+                    f"{self.folder} holds results of suite {row['name']!r}: name another folder "
+                    f"for suite {plan.suite!r}"
+                )
         with self._writing():
             for table in ("suite", "tasks", "methods", "cells"):
                 self._db.execute(f"DELETE FROM {table}")
