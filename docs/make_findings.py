@@ -86,9 +86,12 @@ def claim(name: str, suite: str = "") -> Row:
     return Row(claims(suite).loc[name])
 
 
-def verdicts(suite: str = "") -> dict[str, int]:
-    """How many claims have each verdict."""
-    counts = claims(suite).verdict.value_counts()
+def verdicts(suite: str = "", printed: bool | None = None) -> dict[str, int]:
+    """How many claims have each verdict: all, or those on printed (or on reconstructed) goals."""
+    judged = claims(suite)
+    if printed is not None:
+        judged = judged[judged.statement.str.endswith("†") != printed]
+    counts = judged.verdict.value_counts()
     return {str(verdict): int(count) for verdict, count in counts.items()}
 
 

@@ -140,12 +140,24 @@ def test_importing_the_environments_compiles_nothing():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def program_of_page(title):
+    page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
+    (text,) = re.findall(rf'```python\n("""{title}.*?)```', page.read_text("utf-8"), re.DOTALL)
+    return text
+
+
+def test_the_first_program_of_the_page_learns(capsys):
+    names = {}
+    exec(program_of_page("REINFORCE"), names)
+    assert (np.sign(names["mean"][:, 0]) == [-1, 1, -1, 1]).all()  # the hands LRLR
+    assert names["total"].mean() > -490
+
+
 def test_the_agent_of_the_page_trains(capsys):
     pytest.importorskip("stable_baselines3")
-    page = Path(__file__).parent.parent / "docs" / "howto" / "agents.md"
-    (text,) = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    text = program_of_page("Train PPO")
     names = {}
-    exec(text.replace("60_000", "2048"), names)
+    exec(text.replace("40_000", "2048"), names)
     assert -560 < names["total"] < -480  # the corrective process alone: -532
     assert names["info"]["is_success"]
     assert all(-FAILED < episode["r"] < -480 for episode in names["agent"].ep_info_buffer)
