@@ -24,9 +24,11 @@ from coartic.analysis.methods import (
     main_methods,
     most_exploring,
 )
-from coartic.analysis.statistics.estimates import interval
+from coartic.analysis.statistics.estimates import LEVEL, interval
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.coarticulation import corrected
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 from coartic.robot import Array
@@ -43,7 +45,35 @@ _POINTS = 120  # trials of a learning curve
 _STEPS = 150  # of a price curve, at most
 
 
-@table("method, knows, gap[], on *, runs")
+@table("task, method, runs, reward, learner, p_holm")
+def against_learner(study: Study) -> Rows:
+    """Mean reward of every method and of the paper's learner that explores most, by task.
+
+    Of methods that solved every run. A method that draws nothing has one reward, which is exact.
+    """
+    rows: list[tuple[str, Row]] = []
+    for (task, label), cell in study.cells.items():
+        learner = study.cells.get((task, most_exploring(study.tasks[task])))
+        if learner is None or learner is cell or task not in one_by_one(study):
+            continue
+        both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
+        if is_variant(label) or is_search(label) or not both_solved:
+            continue
+        drawn = study.plan.methods[cell.method].stochastic
+        rewards = cell.rewards if drawn else float(cell.rewards[0])
+        row: Row = {
+            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "method": label,
+            "runs": len(cell.runs),
+            "reward": cell.rewards.mean(),
+            "learner": learner.rewards.mean(),
+            "p_holm": bootstrap_test(learner.rewards, rewards, "two-sided").p,
+        }
+        rows.append((f"{task} {label}", row | runs_of(cell, learner)))
+    yield from corrected(rows)
+
+
+@table("method, knows, gap[], better, worse, on *, runs")
 def ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each, grouped by what methods know."""
     rows = standings(study)
@@ -61,6 +91,12 @@ def ranking(study: Study) -> Rows:
             f"on {task}": method_rows(study).gap[task, labels[task]] if task in labels else math.nan
             for task in names
         }
+        tested = against_learner(study)
+        tested = tested[tested.index.isin([f"{task} {label}" for task, label in labels.items()])]
+        if len(tested):
+            sure = tested[tested.p_holm < LEVEL]
+            row |= {"better": sum(sure.reward > sure.learner)}
+            row |= {"worse": sum(sure.reward < sure.learner)}
         cells = [study.cells[key] for key in labels.items()]
         named.append(
             (str(method), row | {"runs": sum(len(c.runs) for c in cells)} | runs_of(*cells))
