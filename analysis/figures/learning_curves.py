@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
-from coartic.analysis.methods import name_of
+from coartic.analysis.methods import in_order, name_of
 from coartic.analysis.study import Study
 from coartic.analysis.tables import comparison
 from coartic.analysis.trajectories import initial_solution
@@ -25,12 +25,12 @@ from coartic.analysis.trajectories import initial_solution
     "solution are cut off.",
 )
 def learning_curves(study: Study) -> Parts:
-    """Reward of the learner, hill climbing and CMA-ES, one panel for each task."""
+    """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
     data = comparison.learning_curves(study)
     if not len(data):
-        raise missing(study, f"no run of {', '.join(comparison.CURVES)} that learns by trial")
+        raise missing(study, "no run that learns by trial")
     tasks = [study.tasks[name] for name in data.task.unique()]
-    labels = sorted(data.method.unique(), key=comparison.CURVES.index)
+    labels = in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
     drawing, panels = style.figure_of((rows, columns), size, len(tasks))

@@ -17,6 +17,7 @@ from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import (
     CONDITIONS,
     EC1,
+    KNOWN_METHODS,
     TOGETHER,
     in_order,
     is_search,
@@ -38,7 +39,7 @@ BUDGETS = (100, 1_000, 10_000)
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
 CURVES = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
-"""Methods whose learning curves are drawn."""
+"""Built-in methods whose learning curves are drawn; of others they all are."""
 SPENDS = ("trials", "forward_kinematics")
 """What price curves count."""
 _POINTS = 120  # trials of a learning curve
@@ -219,7 +220,7 @@ def half_gain(rewards: Array, trials: Array) -> float:
 
 @cached
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Best reward so far and that of the trials themselves, by task and method of :data:`CURVES`.
+    """Best reward so far and that of the trials themselves, by task and method.
 
     Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
@@ -239,7 +240,14 @@ def learning_curves(study: Study) -> pd.DataFrame:
 def drawn_curves(study: Study) -> Iterator[tuple[str, str]]:
     """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
     for task in (name for name in study.tasks if name in one_by_one(study)):
-        labels = [c for c in CURVES if (task, c) in study.cells and len(study.cells[task, c].good)]
+        solved = [
+            label for (name, label), cell in study.cells.items() if name == task and len(cell.good)
+        ]
+        labels = [
+            label
+            for label in in_order(solved)
+            if label in CURVES or label.partition(" ")[0] not in KNOWN_METHODS
+        ]
         two_armed = {*CONDITIONS} & {*labels} - {EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == EC1))
 
