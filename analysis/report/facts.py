@@ -222,7 +222,7 @@ def learning(study: Study) -> list[Facts]:
     return [
         {"task": study.tasks[task].label.lower(), "trials": float(half[row])}
         for task, row in rows.items()
-        if row in half.index
+        if row in half.index and half[row] < math.inf
     ]
 
 

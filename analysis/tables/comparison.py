@@ -31,6 +31,7 @@ from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.coarticulation import corrected
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
+from coartic.analysis.trajectories import initial_solution
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
@@ -199,23 +200,25 @@ def learning(study: Study) -> Rows:
         budgets = np.array([budget for budget in BUDGETS if budget <= trials], dtype=float)
         best = np.array([run.best("trials", budgets) for run in runs])
         best[~np.isfinite(best)] = math.nan
-        halves = [half_gain(run.rewards, run.spent["trials"]) for run in runs]
+        solution = initial_solution(study.tasks[task], study.model)
+        initial = math.nan if solution is None else float(-solution.ticks)
+        halves = [half_gain(initial, run.rewards, run.spent["trials"]) for run in runs]
+        quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {
             "task": marked(study.tasks[task].label, study.tasks[task]),
             "method": label,
             "runs": len(runs),
-            "initial": ends(study).get(task, (math.nan,))[0],
+            "initial": initial,
             **{f"after_{int(n)}": best[:, k].mean() for k, n in enumerate(budgets)},
-            "half_gain": float(np.median(halves)),
-            "half_gain_low": float(np.quantile(halves, 0.25)),
-            "half_gain_high": float(np.quantile(halves, 0.75)),
+            **dict(zip(("half_gain", "half_gain_low", "half_gain_high"), quartiles, strict=True)),
         }
         yield f"{task} {label}", row | runs_of(cell)
 
 
-def half_gain(rewards: Array, trials: Array) -> float:
-    """Trial at which half of what a run gains from its first solution to its last is there."""
-    return float(trials[rewards >= (rewards[0] + rewards[-1]) / 2][0])
+def half_gain(initial: float, rewards: Array, trials: Array) -> float:
+    """Trial at which half of what a run gains on the initial solution is there; ∞ without any."""
+    enough = trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
+    return float(enough[0]) if len(enough) else math.inf
 
 
 @cached
