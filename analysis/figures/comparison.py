@@ -17,7 +17,7 @@ from coartic.analysis.comparisons.reached import WAY
 from coartic.analysis.comparisons.standings import ALL_TASKS, standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
-from coartic.analysis.methods import is_learner, name_of
+from coartic.analysis.methods import in_order, is_learner, name_of
 from coartic.analysis.study import Study
 from coartic.analysis.tables import comparison
 from coartic.analysis.tables.comparison import price_curves
@@ -135,12 +135,12 @@ def draw_shares(axes: Axes, data: pd.DataFrame) -> None:
     "solution are cut off.",
 )
 def learning_curves(study: Study) -> Parts:
-    """Reward of the learner, hill climbing and CMA-ES, one panel for each task."""
+    """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
     data = comparison.learning_curves(study)
     if not len(data):
-        raise missing(study, f"no run of {', '.join(comparison.CURVES)} that learns by trial")
+        raise missing(study, "no run that learns by trial")
     tasks = [study.tasks[name] for name in data.task.unique()]
-    labels = sorted(data.method.unique(), key=comparison.CURVES.index)
+    labels = in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
     drawing, panels = style.figure_of((rows, columns), size, len(tasks))

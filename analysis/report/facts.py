@@ -63,16 +63,18 @@ def coarticulation(study: Study) -> Facts | None:
 
 @cached
 def slopes(study: Study) -> Facts | None:
-    """The joint that follows a moved goal most, at a goal before it: of the learner if it ran."""
+    """The joint that follows a moved goal most, at a goal before it: of the learner if it ran.
+
+    ``seen``: whether the whole posture surely follows; places where it does come first.
+    """
     rows = tables.slopes(study)
     rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
+    rows = rows.assign(seen=rows.p_holm < LEVEL, size=rows.slope.abs())
     for label in (*CONDITIONS, *main_methods(rows.method)):
-        of_method = rows[rows.method == label].sort_values("slope", key=abs)
+        of_method = rows[rows.method == label].sort_values(["seen", "size"])
         for row in of_method.tail(1).to_dict("records"):
-            low, high = row["slope_low"], row["slope_high"]
             words = {"method": name_of(label), "joint": str(row["joint"]).replace("_", " ")}
-            named = {str(key): value for key, value in row.items()}
-            return named | words | {"seen": low > 0 or high < 0}
+            return {str(key): value for key, value in row.items()} | words
     return None
 
 
@@ -220,7 +222,7 @@ def learning(study: Study) -> list[Facts]:
     return [
         {"task": study.tasks[task].label.lower(), "trials": float(half[row])}
         for task, row in rows.items()
-        if row in half.index
+        if row in half.index and half[row] < math.inf
     ]
 
 

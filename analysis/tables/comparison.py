@@ -16,6 +16,7 @@ from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import (
     CONDITIONS,
     EC1,
+    KNOWN_METHODS,
     TOGETHER,
     in_order,
     is_search,
@@ -23,10 +24,13 @@ from coartic.analysis.methods import (
     main_methods,
     most_exploring,
 )
-from coartic.analysis.statistics.estimates import interval
+from coartic.analysis.statistics.estimates import LEVEL, interval
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
+from coartic.analysis.tables.coarticulation import corrected
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
+from coartic.analysis.trajectories import initial_solution
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
@@ -35,14 +39,42 @@ BUDGETS = (100, 1_000, 10_000)
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
 CURVES = (*CONDITIONS, "random-search/climbing", "cma-es/bandit")
-"""Methods whose learning curves are drawn."""
+"""Built-in methods whose learning curves are drawn; of others they all are."""
 SPENDS = ("trials", "forward_kinematics")
 """What price curves count."""
 _POINTS = 120  # trials of a learning curve
 _STEPS = 150  # of a price curve, at most
 
 
-@table("method, knows, gap[], on *, runs")
+@table("task, method, runs, reward, learner, p_holm")
+def against_learner(study: Study) -> Rows:
+    """Mean reward of every method and of the paper's learner that explores most, by task.
+
+    Of methods that solved every run. A method that draws nothing has one reward, which is exact.
+    """
+    rows: list[tuple[str, Row]] = []
+    for (task, label), cell in study.cells.items():
+        learner = study.cells.get((task, most_exploring(study.tasks[task])))
+        if learner is None or learner is cell or task not in one_by_one(study):
+            continue
+        both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
+        if is_variant(label) or is_search(label) or not both_solved:
+            continue
+        drawn = study.plan.methods[cell.method].stochastic
+        rewards = cell.rewards if drawn else float(cell.rewards[0])
+        row: Row = {
+            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "method": label,
+            "runs": len(cell.runs),
+            "reward": cell.rewards.mean(),
+            "learner": learner.rewards.mean(),
+            "p_holm": bootstrap_test(learner.rewards, rewards, "two-sided").p,
+        }
+        rows.append((f"{task} {label}", row | runs_of(cell, learner)))
+    yield from corrected(rows)
+
+
+@table("method, knows, gap[], better, worse, on *, runs")
 def ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each, grouped by what methods know."""
     rows = standings(study)
@@ -60,6 +92,12 @@ def ranking(study: Study) -> Rows:
             f"on {task}": method_rows(study).gap[task, labels[task]] if task in labels else math.nan
             for task in names
         }
+        tested = against_learner(study)
+        tested = tested[tested.index.isin([f"{task} {label}" for task, label in labels.items()])]
+        if len(tested):
+            sure = tested[tested.p_holm < LEVEL]
+            row |= {"better": sum(sure.reward > sure.learner)}
+            row |= {"worse": sum(sure.reward < sure.learner)}
         cells = [study.cells[key] for key in labels.items()]
         named.append(
             (str(method), row | {"runs": sum(len(c.runs) for c in cells)} | runs_of(*cells))
@@ -161,28 +199,30 @@ def learning(study: Study) -> Rows:
         budgets = np.array([budget for budget in BUDGETS if budget <= trials], dtype=float)
         best = np.array([run.best("trials", budgets) for run in runs])
         best[~np.isfinite(best)] = math.nan
-        halves = [half_gain(run.rewards, run.spent["trials"]) for run in runs]
+        solution = initial_solution(study.tasks[task], study.model)
+        initial = math.nan if solution is None else float(-solution.ticks)
+        halves = [half_gain(initial, run.rewards, run.spent["trials"]) for run in runs]
+        quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {
             "task": marked(study.tasks[task].label, study.tasks[task]),
             "method": label,
             "runs": len(runs),
-            "initial": ends(study).get(task, (math.nan,))[0],
+            "initial": initial,
             **{f"after_{int(n)}": best[:, k].mean() for k, n in enumerate(budgets)},
-            "half_gain": float(np.median(halves)),
-            "half_gain_low": float(np.quantile(halves, 0.25)),
-            "half_gain_high": float(np.quantile(halves, 0.75)),
+            **dict(zip(("half_gain", "half_gain_low", "half_gain_high"), quartiles, strict=True)),
         }
         yield f"{task} {label}", row | runs_of(cell)
 
 
-def half_gain(rewards: Array, trials: Array) -> float:
-    """Trial at which half of what a run gains from its first solution to its last is there."""
-    return float(trials[rewards >= (rewards[0] + rewards[-1]) / 2][0])
+def half_gain(initial: float, rewards: Array, trials: Array) -> float:
+    """Trial at which half of what a run gains on the initial solution is there; ∞ without any."""
+    enough = trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
+    return float(enough[0]) if len(enough) else math.inf
 
 
 @cached
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Best reward so far and that of the trials themselves, by task and method of :data:`CURVES`.
+    """Best reward so far and that of the trials themselves, by task and method.
 
     Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
@@ -202,7 +242,14 @@ def learning_curves(study: Study) -> pd.DataFrame:
 def drawn_curves(study: Study) -> Iterator[tuple[str, str]]:
     """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
     for task in (name for name in study.tasks if name in one_by_one(study)):
-        labels = [c for c in CURVES if (task, c) in study.cells and len(study.cells[task, c].good)]
+        solved = [
+            label for (name, label), cell in study.cells.items() if name == task and len(cell.good)
+        ]
+        labels = [
+            label
+            for label in in_order(solved)
+            if label in CURVES or label.partition(" ")[0] not in KNOWN_METHODS
+        ]
         two_armed = {*CONDITIONS} & {*labels} - {EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == EC1))
 
