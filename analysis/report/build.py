@@ -101,9 +101,14 @@ def plots(study: Study) -> dict[str, Plot]:
 
 
 def shown(study: Study) -> dict[str, dict[str, Any]]:
-    """Sections that are not about single tasks where these are many."""
-    alone = one_by_one(study)
-    return {name: row for name, row in SECTIONS.items() if alone or not row.get("single")}
+    """Sections but those about single tasks where these are many, and claims if none is decided."""
+    alone, claims = one_by_one(study), tables.claims(study)
+    decided = ((claims.verdict != "undecided") & (claims.run_ids != "")).any()
+    return {
+        name: row
+        for name, row in SECTIONS.items()
+        if (alone or not row.get("single")) and (decided or name != "claims")
+    }
 
 
 @cached

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from shlex import quote
 from typing import Any
 
 from coartic.analysis import tables
@@ -374,7 +375,7 @@ def provenance(study: Study) -> Facts:
     made_with = study.made_with
     return {
         "suite": study.suite,
-        "folder": study.folder,
+        "folder": quote(str(study.folder)),
         "runs": len(study.runs),
         "seed": study.plan.seed,
         "version": made_with["coartic"],
