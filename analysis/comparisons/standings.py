@@ -51,6 +51,12 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     return by_task
 
 
+def optimum_in_words(study: Study) -> str:
+    """What gaps are to: where an optimum is not proven, it is the best known reward."""
+    proven = all(best.proven for best in study.optima.values())
+    return "optimum" if proven else "best known reward"
+
+
 @cached
 def gaps(study: Study) -> pd.DataFrame:
     """One row a run of every task of :func:`ends`.

@@ -15,7 +15,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.human import judge
 from coartic.analysis.human.measures import MODELS
-from coartic.analysis.methods import EC4, name_of
+from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import SMOOTH, horizon_beside
 from coartic.analysis.tables.studies import crossings as crossings_table
@@ -84,8 +84,9 @@ def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -
 def beside(axes: Axes, rows: pd.DataFrame) -> None:
     """Other methods at the horizons that they are equivalent to."""
     over_all = rows[rows.arms == "all"].to_dict("records")
+    looks = style.looks([row["method"] for row in over_all])
     for row, marker in zip(over_all, itertools.cycle("sD^v"), strict=False):
-        look = style.look_of(EC4 if row["method"] == "learner" else row["method"])
+        look = looks[row["method"]]
         at, gap = row["horizon"], 100 * row["gap"]
         thin: Any = {"color": look["color"], "linewidth": 0.8, "zorder": 4}
         axes.hlines(gap, row["horizon_low"], row["horizon_high"], **thin)

@@ -178,7 +178,7 @@ def page(study: Study) -> str:
         next_goal=next_goal(study),
         script=script,
         player=player.replace("<", "\\u003c"),
-        answers=answers(study),
+        answers=[answer for answer in answers(study) if answer["id"] in shown(study)],
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),

@@ -157,6 +157,7 @@ def nearest(study: Study) -> Facts | None:
         "learner": {**by_trial[places[0]], "place": places[0] + 1} if places else None,
         "proven": sum(best.proven for best in optima),
         "tasks": len(optima),
+        "settings": sum(map(is_variant, tables.variants(study).method)),
     }
 
 
