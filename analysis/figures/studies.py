@@ -35,7 +35,7 @@ COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
     "Gap to the best known solution, mean over random tasks with its "
     f"{style.CONFIDENCE} interval (bootstrap over tasks), linear below 1 %. All tasks: also by "
     "family (thin), and other methods where the planner has the same gap on their tasks. Given "
-    "hands: hands chosen by each plan, or those of the plan with all goals. Dear joints: these cost "
+    "hands: hands chosen by each plan, or those of the plan with all goals. Dear joints cost "
     "three times as much, by weighted path length.",
 )
 def horizon(study: Study) -> Parts:

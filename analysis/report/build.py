@@ -124,40 +124,20 @@ def sections(study: Study) -> list[dict[str, Any]]:
         if plot is None and not len(frame):
             continue
         of = getattr(facts, name)(study) if hasattr(facts, name) else None
-        words = {
-            "note": "",
-            **section,
-            "id": name,
-            "finding": "" if of is None else sentence(name, of),
+        table = {
+            "html": html_table(frame, section["table"], section["caption"]),
+            "searched": len(frame) > SEARCHED,
+            "example": f"'{frame.index[0]}'",
+        } if len(frame) else None  # fmt: skip
+        words = {"note": "", "finding": "" if of is None else sentence(name, of), **section}
+        inches = plot.figure.get_figwidth() if plot else 0.0
+        figure = plot and {
+            **{"id": plot.id, "title": plot.title, "caption": plot.caption},
+            **{"svg": svg_for_page(plot), "wide": inches > _PHONE},
+            "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
         }
-        figure = None if plot is None else figure_for_page(plot)
-        table = table_for_page(frame, section) if len(frame) else None
-        allowed.append({**words, "figure": figure, "table": table})
+        allowed.append({**words, "id": name, "figure": figure, "rows": table})
     return allowed
-
-
-def figure_for_page(plot: Plot) -> dict[str, Any]:
-    """A figure as the template wants it."""
-    inches = plot.figure.get_figwidth()
-    return {
-        "id": plot.id,
-        "title": plot.title,
-        "caption": plot.caption,
-        "svg": svg_for_page(plot),
-        "wide": inches > _PHONE,
-        "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
-    }
-
-
-def table_for_page(frame: pd.DataFrame, section: dict[str, Any]) -> dict[str, Any]:
-    """The table of a section as the template wants it."""
-    return {
-        "id": section["table"],
-        "caption": section["caption"],
-        "html": html_table(frame, section["table"], section["caption"]),
-        "searched": len(frame) > SEARCHED,
-        "example": f"'{frame.index[0]}'",
-    }
 
 
 def page(study: Study) -> str:
