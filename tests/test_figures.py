@@ -122,3 +122,5 @@ def test_names_and_looks_tell_methods_apart():
     assert len(set(map(str, looks([f"own-{k}" for k in range(20)]).values()))) == 20
     learner = "dual-process/EC4"
     assert looks(["mine", learner])[learner] == looks([learner])[learner]
+    both = looks(["mine", "theirs", "random-search/climbing"])
+    assert len(set(map(str, both.values()))) == 3

@@ -155,7 +155,7 @@ def learning_curves(study: Study) -> Parts:
         for label, look in style.looks(labels).items()
     ]
     handles += [style.entry("initial", **style.INITIAL)]
-    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)]
+    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")

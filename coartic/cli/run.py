@@ -185,7 +185,7 @@ def reproduce(
     _, stored = find_run(run_id, folder)
     run, registered = stored.run, registry(method_file or [])
     if stored.method not in registered:
-        raise CoarticError(f"{stored.method} is not built in: pass --method-file FILE.")
+        raise CoarticError(f"unknown method {stored.method!r}: pass --method-file FILE")
     result = f"reward {run.row['reward']}, hands {run.row['hands']}"
     say_pairs(
         [
