@@ -116,6 +116,8 @@ def name_of(label: str) -> str:
 
 def look_alike(label: str) -> str:
     """Whose look a method has: the learner over all tasks that of its two-armed condition."""
+    if label == "learner":
+        return EC4
     if not label.startswith(TOGETHER):
         return label
     ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)

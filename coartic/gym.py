@@ -61,6 +61,10 @@ class Arms:
         self.scale, self.model = scale, model
         goals, dof = len(self.task.goals), self.task.robot.dof
         if isinstance(around, str):
+            if {*around} - {*LETTERS} or len(around) != goals:
+                raise ValueError(
+                    f"around is {around!r}; needed is L or R for each of {goals} goals"
+                )
             around = corrective_trial(self.task, around, model=model).configurations
         self.around = None if around is None else np.array(around, dtype=np.float64)
         if self.around is not None and self.around.shape != (goals, dof):
@@ -99,14 +103,18 @@ class Arms:
     def step(self, actions: Array, which: Flags) -> tuple[Array, Flags]:
         """Make the next subtask of these robots: rewards ``(N,)``, and whose trials have ended.
 
-        Raises ValueError for actions that are not finite.
+        Raises ValueError for actions that are not finite or have another shape.
         """
         from coartic.motion.penalty import penalties_of_movements
         from coartic.motion.reach import reach_unchecked
         from coartic.optimisers import FAILED
 
         rows = np.flatnonzero(which)
-        chosen = np.asarray(actions, dtype=np.float64)[rows]
+        chosen = np.asarray(actions, dtype=np.float64)
+        shape = len(which), *self.action_space.shape
+        if chosen.shape != shape:
+            raise ValueError(f"actions have shape {chosen.shape}; needed is {shape}")
+        chosen = chosen[rows]
         hands = np.full(len(rows), HANDS.index(self.task.hands[0]))
         if self.two_hands:
             hands = (chosen[:, 0] > 0).astype(np.int64)

@@ -68,6 +68,7 @@ def report(traced, tmp_path_factory):
     folder = tmp_path_factory.mktemp("traced-report") / "report"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "picture", lambda figure, ending: b"")  # drawn for the page already
+        patch.setattr(build, "shown", lambda study: build.SECTIONS)  # undecided claims as well
         build.write_report(traced, folder, for_paper=False)
     return folder
 

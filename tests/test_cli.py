@@ -177,6 +177,8 @@ def test_entry_points():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (("list", "two-armed/v2/i003"), "two-armed/v1"),
+        (("check", "two-armed/v1/i003"), "coartic draw"),
         (("run", "papr"), "paper"),
         (("run", "paper", "--tasks", "ascendin"), "ascending"),
         (("run", "paper", "--methods", "EC9"), "EC9"),

@@ -78,7 +78,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     assert coartic(*again, "--method-file", METHOD)[1].endswith("identical.\n")
     code, _, error = coartic(*again)
     assert code == 2
-    assert "unknown method 'nearest-hand'" in error
+    assert "unknown method 'nearest-hand': pass --method-file" in error
 
 
 FILES = {

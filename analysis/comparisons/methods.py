@@ -66,7 +66,7 @@ def described(study: Study, cell: CellRuns) -> dict[str, object]:
     best = None if locks_base(runs) else study.optima.get(cell.task)
     told = set(runs.told.iloc[0].split(", ")) if len(runs) else set()
     hands = tally(good.hands.value_counts().to_dict())
-    arm = "still" if keeps_still(good) else "moves"
+    arm = "still" if (numbers(good.other_arm_travel) <= STILL).all() else "moves"
     return {
         "task": cell.task,
         "label": cell.label,
@@ -112,11 +112,6 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     marked = np.where(solving > 0, solving, all_in_all)
     times = pd.Series(marked, runs.index, dtype=runs.solve_s.dtype)
     return times[warm] if warm.any() else times
-
-
-def keeps_still(good: pd.DataFrame) -> bool:
-    """Whether the arm that is not chosen stands still in every solution of these runs."""
-    return bool((numbers(good.other_arm_travel) <= STILL).all())
 
 
 def median(values: pd.Series) -> float:

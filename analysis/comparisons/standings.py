@@ -51,6 +51,12 @@ def ends(study: Study) -> dict[str, tuple[float, int]]:
     return by_task
 
 
+def optimum_in_words(study: Study) -> str:
+    """What gaps are to: where an optimum is not proven, it is the best known reward."""
+    proven = all(best.proven for best in study.optima.values())
+    return "optimum" if proven else "best known reward"
+
+
 @cached
 def gaps(study: Study) -> pd.DataFrame:
     """One row a run of every task of :func:`ends`.
@@ -100,12 +106,9 @@ def standings(study: Study) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
-Standing = tuple[str, str, float, float, float, int]
-"""Task, method, gap with its interval, and runs."""
-
-
-def over_all(study: Study) -> Iterator[Standing]:
-    """Methods with a solution to every run of every task, where there are several."""
+def over_all(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
+    """Methods with a solution to every run of every task, where there are several: ``all tasks``,
+    method, gap with its interval, and runs."""
     tasks = ends(study)
     for name, runs in gaps(study).groupby("method", sort=False):
         by_task = {str(task): of_task.gap.to_numpy() for task, of_task in runs.groupby("task")}
@@ -114,8 +117,8 @@ def over_all(study: Study) -> Iterator[Standing]:
             yield ALL_TASKS, str(name), gap.estimate, gap.low, gap.high, len(runs)
 
 
-def task_by_task(study: Study) -> Iterator[Standing]:
-    """Methods with a solution to every run of a task."""
+def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
+    """The same of methods with a solution to every run of a task."""
     for (task, label), cell in study.cells.items():
         has_gap = not math.isnan(method_rows(study).gap[task, label])
         if has_gap and len(cell.good) == len(cell.runs):

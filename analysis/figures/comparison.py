@@ -4,7 +4,7 @@ how rewards rise with trials."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from coartic import Task
 from coartic.analysis.comparisons.methods import GROUPS
 from coartic.analysis.comparisons.reached import WAY
-from coartic.analysis.comparisons.standings import ALL_TASKS, standings
+from coartic.analysis.comparisons.standings import ALL_TASKS, optimum_in_words, standings
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
 from coartic.analysis.methods import in_order, is_learner, name_of
@@ -45,20 +45,20 @@ def ranking(study: Study) -> Parts:
     size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
-        draw_group(axes, group, of_group)
+        draw_group(axes, group, of_group, style.looks(rows.method))
     farthest = percent[["gap", "high"]].max(axis=None)
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     where = "" if rows.task.iloc[0] == ALL_TASKS else f" on {rows.task.iloc[0]}"
-    panels[-1].set_xlabel(f"gap to the optimum{where} (%)")
+    panels[-1].set_xlabel(f"gap to the {optimum_in_words(study)}{where} (%)")
     alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
     return drawing, data, alt, study.tasks.values()
 
 
-def draw_group(axes: Axes, group: str, rows: pd.DataFrame) -> None:
+def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
     """Methods that know as much of the reward, nearest first."""
     axes.set_title(f"{group[0].upper()}{group[1:]}")
     for place, row in enumerate(rows.to_dict("records")):
-        color = style.look_of(row["method"])["color"]
+        color = looks[row["method"]]["color"]
         mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
         end = row["gap"]
         if not math.isnan(row["low"]):
@@ -96,7 +96,7 @@ def price(study: Study) -> Parts:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
-        draw_shares(axes, data[data.spend == spend])
+        draw_shares(axes, data[data.spend == spend], style.looks(data.method))
         axes.set_xlabel(PANELS[spend])
     panels[0].set_ylabel("targets reached (%)")
     style.letters(panels)
@@ -109,7 +109,7 @@ def price(study: Study) -> Parts:
     return drawing, data, alt, study.tasks.values()
 
 
-def draw_shares(axes: Axes, data: pd.DataFrame) -> None:
+def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
     """A step curve for each method."""
     style.log_axis(axes)
     positive = data.budget[data.budget > 0]
@@ -119,7 +119,7 @@ def draw_shares(axes: Axes, data: pd.DataFrame) -> None:
     for label, rows in data.groupby("method", sort=False):
         x = np.concatenate([rows.budget.clip(lower=edge), [most]])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
-        line: Any = {**style.look_of(str(label)), "linewidth": 1.3}
+        line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
         style.tip(drawn, f"{name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
     axes.set_xlim(edge, most)
@@ -154,7 +154,8 @@ def learning_curves(study: Study) -> Parts:
         style.entry(name_of(label), linewidth=1.3, **look)
         for label, look in style.looks(labels).items()
     ]
-    handles += [style.entry("initial", **style.INITIAL), style.entry("optimum", **style.OPTIMUM)]
+    handles += [style.entry("initial", **style.INITIAL)]
+    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")

@@ -15,7 +15,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.human import judge
 from coartic.analysis.human.measures import MODELS
-from coartic.analysis.methods import EC4, name_of
+from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import SMOOTH, horizon_beside
 from coartic.analysis.tables.studies import crossings as crossings_table
@@ -33,28 +33,33 @@ COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
     "horizon",
     "Gap of a planner by how far it looks ahead",
     "Gap to the best known solution, mean over random tasks with its "
-    f"{style.CONFIDENCE} interval (bootstrap over tasks), linear below 1 %. a: all tasks, by "
-    "family (thin), and other methods where the planner has the same gap on their tasks. "
-    "b: hands chosen by each plan, or those of the plan with all goals. c: joints that cost three "
-    "times as much, by weighted path length.",
+    f"{style.CONFIDENCE} interval (bootstrap over tasks), linear below 1 %. All tasks: also by "
+    "family (thin), and other methods where the planner has the same gap on their tasks. Given "
+    "hands: hands chosen by each plan, or those of the plan with all goals. Dear joints cost "
+    "three times as much, by weighted path length.",
 )
 def horizon(study: Study) -> Parts:
     """The curve over all tasks, with given hands, and with dear joints."""
     data = horizon_table(study)
     if not len(data):
         raise missing(study, "no runs of the planner on instances of a family of tasks")
-    drawing, panels = style.figure_of((1, 3), (style.TWO, 2.6), sharey=True)
-    everywhere, hands, costs = panels
+    titles = {"all": "all tasks", "hands": "given hands", "costs": "dear joints"}
+    groups = [group for group in titles if (data.group == group).any()]
+    drawing, panels = style.figure_of((1, len(groups)), (style.TWO, 2.6), sharey=True)
+    everywhere = panels[0]
     families = data[data.group == "family"]
     for color, (name, rows) in zip(style.PALETTE, families.groupby("value"), strict=False):
         line: Any = {"color": color, "linewidth": 0.7}
         everywhere.plot(rows.h.map(PLACES.index), 100 * rows.gap, **line, label=name)
-    for axes, group in ((everywhere, "all"), (hands, "hands"), (costs, "costs")):
+    for axes, group in zip(panels, groups, strict=True):
         parts = data[data.group == group].groupby("value", sort=False)
         for number, (color, (name, rows)) in enumerate(zip(COLORS, parts, strict=False)):
             curve(axes, rows, color, 0.08 * number, str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
+        axes.set_title(titles[group])
+        if axes is not everywhere:
+            axes.legend(loc="upper right")
     beside(everywhere, horizon_beside(study))
     everywhere.set_yscale("symlog", linthresh=1, linscale=0.6)
     everywhere.set_yticks(
@@ -62,10 +67,6 @@ def horizon(study: Study) -> Parts:
     )
     everywhere.set_ylim(bottom=-0.1)
     everywhere.set_ylabel("gap (%)")
-    for axes, title in zip(panels, ("all tasks", "given hands", "dear joints"), strict=True):
-        axes.set_title(title)
-        if axes is not everywhere and axes.lines:
-            axes.legend(loc="upper right")
     style.letters(panels)
     style.legend(drawing, everywhere.get_legend_handles_labels()[0], 5)
     of_all = data[data.group == "all"]
@@ -84,8 +85,9 @@ def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -
 def beside(axes: Axes, rows: pd.DataFrame) -> None:
     """Other methods at the horizons that they are equivalent to."""
     over_all = rows[rows.arms == "all"].to_dict("records")
+    looks = style.looks([row["method"] for row in over_all])
     for row, marker in zip(over_all, itertools.cycle("sD^v"), strict=False):
-        look = style.look_of(EC4 if row["method"] == "learner" else row["method"])
+        look = looks[row["method"]]
         at, gap = row["horizon"], 100 * row["gap"]
         thin: Any = {"color": look["color"], "linewidth": 0.8, "zorder": 4}
         axes.hlines(gap, row["horizon_low"], row["horizon_high"], **thin)

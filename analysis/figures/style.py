@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -73,26 +73,18 @@ Look = dict[str, Any]
 """How the lines of a method are drawn: ``color`` and ``linestyle``."""
 
 
-def looks(labels: Iterable[str]) -> dict[str, Look]:
-    """The look of each method: the project's own look the same in all figures."""
-    look_by_id = {
-        name: {"color": _COLORS[row.look[0]], "linestyle": _DASHES[row.look[1]]}
-        for name, row in KNOWN_METHODS.items()
-        if row.look is not None
-    }
-    free = itertools.cycle(
-        {"color": color, "linestyle": dash}
-        for dash, color in itertools.product(
-            (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
-        )
-    )
-    return {label: look_by_id.get(label) or next(free) for label in dict.fromkeys(labels)}
-
-
-def look_of(label: str) -> Look:
-    """Look of one method, the learner over all tasks like its two-armed condition."""
-    alike = look_alike(label)
-    return looks([alike])[alike]
+def looks(labels: Collection[str]) -> dict[str, Look]:
+    """The look of each method of a figure: those with a look of their own have it in all figures,
+    the learner over all tasks that of its two-armed condition."""
+    fixed = {}
+    for label in labels:
+        row = KNOWN_METHODS.get(look_alike(label))
+        if row is not None and row.look is not None:
+            fixed[label] = {"color": _COLORS[row.look[0]], "linestyle": _DASHES[row.look[1]]}
+    dashes, colors = (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
+    every = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
+    free = itertools.cycle(look for look in every if look not in fixed.values())
+    return {label: fixed.get(label) or next(free) for label in dict.fromkeys(labels)}
 
 
 def heading(task: Task) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import pandas as pd
@@ -56,6 +57,7 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
     drawing, panels = style.figure_of(
         (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
     )
+    drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0)
         draw_goals(axes, task)
@@ -63,7 +65,8 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
         variants = [other.label for other in tasks].count(task.label) > 1
         name = task.name if variants else task.label
-        axes.set_title(f"{name}\n{'; '.join(remarks)}".strip())
+        fits = int(13 * drawing.get_figwidth() / columns)  # letters
+        axes.set_title("\n".join([*textwrap.wrap(name, fits), "; ".join(remarks)]).strip())
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)

@@ -18,7 +18,9 @@
   const write = () => {
     const changed = controls.filter((control) => control.value !== atStart.get(control) && !control.closest("[hidden]"));
     const query = new URLSearchParams(changed.map((control) => [control.id, control.value])).toString();
-    const heading = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);
+    const typing = document.activeElement.type === "search" && document.activeElement.closest("section");
+    const inView = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);
+    const heading = (typing && typing.querySelector("h2")) || inView || changed.at(-1)?.closest(".touch, .player");
     const section = heading && heading.closest("section");
     const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
     const within = target && section && section.contains(target); // as a claim is
@@ -35,6 +37,10 @@
     clearTimeout(waiting);
     waiting = setTimeout(write, 200);
   };
+  /* Whoever unfolds a claim can send a link to it. */
+  document.querySelectorAll("tr[id] details").forEach((details) => details.addEventListener("toggle", () => {
+    if (details.open) window.history.replaceState(null, "", `#${details.closest("tr").id}`);
+  }));
   read();
   ["input", "change", "scroll"].forEach((kind) => window.addEventListener(kind, later));
 })();

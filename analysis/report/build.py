@@ -101,9 +101,14 @@ def plots(study: Study) -> dict[str, Plot]:
 
 
 def shown(study: Study) -> dict[str, dict[str, Any]]:
-    """Sections that are not about single tasks where these are many."""
-    alone = one_by_one(study)
-    return {name: row for name, row in SECTIONS.items() if alone or not row.get("single")}
+    """Sections but those about single tasks where these are many, and claims if none is decided."""
+    alone, claims = one_by_one(study), tables.claims(study)
+    decided = ((claims.verdict != "undecided") & (claims.run_ids != "")).any()
+    return {
+        name: row
+        for name, row in SECTIONS.items()
+        if (alone or not row.get("single")) and (decided or name != "claims")
+    }
 
 
 @cached
@@ -119,40 +124,20 @@ def sections(study: Study) -> list[dict[str, Any]]:
         if plot is None and not len(frame):
             continue
         of = getattr(facts, name)(study) if hasattr(facts, name) else None
-        words = {
-            "note": "",
-            **section,
-            "id": name,
-            "finding": "" if of is None else sentence(name, of),
+        table = {
+            "html": html_table(frame, section["table"], section["caption"]),
+            "searched": len(frame) > SEARCHED,
+            "example": f"'{frame.index[0]}'",
+        } if len(frame) else None  # fmt: skip
+        words = {"note": "", "finding": "" if of is None else sentence(name, of), **section}
+        inches = plot.figure.get_figwidth() if plot else 0.0
+        figure = plot and {
+            **{"id": plot.id, "title": plot.title, "caption": plot.caption},
+            **{"svg": svg_for_page(plot), "wide": inches > _PHONE},
+            "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
         }
-        figure = None if plot is None else figure_for_page(plot)
-        table = table_for_page(frame, section) if len(frame) else None
-        allowed.append({**words, "figure": figure, "table": table})
+        allowed.append({**words, "id": name, "figure": figure, "rows": table})
     return allowed
-
-
-def figure_for_page(plot: Plot) -> dict[str, Any]:
-    """A figure as the template wants it."""
-    inches = plot.figure.get_figwidth()
-    return {
-        "id": plot.id,
-        "title": plot.title,
-        "caption": plot.caption,
-        "svg": svg_for_page(plot),
-        "wide": inches > _PHONE,
-        "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
-    }
-
-
-def table_for_page(frame: pd.DataFrame, section: dict[str, Any]) -> dict[str, Any]:
-    """The table of a section as the template wants it."""
-    return {
-        "id": section["table"],
-        "caption": section["caption"],
-        "html": html_table(frame, section["table"], section["caption"]),
-        "searched": len(frame) > SEARCHED,
-        "example": f"'{frame.index[0]}'",
-    }
 
 
 def page(study: Study) -> str:
@@ -173,7 +158,7 @@ def page(study: Study) -> str:
         next_goal=next_goal(study),
         script=script,
         player=player.replace("<", "\\u003c"),
-        answers=answers(study),
+        answers=[answer for answer in answers(study) if answer["id"] in shown(study)],
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from shlex import quote
 from typing import Any
 
 from coartic.analysis import tables
@@ -156,6 +157,7 @@ def nearest(study: Study) -> Facts | None:
         "learner": {**by_trial[places[0]], "place": places[0] + 1} if places else None,
         "proven": sum(best.proven for best in optima),
         "tasks": len(optima),
+        "settings": sum(map(is_variant, tables.variants(study).method)),
     }
 
 
@@ -374,7 +376,7 @@ def provenance(study: Study) -> Facts:
     made_with = study.made_with
     return {
         "suite": study.suite,
-        "folder": study.folder,
+        "folder": quote(str(study.folder)),
         "runs": len(study.runs),
         "seed": study.plan.seed,
         "version": made_with["coartic"],

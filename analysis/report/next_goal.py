@@ -68,13 +68,15 @@ def store(study: Study) -> None:
 def next_goal(study: Study | None = None) -> str:
     """The figure as HTML, from a folder's own runs or from the stored ones."""
     shown = pd.DataFrame() if study is None else postures(study)
-    shown = pd.read_csv(STORED) if shown.empty else shown
+    is_example = shown.empty
+    shown = pd.read_csv(STORED) if is_example else shown
     task = load_task(TASK)
     low, high = box(task, shown[[*task.robot.joint_names]].to_numpy())
     high[1] = max(high[1], shown.y.max() + HANDLE)
     template = environment(escape=True).get_template("next_goal.html.jinja")
     return template.render(
         moves=[move_of(task, moved, runs) for moved, runs in shown.groupby("moved")],
+        is_example=is_example,
         radius=task.radius,
         handle=HANDLE,
         sight=[round(value, 2) for value in (low[0], -high[1], *(high - low))],

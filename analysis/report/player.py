@@ -40,8 +40,7 @@ def player_data(study: Study) -> dict[str, Any] | None:
     for name in (name for name in study.tasks if name in one_by_one(study)):
         task, unit = study.tasks[name], rounding_unit(study.tasks[name].robot)
         labels = [label for on, label in study.cells if on == name]
-        both = [*main_methods(labels), *(c for c in CONDITIONS if c in labels)]
-        shown = in_order(list(dict.fromkeys(both)))
+        shown = in_order([k for k in labels if k in (*CONDITIONS, *main_methods(labels))])
         on_task = []
         if (initial := initial_solution(task, study.model)) is not None:
             run = trajectory(task, initial.movements, study.model)
@@ -50,11 +49,9 @@ def player_data(study: Study) -> dict[str, Any] | None:
             runs = study.trajectories(name, label).runs
             if runs:
                 good = study.cells[name, label].good[: len(runs)]
-                index = typical_run(replace(study.cells[name, label], runs=good))
-                run_id = str(good.run_id.iloc[index])
-                on_task.append(
-                    movement_of(len(tasks), label, name_of(label), run_id, runs[index], unit)
-                )
+                k = typical_run(replace(study.cells[name, label], runs=good))
+                about = label, name_of(label), str(good.run_id.iloc[k])
+                on_task.append(movement_of(len(tasks), *about, runs[k], unit))
         if on_task:
             tasks.append(geometry_of(task, unit))
             movements += on_task
@@ -70,33 +67,29 @@ def player_json(study: Study) -> str:
 
 def views_of(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the player offers first: the same goal before two successors, before and after."""
-
     place = {(movement["on"], movement["label"]): k for k, movement in enumerate(movements)}
-    views = []
+    views: list[dict[str, Any]] = []
     shared, most = shared_goal(study), gain(study)
     if shared is not None:
-        both = [place.get((task.name, shared.method)) for task in shared.tasks]
-        if None not in both:
-            views.append(
-                {
-                    "name": "One goal, two successors",
-                    "watch": f"Both robots hit the same goal {shared.goal} first. Watch how their "
-                    "joints differ when it is hit, because the next goal lies elsewhere.",
-                    "show": both,
-                    "pause": shared.goal,
-                }
-            )
+        views.append(
+            {
+                "name": "One goal, two successors",
+                "watch": f"Both robots hit the same goal {shared.goal} first. Watch how their "
+                "joints differ when it is hit, because the next goal lies elsewhere.",
+                "show": [place.get((task.name, shared.method)) for task in shared.tasks],
+                "pause": shared.goal,
+            }
+        )
     if most is not None:
-        both = [place.get((most["task"], label)) for label in ("", most["label"])]
-        if None not in both:
-            views.append(
-                {
-                    "name": "Before and after learning",
-                    "watch": "The same task before and after learning. Watch how the learner "
-                    "prepares for a goal while it moves to the one before.",
-                    "show": both,
-                }
-            )
+        views.append(
+            {
+                "name": "Before and after learning",
+                "watch": "The same task before and after learning. Watch how the learner "
+                "prepares for a goal while it moves to the one before.",
+                "show": [place.get((most["task"], label)) for label in ("", most["label"])],
+            }
+        )
+    views = [view for view in views if None not in view["show"]]
     return views or [{"name": "Movements", "watch": "", "show": [0]}]
 
 

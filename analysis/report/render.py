@@ -14,7 +14,7 @@ import pandas as pd
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.tables import COLUMNS, Column
-from coartic.analysis.words import NONE, in_brackets, number
+from coartic.analysis.words import NARROW_SPACE, NONE, in_brackets, number
 from coartic.text import one_line
 
 _COMPANIONS = ("_low", "_high", "_sd")
@@ -57,7 +57,8 @@ def columns_of(frame: pd.DataFrame) -> dict[str, str]:
         if not name.endswith(_COMPANIONS) and column_of(name).page:
             header = column_of(name).header or name.replace("_", " ")
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
-            headers[name] = f"{header} [95 %]" if has_interval and "[" not in header else header
+            interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
+            headers[name] = f"{header}{interval}"
     return headers
 
 

@@ -52,14 +52,10 @@ def shown(text: str) -> str:
     return one_line(text).replace(" %", f"{words.NO_BREAK}%")
 
 
-def macros() -> Any:
-    """The macros of ``sentences.jinja`` by name."""
-    return environment(escape=False).get_template("sentences.jinja").module
-
-
 def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
-    text = str(getattr(macros(), name)(of)).replace("\n", " ")
+    macros = environment(escape=False).get_template("sentences.jinja").module
+    text = str(getattr(macros, name)(of)).replace("\n", " ")
     return shown(" ".join(part for part in text.split(" ") if part))
 
 

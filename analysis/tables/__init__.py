@@ -10,7 +10,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from coartic.analysis.tables.coarticulation import all_signatures, contexts, signatures, slopes
-from coartic.analysis.tables.comparison import learning, methods, price, ranking
+from coartic.analysis.tables.comparison import learning, methods, price, ranking, variants
 from coartic.analysis.tables.families import exploration, family_gaps, family_signs
 from coartic.analysis.tables.paper import claims, hands, published, tasks
 from coartic.analysis.tables.table import COLUMNS, TABLES, Column
@@ -21,5 +21,5 @@ for _module in iter_modules(__path__, f"{__name__}."):
 __all__ = [
     "COLUMNS", "TABLES", "Column", "all_signatures", "claims", "contexts", "exploration",
     "family_gaps", "family_signs", "hands", "learning", "methods", "price", "published",
-    "ranking", "signatures", "slopes", "tasks",
+    "ranking", "signatures", "slopes", "tasks", "variants",
 ]  # fmt: skip

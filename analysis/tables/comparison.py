@@ -76,9 +76,9 @@ def against_learner(study: Study) -> Rows:
 
 @table("method, knows, gap[], better, worse, on *, runs")
 def ranking(study: Study) -> Rows:
-    """Gap to the optimum over all tasks and on each, grouped by what methods know."""
+    """Gap to the optimum over all tasks and on each single one, grouped by what methods know."""
     rows = standings(study)
-    names = [name for name in study.tasks if name in set(rows.task)][:5]
+    single = {name for name, task in study.tasks.items() if task.family is None}
     named: list[tuple[str, Row]] = []
     for method, of_method in rows.groupby("method", sort=False):
         by_task = of_method.set_index("task")
@@ -90,7 +90,8 @@ def ranking(study: Study) -> Rows:
         labels = labels_of(study, str(method))
         row |= {
             f"on {task}": method_rows(study).gap[task, labels[task]] if task in labels else math.nan
-            for task in names
+            for task in ends(study)
+            if task in single
         }
         tested = against_learner(study)
         tested = tested[tested.index.isin([f"{task} {label}" for task, label in labels.items()])]

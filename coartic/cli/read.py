@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -62,6 +63,7 @@ def trace(
 ) -> None:
     """Name the runs behind a row of a report's table."""
     from coartic.analysis.report.trace import runs_of, tables_of
+    from coartic.benchmarks.registry import registry
 
     tables = tables_of(folder)
     if table is None:
@@ -73,11 +75,14 @@ def trace(
     if row is None:
         say(*values)
         return
-    say_pairs([(name, text) for name, _, text in (line.partition(": ") for line in values)])
-    results = tables[table].parents[2]
+    pairs = [(name, text) for name, _, text in (line.partition(": ") for line in values)]
+    methods = {text.split()[0] for name, text in pairs if name == "method"}
+    file = "" if methods <= {*registry(), "dual-process"} else " --method-file FILE"
+    results = quote(str(tables[table].parents[2]))
+    say_pairs(pairs)
     say(
         f"{counted(len(runs), 'run')}:",
-        *(f"coartic reproduce {run} --in {results}" for run in runs),
+        *(f"coartic reproduce {run} --in {results}{file}" for run in runs),
     )
 
 

@@ -123,20 +123,24 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import methods_named, suites
     from coartic.tasks.families import families
+    from coartic.tasks.task import address_of
 
     if name in suites():
         suite = suites()[name]
         yield "Suite", f"{name}: {suite.title}"
         yield "", suite.description
-        yield "Runs", f"{suite.runs} of each cell, {suite.trials or 'no'} trials a run"
+        runs = sorted({block.runs or suite.runs for block in suite.cells})
+        counts = " or ".join(map(str, runs))
+        yield "Runs", f"{counts} of each cell, {suite.trials or 'no'} trials a run"
         yield "Run it", f"coartic run {name}"
-    elif name in builtin_tasks():
+    elif name in builtin_tasks() or address_of(name):
         task = load_task(name)
         yield "Task", f"{name}: {task.description}"
         yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
-        yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
+        source = "reconstructed" if task.reconstructed else "printed in the paper"
+        yield "Goals are", "drawn at random" if task.family else source
     elif name in families() or f"{name}/v1" in families():
         family = families().get(name) or families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
@@ -180,6 +184,8 @@ def reproduce(
 
     _, stored = find_run(run_id, folder)
     run, registered = stored.run, registry(method_file or [])
+    if stored.method not in registered:
+        raise CoarticError(f"unknown method {stored.method!r}: pass --method-file FILE")
     result = f"reward {run.row['reward']}, hands {run.row['hands']}"
     say_pairs(
         [
@@ -214,7 +220,9 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
         try:
             names = methods_named(subject, registered)
         except CoarticError as error:
-            raise CoarticError(f"{error} A task is checked by its file.") from None
+            raise CoarticError(
+                f"{error} A task is checked by its file, which `coartic draw` writes."
+            ) from None
         broken = sum(show_laws(name, check_method(registered[name])) for name in names)
     if broken:
         sys.exit(1)
