@@ -1,4 +1,4 @@
-"""An exact planner that looks a fixed number of goals ahead.
+"""A planner that looks a fixed number of goals ahead.
 
 From where the robot stands it finds the shortest movements through the next goals, ``horizon``
 beyond the one to be hit, over all hand sequences. It makes the first of them, stands where that
