@@ -117,20 +117,13 @@ def fewest_ticks(
             for rounded in rounding.every(shortest, merged):
                 if not worth(rounded.ticks):
                     continue
-                planned, evaluations = movements(
-                    task,
-                    rounded.hands,
-                    rounded.configurations,
-                    instance.held,
-                    session.model,
-                    rounded.steps,
-                )
+                planned = movements(session, task, instance, rounded.configurations, rounded.steps)
                 execution = execute(task, planned, model=session.model)
-                session.spend(forward_kinematics=evaluations + execution.evaluations)
+                session.spend(forward_kinematics=execution.evaluations)
                 if execution.completed and (
                     fewest is None or price(execution) < price(fewest.execution)
                 ):
-                    fewest = PlanInTicks(tuple(planned), execution, shortest)
+                    fewest = PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
         session.spend(**rounding.spent)

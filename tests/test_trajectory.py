@@ -84,9 +84,9 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
     graph = PostureGraph.sampled(task, 60, np.random.default_rng(0))
-    (chain,) = graph.chains(hands)
+    ((_, chain),) = graph.chains(hands)
     problem = trajectory_problem(task.robot, task.hands, 2, cost)
-    plan = problem.solve(instance, chain.configurations)
+    plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
     free = ~instance.held
 
@@ -194,9 +194,8 @@ def test_whole_ticks_are_what_is_executed():
         plan = problem.solve(instance, corrective_trial(task, hands).configurations)
         rounding = Rounding(problem, instance, PAPER.step)
         rounded = rounding.nearest(plan)
-        solution, _ = movements(
-            task, rounded.hands, rounded.configurations, instance.held, PAPER, rounded.steps
-        )
+        session = Session(task, 0, ())
+        solution = movements(session, task, instance, rounded.configurations, rounded.steps)
         execution = execute(task, solution)
         assert execution.corrections == 0
         assert execution.ticks <= rounded.ticks
