@@ -161,7 +161,7 @@ class _Search:
         values = [centre.values + noise for centre, (_, noise) in zip(centres, drawn, strict=True)]
         than = np.array([centre.reward for centre in centres])
         masks = [centre.mask for centre in centres]
-        attempt = self._practice.until_better([hands for hands, _ in drawn], masks, values, than)
+        attempt = self._practice.by_targets([hands for hands, _ in drawn], masks, values, than)
         last = len(attempt.rewards) - 1
         moves = bool(attempt.rewards[last] > than[last])
         if moves:

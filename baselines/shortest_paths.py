@@ -106,7 +106,7 @@ def fewest_ticks(
         return fewest is None or ticks < fewest.execution.ticks
 
     for instance, plan in plans.ranked:
-        rounding = Rounding(problem, instance, session.model.step)
+        rounding = Rounding(session, problem, instance)
         # A merger saves one tick a goal and never shortens the path.
         most = len(instance.hands)
         if not worth(rounding.least(plan) - most):
@@ -126,7 +126,6 @@ def fewest_ticks(
                     fewest = PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
-        session.spend(**rounding.spent)
     if fewest is None:
         raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
     return fewest

@@ -259,9 +259,7 @@ class PathLength(TrajectoryOptimisation):
         if not self.parameters.whole_ticks:
             return super().movements_of(session, task, instance, plan)
         problem = self.problem(task)
-        rounding = Rounding(problem, instance, session.model.step)
-        rounded = rounding.nearest(plan)
-        session.spend(**rounding.spent)
+        rounded = Rounding(session, problem, instance).nearest(plan)
         if rounded is None:  # aimed inside the discs it is a plan all the same
             inside = replace(instance, radius=super().target_radius(session, task))
             plan = problem.solve(inside, plan.configurations)

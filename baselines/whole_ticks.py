@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -44,14 +44,14 @@ class TickPlan:
 
 
 class Rounding:
-    """Rounds plans of one problem and instance, and keeps count of the solver.
+    """Rounds plans of one problem and instance; the session spends what the solver takes.
 
     ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
     """
 
-    def __init__(self, problem: TrajectoryProblem, instance: Instance, step: float) -> None:
-        self._problem, self._instance, self._step = problem, instance, step
-        self.spent: Counter[str] = Counter()
+    def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
+        self._session, self._problem, self._instance = session, problem, instance
+        self._step = session.model.step
 
     def nearest(self, plan: Plan) -> TickPlan | None:
         """Every segment but the last rounded to the nearest step, the last one up.
@@ -142,7 +142,7 @@ class Rounding:
             held[list(merged)] = True
             instance = replace(instance, held=held)
         plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
-        self.spent.update(plan.spent)
+        self._session.spend(**plan.spent)
         return plan
 
 

@@ -91,7 +91,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     free = ~instance.held
 
     def configurations(x):
-        steps = np.zeros_like(chain.configurations)
+        steps = np.zeros_like(chain)
         steps[free] = x
         return task.q0 + np.cumsum(steps, axis=0)
 
@@ -109,7 +109,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
         ]
 
     rng = np.random.default_rng(1)
-    start = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)[free]
+    start = np.diff(np.vstack([task.q0, chain]), axis=0)[free]
     optimum = minimize(
         objective,
         start + 0.1 * rng.standard_normal(start.shape),
@@ -192,9 +192,9 @@ def test_whole_ticks_are_what_is_executed():
         instance = Instance.of(task, sequence, still=True, radius=task.radius)
         problem = trajectory_problem(task.robot, task.hands, len(hands), "path-length")
         plan = problem.solve(instance, corrective_trial(task, hands).configurations)
-        rounding = Rounding(problem, instance, PAPER.step)
-        rounded = rounding.nearest(plan)
         session = Session(task, 0, ())
+        rounding = Rounding(session, problem, instance)
+        rounded = rounding.nearest(plan)
         solution = movements(session, task, instance, rounded.configurations, rounded.steps)
         execution = execute(task, solution)
         assert execution.corrections == 0

@@ -425,12 +425,9 @@ def named_by(text: str) -> list[str]:
 
 def families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
-    return {name: read_family(path) for name, path in family_files().items()}
-
-
-def family_files() -> dict[str, Path]:
-    """Files of the shipped families by name with version."""
-    return {family_name(path): path for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))}
+    return {
+        family_name(path): read_family(path) for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))
+    }
 
 
 def family_name(path: Path) -> str:
@@ -440,10 +437,10 @@ def family_name(path: Path) -> str:
 
 def load_family(name: str) -> Family:
     """A family by name with version, as ``two-armed/v1``. Raises TaskError."""
-    files = family_files()
-    if name not in files:
-        raise TaskError(unknown("family", name, files))
-    return read_family(files[name])
+    shipped = families()
+    if name not in shipped:
+        raise TaskError(unknown("family", name, shipped))
+    return shipped[name]
 
 
 @cache
