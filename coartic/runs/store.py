@@ -543,19 +543,14 @@ def check_place(folder: Path) -> None:
         )
 
 
-def connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """A connection to a path or a ``file:`` address, which waits so long for a lock."""
+@contextmanager
+def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+    """A connection to a path or a ``file:`` address, which waits so long for a lock; it stays
+    open, unless something is wrong with it."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
     connection.row_factory = sqlite3.Row
-    return connection
-
-
-@contextmanager
-def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
-    """A connection that stays open, unless something is wrong with it."""
-    connection = connect(where, timeout_s)
     try:
         yield connection
     except BaseException:
