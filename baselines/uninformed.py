@@ -56,8 +56,7 @@ class Practice:
 
     def by_correction(self, hands: str) -> Trials:
         """One trial by **A** alone."""
-        shape = (1, self._session.goals_count, self._session.dof)
-        return self._make([hands], np.full(shape, np.nan))
+        return self.by_targets([hands], [self.explored(hands)], [np.array(np.nan)])
 
     def by_targets(
         self,
@@ -74,7 +73,15 @@ class Practice:
         targets = np.full((len(hands), *masks[0].shape), np.nan)
         for target, mask, value in zip(targets, masks, values, strict=True):
             target[mask] = value
-        return self._make(hands, targets, until)
+        trials = self._session.trials(hands, targets, until=until)
+        rewards = trials.rewards
+        best = int(rewards.argmax())
+        if rewards[best] > self.reward:
+            self.reward, self.hands = float(rewards[best]), hands[best]
+            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
+        self.trials_made += len(rewards)
+        self.left -= len(rewards)
+        return trials
 
     def result(self, **details: Any) -> Result:
         """The best trial's movements; MethodError where no trial hit every goal."""
@@ -89,14 +96,3 @@ class Practice:
             )
         movements = movements_of(self.hands, self._targets)
         return Result(movements, {"best_trial": self._best_trial, **details})
-
-    def _make(self, hands: list[str], targets: Array, until: Array | None = None) -> Trials:
-        trials = self._session.trials(hands, targets, until=until)
-        rewards = trials.rewards
-        best = int(rewards.argmax())
-        if rewards[best] > self.reward:
-            self.reward, self.hands = float(rewards[best]), hands[best]
-            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
-        self.trials_made += len(rewards)
-        self.left -= len(rewards)
-        return trials

@@ -163,10 +163,6 @@ class Family(FileData):
     bent: Parts = 200
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
-    def key(self, stream: str) -> tuple[int, int]:
-        """Of the generator, for the instances of a stream."""
-        return key_of(f"coartic {self.name}/{stream}")
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -288,7 +284,7 @@ def corrective_hands(candidate: Candidate) -> str | None:
 def candidate_of(address: Address, attempt: int) -> Candidate:
     """What is drawn for an instance at the given attempt, from 0. Raises TaskError."""
     family = load_family(address.family)
-    key = family.key(address.stream)
+    key = key_of(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
     count, links = structure.integer(*family.goals), structure.integer(*family.links)
     base, postures = structure.one_of(family.base), structure.one_of(family.start)
