@@ -337,12 +337,7 @@ class Jerk(Acceleration):
     cost = "jerk"
 
 
-METHODS: tuple[type[TrajectoryOptimisation], ...] = (
-    PathLength,
-    SquaredChanges,
-    Acceleration,
-    Jerk,
-)
+METHODS: tuple[type[Method], ...] = (PathLength, SquaredChanges, Acceleration, Jerk)
 
 
 def with_stops(rates: Array, stop: float, every: int) -> Array:
