@@ -189,8 +189,8 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch):
-    connect = store_module.connect
-    monkeypatch.setattr(store_module, "connect", lambda where, _: connect(where, 0.01))
+    opened = store_module.opened
+    monkeypatch.setattr(store_module, "opened", lambda where, _: opened(where, 0.01))
     plan = planned(ONE, **FEW)
     busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
     with writing(tmp_path):
