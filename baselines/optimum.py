@@ -166,7 +166,7 @@ class BranchAndBound(DynamicProgramming):
             )
         session.spend(solver_iterations=certificate.iterations)
         return -certificate.ticks, {
-            "proven_optimal": certificate.proven,
+            "proven_optimal": certificate.ticks == ticks,
             "nodes": certificate.nodes,
             "open_nodes": certificate.open_nodes,
             "ticks_left": ticks - certificate.ticks,

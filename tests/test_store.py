@@ -252,8 +252,14 @@ def foreign(path):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (sql(f"PRAGMA user_version = {FORMAT + 1}"), "newer version.*update coartic"),
-        (sql(f"PRAGMA user_version = {FORMAT - 1}"), "older version.*another --out"),
+        (
+            sql(f"PRAGMA user_version = {FORMAT + 1}"),
+            "this version.*reads.*update coartic",
+        ),
+        (
+            sql(f"PRAGMA user_version = {FORMAT - 1}"),
+            "this version.*reads.*another --out",
+        ),
         (foreign, "is not a file of coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),

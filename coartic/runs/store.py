@@ -563,11 +563,9 @@ def has_our_tables(connection: sqlite3.Connection, folder: Path) -> bool:
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application == _APPLICATION and version != FORMAT:
-        age, do = ("newer", "update coartic") if version > FORMAT else ("older", "choose another")
+        do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(
-            f"{folder / FILE} was written by a{'n' * (age == 'older')} {age} version of coartic "
-            f"(format {version}; this version reads {FORMAT}); "
-            + (do if age == "newer" else "run the suite again with another --out")
+            f"{folder / FILE} has format {version}; this version of coartic reads {FORMAT}: {do}"
         )
     if application != _APPLICATION:
         tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
