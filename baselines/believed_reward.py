@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -28,7 +28,7 @@ from coartic.baselines.posture_graph import Start, cheapest_chains
 from coartic.baselines.shortest_paths import TOLD, ShortestPlans, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.baselines.whole_ticks import movements
-from coartic.learner.conditions import CONDITIONS, ExplorationCondition
+from coartic.learner.conditions import CONDITIONS
 from coartic.learner.method import DualProcess, DualProcessParameters
 from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.model import PAPER, MotionModel
@@ -71,24 +71,21 @@ def planned(
     believed = with_belief(task, parameters.belief)
     with session.solving():
         plain = believed.model_copy(update={"penalty": None})
-        plans, spent = shortest(plain.model_dump_json(), search_of(parameters), session.model)
+        how_long = parameters.model_dump(include={"nodes", "graphs", "starts", "sampling_seed"})
+        search = BeliefParameters(**how_long)  # the same for every belief
+        plans, spent = shortest(plain.model_dump_json(), search, session.model)
         session.spend(**spent)
         if believed.penalty is not None:
             known = [(i.hands, plan.configurations) for i, plan in plans.ranked[:MOST_EXECUTED]]
-            plans = cheapest(session, believed, search_of(parameters), known)
+            plans = cheapest(session, believed, search, known)
         best: Execution | None = None
         for instance, plan in plans.ranked[:MOST_EXECUTED]:
             steps = np.ceil(plan.lengths(task.q0) / session.model.step).astype(int)
-            solution, evaluations = movements(
-                task,
-                instance.hands,
-                plan.configurations,
-                instance.held,
-                session.model,
-                tuple(steps.tolist()),
+            solution = movements(
+                session, task, instance, plan.configurations, tuple(steps.tolist())
             )
             execution = execute(believed, solution, model=session.model)
-            session.spend(forward_kinematics=evaluations + execution.evaluations)
+            session.spend(forward_kinematics=execution.evaluations)
             if execution.reward is not None and (
                 best is None or best.reward is None or execution.reward > best.reward
             ):
@@ -103,23 +100,9 @@ def planned(
     return best.movements, details
 
 
-class Search(NamedTuple):
-    """How long is searched, and from which random numbers: see :class:`BeliefParameters`."""
-
-    nodes: int
-    graphs: int
-    starts: int
-    sampling_seed: int
-
-
-def search_of(parameters: BeliefParameters) -> Search:
-    """The parameters of the search."""
-    return Search(*(getattr(parameters, name) for name in Search._fields))
-
-
 @lru_cache(maxsize=64)
 def shortest(
-    task_json: str, search: Search, model: MotionModel
+    task_json: str, search: BeliefParameters, model: MotionModel
 ) -> tuple[ShortestPlans, dict[str, int]]:
     """The shortest plans of a task without a penalty, given as JSON, and what they took.
 
@@ -132,7 +115,7 @@ def shortest(
 
 
 def cheapest(
-    session: Session, believed: Task, search: Search, known: Sequence[Start]
+    session: Session, believed: Task, search: BeliefParameters, known: Sequence[Start]
 ) -> ShortestPlans:
     """The plans of least path length and penalty, from ``known`` starts and from chains."""
     penalty = believed.penalty
@@ -200,9 +183,13 @@ class BelievedReward(Method):
         return Result(*planned(session, session.hand_over(*self.told), self.parameters))
 
 
-class LearnerFromPlan(DualProcess):
-    """The learner whose trial 0 is a plan."""
+class FromPlanEC1(DualProcess):
+    """The learner whose trial 0 is a plan, under exploration condition 1."""
 
+    name = "believed-reward/EC1"
+    title = "Dual-process learner from a plan, exploration condition 1"
+    told = KNOWS
+    condition = CONDITIONS["EC1"]
     Parameters = LearnerParameters
     quick: ClassVar[dict[str, Any]] = BelievedReward.quick
 
@@ -215,23 +202,12 @@ class LearnerFromPlan(DualProcess):
         return plan
 
 
-def from_plan(condition: ExplorationCondition) -> type[LearnerFromPlan]:
-    """The learner from a plan under an exploration condition."""
-    return type(
-        f"LearnerFromPlan{condition.id}",
-        (LearnerFromPlan,),
-        {
-            "__doc__": LearnerFromPlan.__doc__,
-            "__module__": __name__,
-            "name": f"believed-reward/{condition.id}",
-            "title": f"Dual-process learner from a plan, exploration condition {condition.id[2:]}",
-            "told": KNOWS,
-            "condition": condition,
-        },
-    )
+class FromPlanEC4(FromPlanEC1):
+    """The same under exploration condition 4."""
+
+    name = "believed-reward/EC4"
+    title = "Dual-process learner from a plan, exploration condition 4"
+    condition = CONDITIONS["EC4"]
 
 
-METHODS: tuple[type[Method], ...] = (
-    BelievedReward,
-    *(from_plan(CONDITIONS[name]) for name in ("EC1", "EC4")),
-)
+METHODS: tuple[type[Method], ...] = (BelievedReward, FromPlanEC1, FromPlanEC4)

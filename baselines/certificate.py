@@ -51,8 +51,6 @@ class Certificate:
 
     ticks: int
     """No solution takes fewer; the reward of any is at most minus this."""
-    proven: bool
-    """Whether that is the number of ticks that was to be proven least."""
     nodes: int
     """Cone programmes solved."""
     open_nodes: int
@@ -150,7 +148,6 @@ def certify(
     least = max(least, math.ceil(search.heap[0].ticks - 1e-9) if search.heap else ticks)
     return Certificate(
         ticks=min(least, ticks),
-        proven=least >= ticks,
         nodes=search.solved,
         open_nodes=len(search.heap),
         iterations=search.iterations,

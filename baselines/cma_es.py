@@ -73,11 +73,13 @@ class Strategy:
         if self._restarts < 0 or self._evolution.stop():
             self._restart()
         values = np.array(self._evolution.ask())[: self._practice.left]
-        rewards = self._practice.by_targets(self.hands, self._mask, values).rewards
+        count = len(values)
+        trials = self._practice.by_targets([self.hands] * count, [self._mask] * count, values)
+        rewards = trials.rewards
         self.generations += 1
-        self.trials += len(values)
+        self.trials += count
         self.reward = max(self.reward, float(rewards.max()))
-        if len(values) == self._evolution.popsize:
+        if count == self._evolution.popsize:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
             self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst).tolist())

@@ -12,13 +12,7 @@ import warnings
 import cvxpy as cp
 import numpy as np
 
-from coartic.baselines.cascade import (
-    DAMPING,
-    LIMIT,
-    SLACK,
-    Cascade,
-    CascadeError,
-)
+from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, Cascade, CascadeError
 from coartic.robot import Array
 
 

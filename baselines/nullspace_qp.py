@@ -378,19 +378,15 @@ class NullspaceQP(Method):
         """``goal`` (0-based), and what is prepared for on the way there."""
         return (Aim(hands[goal], goal),)
 
-    def cascade(self, joints: int) -> Cascade:
-        """The solver of every control step."""
-        return cascade_for(FACES, joints, self.parameters.modelling)
-
     def solve(self, session: Session) -> Result:
         """Simulate the candidate hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
+        parameters, joints = self.parameters, task.robot.dof - len(task.locked_base)
         try:
             with session.building():
-                cascade = self.cascade(task.robot.dof - len(task.locked_base))
+                cascade = cascade_for(FACES, joints, parameters.modelling)
         except CascadeError as error:
             raise MethodError("solver-failed", str(error)) from None
-        parameters = self.parameters
         controller = Controller(
             session,
             task,

@@ -20,15 +20,8 @@ from pydantic import Field
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import Start, cheapest_chains
-from coartic.baselines.shortest_paths import (
-    TOLD,
-    check_ticks,
-    fewest_ticks,
-    shortest_plans,
-)
-from coartic.baselines.trajectory_problem import (
-    trajectory_problem,
-)
+from coartic.baselines.shortest_paths import TOLD, check_ticks, fewest_ticks, shortest_plans
+from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.corrective import correct
 from coartic.motion.initial import hand_sequences, too_many_sequences
@@ -173,7 +166,7 @@ class BranchAndBound(DynamicProgramming):
             )
         session.spend(solver_iterations=certificate.iterations)
         return -certificate.ticks, {
-            "proven_optimal": certificate.proven,
+            "proven_optimal": certificate.ticks == ticks,
             "nodes": certificate.nodes,
             "open_nodes": certificate.open_nodes,
             "ticks_left": ticks - certificate.ticks,

@@ -285,8 +285,12 @@ class Planner:
                 self.generate([search for choices in searches for search in choices], ahead)
             )
             for plan, choices in zip(plans, filter(None, searches), strict=True):
-                chain = min(itertools.islice(chains, len(choices)), key=lambda chain: chain[0])
-                self.adopt(plan, chain)
+                cheapest = min(itertools.islice(chains, len(choices)), key=lambda chain: chain[0])
+                _, (hand, *_), postures = cheapest
+                plan.store = np.vstack([plan.store, postures])
+                plan.movements.append(Movement(goal + 1, hand, "planned", postures[0]))
+                plan.q, spent = self.simulate(plan.q, postures[0], hand, goal)
+                plan.ticks.append(spent)
         return plans
 
     def goals_ahead(self, goal: int) -> range:
@@ -343,15 +347,6 @@ class Planner:
             f"goal {goal + 1}: no correction of any of {len(plan.store)} stored postures "
             f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
         )
-
-    def adopt(self, plan: GrowingPlan, chain: PostureChain) -> None:
-        """Make the first movement of a chain, and store its postures."""
-        goal, (_, hands, postures) = len(plan.movements), chain
-        hand, target = hands[0], postures[0]
-        plan.store = np.vstack([plan.store, postures])
-        plan.movements.append(Movement(goal + 1, hand, "planned", target))
-        plan.q, spent = self.simulate(plan.q, target, hand, goal)
-        plan.ticks.append(spent)
 
     def most_promising(self, q: Array, hands: Hands, layers: list[Array]) -> Array:
         """Second aspect: of the retrieved postures those that are cheapest, one a goal."""

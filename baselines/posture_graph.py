@@ -31,17 +31,6 @@ _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
 
 
-@dataclass(frozen=True)
-class Chain:
-    """The cheapest chain of nodes for one hand sequence."""
-
-    hands: tuple[Hand, ...]
-    length: float
-    """Joint-space path length, length unit and rad."""
-    configurations: Array
-    """Configuration at each goal, shape ``(G, dof)``."""
-
-
 def sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
@@ -137,7 +126,7 @@ class PostureGraph:
 
     def chains(
         self, only: tuple[Hand, ...] | None = None, most: int | None = None
-    ) -> Iterator[Chain]:
+    ) -> Iterator[Start]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
         ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
@@ -147,12 +136,9 @@ class PostureGraph:
         begun = Beginning(
             (), dict.fromkeys(HANDS, np.array(self.task.q0)[None, :]), np.zeros((1, 1)), ()
         )
-        if only is not None or most is None or len(self.task.hands) ** len(self.task.goals) <= most:
-            yield from self.every_chain(begun, only)
-            return
         kept = [begun]
         for _ in range(len(self.task.goals)):
-            longer = [more for beginning in kept for more in self.longer(beginning, None)]
+            longer = [more for beginning in kept for more in self.longer(beginning, only)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
         for complete in kept:
@@ -168,14 +154,6 @@ class PostureGraph:
                     f"{' or the '.join(hands)} hand inside its disc"
                 )
         return ""
-
-    def every_chain(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Chain]:
-        """All chains that begin so, one after another: they share what they begin with."""
-        if len(begun.hands) == len(self.task.goals):
-            yield self.chain_of(begun)
-            return
-        for longer in self.longer(begun, only):
-            yield from self.every_chain(longer, only)
 
     def longer(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
@@ -231,7 +209,7 @@ class PostureGraph:
             by_arm += penalty.distinct * np.maximum(1.0 - way / penalty.apart, 0.0)
         return by_base * PAPER.step, by_arm * PAPER.step
 
-    def chain_of(self, complete: Beginning) -> Chain:
+    def chain_of(self, complete: Beginning) -> Start:
         """The cheapest chain of a whole sequence."""
         hands, cost, back = complete.hands, complete.cost, complete.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
@@ -247,7 +225,7 @@ class PostureGraph:
             q[:BASE_DOF] = node[:BASE_DOF]
             q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
             configurations.append(q)
-        return Chain(hands, float(cost.min()), np.array(configurations))
+        return hands, np.array(configurations)
 
 
 def cheapest_chains(
@@ -279,23 +257,23 @@ def cheapest_chains(
         missing = graph.why_none(only)
         if missing:
             raise MethodError("infeasible", missing)
-        for chain in graph.chains(only, most):
+        for hands, configurations in graph.chains(only, most):
             yielded += 1
-            yield chain.hands, chain.configurations
+            yield hands, configurations
             if spread and len(task.hands) > 1:
-                yield chain.hands, spread_out(task, chain)
+                yield hands, spread_out(task, hands, configurations)
         if number >= graphs and yielded >= chains:
             return
 
 
-def spread_out(task: Task, chain: Chain) -> Array:
+def spread_out(task: Task, hands: Hands, chain: Array) -> Array:
     """A chain's configurations with each arm moving steadily between the goals it hits."""
-    configurations = chain.configurations.copy()
+    configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)
-        used = [0, *(g for g, chosen in enumerate(chain.hands, 1) if chosen == hand)]
-        corners = np.vstack([task.q0, chain.configurations])[used, joints]
-        at = np.arange(1, len(chain.hands) + 1)
+        used = [0, *(g for g, chosen in enumerate(hands, 1) if chosen == hand)]
+        corners = np.vstack([task.q0, chain])[used, joints]
+        at = np.arange(1, len(hands) + 1)
         configurations[:, joints] = np.stack(
             [np.interp(at, used, joint) for joint in corners.T], axis=1
         )

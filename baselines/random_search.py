@@ -57,7 +57,7 @@ class Pure(Method):
 
     def solve(self, session: Session) -> Result:
         """Every hand sequence is drawn with the same probability."""
-        return _search(session, self.parameters, 1.0, climbs=False)
+        return _Search(session, self.parameters, 1.0, climbs=False).result()
 
 
 class Climbing(Method):
@@ -75,46 +75,33 @@ class Climbing(Method):
     def solve(self, session: Session) -> Result:
         """Hands are drawn around the best sequence known."""
         parameters: ClimbingParameters = self.parameters
-        return _search(session, parameters, parameters.epsilon, climbs=True)
-
-
-def _search(
-    session: Session,
-    parameters: UninformedParameters,
-    epsilon: float,
-    *,
-    climbs: bool,
-) -> Result:
-    first_hands = session.find_initial_hands()
-    practice = Practice(session, parameters)
-    search = _Search(session, practice, parameters.sigma, epsilon, climbs)
-    with session.solving():
-        search.run(first_hands)
-    return practice.result(sequences=len(search.centres))
+        return _Search(session, parameters, parameters.epsilon, climbs=True).result()
 
 
 class _Search:
     """The centres, and the next trials around them."""
 
     def __init__(
-        self,
-        session: Session,
-        practice: Practice,
-        sigma: float,
-        epsilon: float,
-        climbs: bool,
+        self, session: Session, parameters: UninformedParameters, epsilon: float, *, climbs: bool
     ) -> None:
-        self._rng, self._practice = session.rng, practice
+        self._session, self._rng = session, session.rng
+        self._first_hands = session.find_initial_hands()
+        self._practice = Practice(session, parameters)
         self._letters = [hand[0].upper() for hand in session.hands]
-        self._goals = session.goals_count
-        self._sigma, self._epsilon, self._climbs = sigma, epsilon, climbs
+        self._sigma, self._epsilon, self._climbs = parameters.sigma, epsilon, climbs
         self.centres: dict[str, _Centre] = {}
         self._hopeless: set[str] = set()  # A alone does not complete them, ever
 
-    def run(self, hands: str) -> None:
-        """Make trials, the first with ``hands``, until none is left or none can succeed."""
-        most, ahead = len(self._letters) ** self._goals, 1
-        following: str | None = hands
+    def result(self) -> Result:
+        """The best of all trials."""
+        with self._session.solving():
+            self._run()
+        return self._practice.result(sequences=len(self.centres))
+
+    def _run(self) -> None:
+        """Make trials until none is left or none can succeed."""
+        most, ahead = len(self._letters) ** self._session.goals_count, 1
+        following: str | None = self._first_hands
         while self._practice.left > 0 and len(self._hopeless) < most:
             best = self._practice.hands
             hands = self._draw(best) if following is None else following
@@ -161,7 +148,7 @@ class _Search:
         values = [centre.values + noise for centre, (_, noise) in zip(centres, drawn, strict=True)]
         than = np.array([centre.reward for centre in centres])
         masks = [centre.mask for centre in centres]
-        attempt = self._practice.until_better([hands for hands, _ in drawn], masks, values, than)
+        attempt = self._practice.by_targets([hands for hands, _ in drawn], masks, values, than)
         last = len(attempt.rewards) - 1
         moves = bool(attempt.rewards[last] > than[last])
         if moves:
@@ -177,7 +164,7 @@ class _Search:
                 letters[rng.integers(len(letters))]
                 if not best or rng.random() < self._epsilon
                 else best[goal]
-                for goal in range(self._goals)
+                for goal in range(self._session.goals_count)
             )
             if hands not in self._hopeless:
                 return hands

@@ -202,11 +202,9 @@ def remaining(task: Task, q: Array, first: int, end: int) -> Task:
 def shortest_as_it_is(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
     """The shortest plan without rounding; its movements end with the first step inside a disc."""
     instance, plan = plans.ranked[0]
-    planned, evaluations = movements(
-        task, instance.hands, plan.configurations, instance.held, session.model
-    )
+    planned = movements(session, task, instance, plan.configurations)
     execution = execute(task, planned, model=session.model)
-    session.spend(forward_kinematics=evaluations + execution.evaluations)
+    session.spend(forward_kinematics=execution.evaluations)
     if not execution.completed:
         raise MethodError("solver-failed", f"a movement missed its goal: {execution.reason}")
-    return PlanInTicks(tuple(planned), execution, plan)
+    return PlanInTicks(planned, execution, plan)

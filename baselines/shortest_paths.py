@@ -106,7 +106,7 @@ def fewest_ticks(
         return fewest is None or ticks < fewest.execution.ticks
 
     for instance, plan in plans.ranked:
-        rounding = Rounding(problem, instance, session.model.step)
+        rounding = Rounding(session, problem, instance)
         # A merger saves one tick a goal and never shortens the path.
         most = len(instance.hands)
         if not worth(rounding.least(plan) - most):
@@ -117,23 +117,15 @@ def fewest_ticks(
             for rounded in rounding.every(shortest, merged):
                 if not worth(rounded.ticks):
                     continue
-                planned, evaluations = movements(
-                    task,
-                    rounded.hands,
-                    rounded.configurations,
-                    instance.held,
-                    session.model,
-                    rounded.steps,
-                )
+                planned = movements(session, task, instance, rounded.configurations, rounded.steps)
                 execution = execute(task, planned, model=session.model)
-                session.spend(forward_kinematics=evaluations + execution.evaluations)
+                session.spend(forward_kinematics=execution.evaluations)
                 if execution.completed and (
                     fewest is None or price(execution) < price(fewest.execution)
                 ):
-                    fewest = PlanInTicks(tuple(planned), execution, shortest)
+                    fewest = PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
-        session.spend(**rounding.spent)
     if fewest is None:
         raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
     return fewest

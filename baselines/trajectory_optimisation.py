@@ -36,6 +36,17 @@ _REST = 1e-6  # rates below this are none: IPOPT fixes a variable whose bounds a
 SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
 
 
+PLANNER = frozenset(
+    {
+        Information.GOALS,
+        Information.FORWARD_KINEMATICS,
+        Information.JACOBIAN,
+        Information.KINEMATIC_MODEL,
+    }
+)
+"""What every plan is told, beside its cost."""
+
+
 class TrajectoryParameters(Parameters):
     """What is planned over, and how it is started."""
 
@@ -150,7 +161,7 @@ class TrajectoryOptimisation(Method):
             "costs": {letters_of(i.hands): p.cost for i, p in plans},
             "failed": failed,
         }
-        return Result(tuple(solution), details)
+        return Result(solution, details)
 
     def problem(self, task: Task) -> TrajectoryProblem:
         """The programme of tasks like this one, compiled once."""
@@ -217,18 +228,21 @@ class TrajectoryOptimisation(Method):
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: Plan
-    ) -> list[Movement]:
+    ) -> tuple[Movement, ...]:
         """The movements of a plan; the session spends what they take."""
-        planned, evaluations = movements(
-            task, instance.hands, plan.configurations, instance.held, session.model
-        )
-        session.spend(forward_kinematics=evaluations)
-        return planned
+        return movements(session, task, instance, plan.configurations)
 
 
 class PathLength(TrajectoryOptimisation):
     """The reward itself: the shortest path in joint space."""
 
+    name = "trajectory-optimisation/path-length"
+    title = "Trajectory optimisation, path length"
+    citation = (
+        "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
+        "Journal of Guidance, Control, and Dynamics."
+    )
+    told = PLANNER | {Information.REWARD_FORMULA}
     cost = "path-length"
     Parameters = PathLengthParameters
 
@@ -240,14 +254,12 @@ class PathLength(TrajectoryOptimisation):
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: Plan
-    ) -> list[Movement]:
+    ) -> tuple[Movement, ...]:
         """The movements of a plan; the session spends what they take."""
         if not self.parameters.whole_ticks:
             return super().movements_of(session, task, instance, plan)
         problem = self.problem(task)
-        rounding = Rounding(problem, instance, session.model.step)
-        rounded = rounding.nearest(plan)
-        session.spend(**rounding.spent)
+        rounded = Rounding(session, problem, instance).nearest(plan)
         if rounded is None:  # aimed inside the discs it is a plan all the same
             inside = replace(instance, radius=super().target_radius(session, task))
             plan = problem.solve(inside, plan.configurations)
@@ -255,16 +267,36 @@ class PathLength(TrajectoryOptimisation):
             if not plan.converged:
                 raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
             return super().movements_of(session, task, inside, plan)
-        planned, evaluations = movements(
-            task, rounded.hands, rounded.configurations, instance.held, session.model, rounded.steps
-        )
-        session.spend(forward_kinematics=evaluations)
-        return planned
+        return movements(session, task, instance, rounded.configurations, rounded.steps)
 
 
-class Smooth(TrajectoryOptimisation):
-    """Minimum acceleration or jerk: a spline through the goals' discs."""
+class SquaredChanges(TrajectoryOptimisation):
+    """The sum of squared changes of the joints from goal to goal."""
 
+    name = "trajectory-optimisation/squared-changes"
+    title = "Trajectory optimisation, squared configuration changes"
+    citation = (
+        "M. I. Jordan (1992). Constrained supervised learning. Journal of Mathematical "
+        "Psychology; M. I. Jordan (1986). Serial order: a parallel distributed processing "
+        "approach."
+    )
+    told = PLANNER | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("sum of squared configuration changes",)
+    cost = "squared-changes"
+
+
+class Acceleration(TrajectoryOptimisation):
+    """Minimum acceleration: a spline through the goals' discs."""
+
+    name = "trajectory-optimisation/acceleration"
+    title = "Trajectory optimisation, minimum acceleration"
+    citation = (
+        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
+        "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
+    )
+    told = PLANNER | {Information.SECONDARY_OBJECTIVES}
+    secondary = ("minimum joint acceleration",)
+    cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
 
     def cheapest(
@@ -287,9 +319,25 @@ class Smooth(TrajectoryOptimisation):
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: Plan
-    ) -> list[Movement]:
+    ) -> tuple[Movement, ...]:
         """The movements of a plan; the session spends what they take."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
+
+
+class Jerk(Acceleration):
+    """Minimum jerk: a smoother spline."""
+
+    name = "trajectory-optimisation/jerk"
+    title = "Trajectory optimisation, minimum jerk"
+    citation = (
+        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
+        "confirmed mathematical model. Journal of Neuroscience."
+    )
+    secondary = ("minimum joint jerk",)
+    cost = "jerk"
+
+
+METHODS: tuple[type[Method], ...] = (PathLength, SquaredChanges, Acceleration, Jerk)
 
 
 def with_stops(rates: Array, stop: float, every: int) -> Array:
@@ -305,7 +353,7 @@ def with_stops(rates: Array, stop: float, every: int) -> Array:
 
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
-) -> list[Movement]:
+) -> tuple[Movement, ...]:
     """A path of one piece ``(k, dof)`` per goal, which ends where the scorer sees the hit.
 
     A smooth path goes on towards a goal's inside after its rim is hit; the rest of the
@@ -325,72 +373,4 @@ def path_movements(
         ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
         steps_made = followed.ticks - session.model.arrival_tick
         here, rest = followed.q, ahead[ends > steps_made * session.model.step]
-    return paths
-
-
-_PLANNER = frozenset(
-    {
-        Information.GOALS,
-        Information.FORWARD_KINEMATICS,
-        Information.JACOBIAN,
-        Information.KINEMATIC_MODEL,
-    }
-)
-
-
-def variant(
-    base: type[TrajectoryOptimisation], cost: Cost, title: str, citation: str, secondary: str
-) -> type[TrajectoryOptimisation]:
-    """A method of its own for one cost."""
-    extra = Information.SECONDARY_OBJECTIVES if secondary else Information.REWARD_FORMULA
-    return type(
-        base.__name__ + "".join(part.title() for part in cost.split("-")),
-        (base,),
-        {
-            "__doc__": base.__doc__,
-            "__module__": __name__,
-            "name": f"trajectory-optimisation/{cost}",
-            "title": f"Trajectory optimisation, {title}",
-            "citation": citation,
-            "cost": cost,
-            "told": _PLANNER | {extra},
-            "secondary": (secondary,) if secondary else (),
-        },
-    )
-
-
-METHODS: tuple[type[TrajectoryOptimisation], ...] = (
-    variant(
-        PathLength,
-        "path-length",
-        "path length",
-        "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
-        "Journal of Guidance, Control, and Dynamics.",
-        "",
-    ),
-    variant(
-        TrajectoryOptimisation,
-        "squared-changes",
-        "squared configuration changes",
-        "M. I. Jordan (1992). Constrained supervised learning. Journal of Mathematical "
-        "Psychology; M. I. Jordan (1986). Serial order: a parallel distributed processing "
-        "approach.",
-        "sum of squared configuration changes",
-    ),
-    variant(
-        Smooth,
-        "acceleration",
-        "minimum acceleration",
-        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
-        "confirmed mathematical model. Journal of Neuroscience (there: jerk).",
-        "minimum joint acceleration",
-    ),
-    variant(
-        Smooth,
-        "jerk",
-        "minimum jerk",
-        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
-        "confirmed mathematical model. Journal of Neuroscience.",
-        "minimum joint jerk",
-    ),
-)
+    return tuple(paths)

@@ -8,6 +8,7 @@ goals were hit are known afterwards.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -55,30 +56,32 @@ class Practice:
 
     def by_correction(self, hands: str) -> Trials:
         """One trial by **A** alone."""
-        shape = (1, self._session.goals_count, self._session.dof)
-        return self._make([hands], np.full(shape, np.nan))
+        return self.by_targets([hands], [self.explored(hands)], [np.array(np.nan)])
 
-    def by_targets(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Trials:
-        """Trials with targets for the joints in ``mask`` (G, dof); the others keep still.
-
-        ``values`` has shape ``(N, number of joints in the mask)``.
-        """
-        targets = np.full((len(values), *mask.shape), np.nan)
-        targets[:, mask] = values
-        return self._make([hands] * len(values), targets)
-
-    def until_better(
-        self, hands: list[str], masks: list[NDArray[np.bool_]], values: list[Array], than: Array
+    def by_targets(
+        self,
+        hands: list[str],
+        masks: list[NDArray[np.bool_]],
+        values: Iterable[Array],
+        until: Array | None = None,
     ) -> Trials:
-        """As :meth:`by_targets`, one trial after the other, each with hands of its own.
+        """Trials with targets for the joints in each one's mask (G, dof); the others keep still.
 
-        The last one is the first whose reward exceeds its entry in ``than`` (N,). Those after
-        it are not made: nothing of them is counted or known.
+        With ``until`` (N,) the last one is the first whose reward exceeds its entry there. Those
+        after it are not made: nothing of them is counted or known.
         """
         targets = np.full((len(hands), *masks[0].shape), np.nan)
         for target, mask, value in zip(targets, masks, values, strict=True):
             target[mask] = value
-        return self._make(hands, targets, than)
+        trials = self._session.trials(hands, targets, until=until)
+        rewards = trials.rewards
+        best = int(rewards.argmax())
+        if rewards[best] > self.reward:
+            self.reward, self.hands = float(rewards[best]), hands[best]
+            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
+        self.trials_made += len(rewards)
+        self.left -= len(rewards)
+        return trials
 
     def result(self, **details: Any) -> Result:
         """The best trial's movements; MethodError where no trial hit every goal."""
@@ -93,14 +96,3 @@ class Practice:
             )
         movements = movements_of(self.hands, self._targets)
         return Result(movements, {"best_trial": self._best_trial, **details})
-
-    def _make(self, hands: list[str], targets: Array, until: Array | None = None) -> Trials:
-        trials = self._session.trials(hands, targets, until=until)
-        rewards = trials.rewards
-        best = int(rewards.argmax())
-        if rewards[best] > self.reward:
-            self.reward, self.hands = float(rewards[best]), hands[best]
-            self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
-        self.trials_made += len(rewards)
-        self.left -= len(rewards)
-        return trials

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coartic import MotionModel, Movement, Task
+from coartic import Movement, Task
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic.method import Session
 from coartic.motion.movement import move
 from coartic.robot import Array, Hand
 
@@ -32,7 +32,6 @@ _BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond th
 class TickPlan:
     """A plan in whole steps."""
 
-    hands: tuple[Hand, ...]
     steps: tuple[int, ...]
     """Movement steps to each goal; 0 where the goal is hit as its turn comes."""
     configurations: Array
@@ -45,23 +44,23 @@ class TickPlan:
 
 
 class Rounding:
-    """Rounds plans of one problem and instance, and keeps count of the solver.
+    """Rounds plans of one problem and instance; the session spends what the solver takes.
 
     ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
     """
 
-    def __init__(self, problem: TrajectoryProblem, instance: Instance, step: float) -> None:
-        self._problem, self._instance, self._step = problem, instance, step
-        self.spent: Counter[str] = Counter()
+    def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
+        self._session, self._problem, self._instance = session, problem, instance
+        self._step = session.model.step
 
-    def nearest(self, plan: Plan, merged: tuple[int, ...] = ()) -> TickPlan | None:
+    def nearest(self, plan: Plan) -> TickPlan | None:
         """Every segment but the last rounded to the nearest step, the last one up.
 
         At a shortest path the total does not change with the division to first order, so
         this is nearly always the least number of ticks. None where a solve fails.
         """
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
-        return self.divided(plan, [round(length) for length in exact], merged)
+        return self.divided(plan, [round(length) for length in exact], ())
 
     def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Roundings up and down of all but the last segment, the nearest first.
@@ -125,7 +124,7 @@ class Rounding:
             return None
         lengths[list(merged)] = 0.0
         rounded = tuple(round(length / self._step) for length in lengths)
-        return TickPlan(self._instance.hands, rounded, centred.configurations)
+        return TickPlan(rounded, centred.configurations)
 
     def solve_around(
         self,
@@ -143,7 +142,7 @@ class Rounding:
             held[list(merged)] = True
             instance = replace(instance, held=held)
         plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
-        self.spent.update(plan.spent)
+        self._session.spend(**plan.spent)
         return plan
 
 
@@ -167,24 +166,23 @@ def mergeable(task: Task, hands: Sequence[Hand | None]) -> tuple[int, ...]:
 
 
 def movements(
+    session: Session,
     task: Task,
-    hands: tuple[Hand, ...],
+    instance: Instance,
     configurations: Array,
-    held: NDArray[np.bool_],
-    model: MotionModel,
     steps: tuple[int, ...] | None = None,
-) -> tuple[list[Movement], int]:
-    """Movements to one configuration per goal; forward-kinematics evaluations.
+) -> tuple[Movement, ...]:
+    """Movements of an instance to one configuration per goal, ``(G, dof)``.
 
-    Joints that are ``held`` (bool, ``(G, dof)``) on the way to a goal stay where they are,
-    also where an earlier movement hit before it was where the plan has it. With ``steps``,
-    each movement aims through the rim to hit after so many; where no target beyond does,
-    it aims at the plan's own configuration.
+    Joints that are held on the way to a goal stay where they are, also where an earlier
+    movement hit before it was where the plan has it. With ``steps``, each movement aims
+    through the rim to hit after so many; where no target beyond does, it aims at the plan's
+    own configuration. The session spends what that takes.
     """
     planned: list[Movement] = []
-    q, evaluations = np.array(task.q0), 0
-    for goal, hand in enumerate(hands):
-        wanted = np.where(held[goal], q, configurations[goal])
+    q, model = np.array(task.q0), session.model
+    for goal, hand in enumerate(instance.hands):
+        wanted = np.where(instance.held[goal], q, configurations[goal])
         if steps is not None and not steps[goal]:
             planned.append(Movement(goal + 1, hand, "corrective", wanted))
             continue
@@ -195,9 +193,9 @@ def movements(
             targets = [*through, wanted]
         for target in targets:
             result = move(task.robot, q, target, hand, task.goals[goal], task.radius, model=model)
-            evaluations += result.evaluations
+            session.spend(forward_kinematics=result.evaluations)
             if steps is None or (result.hit and result.ticks <= steps[goal] + 1):
                 break
         q = result.q
         planned.append(Movement(goal + 1, hand, "planned", target))
-    return planned, evaluations
+    return tuple(planned)

@@ -22,10 +22,8 @@ _GOES_ON = "Finished runs are kept; repeat the command to resume."
 class Dask:
     """An executor: a Dask scheduler, whose workers have this version of coartic."""
 
-    def __init__(
-        self, address: str, *, workers_s: float = WORKERS_S, say: Callable[[str], None] = print
-    ) -> None:
-        self.address, self.workers_s, self.say = address, workers_s, say
+    def __init__(self, address: str, *, say: Callable[[str], None] = print) -> None:
+        self.address, self.say = address, say
         self.workers = 1  # it may have any number: lots are as large as methods take them
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
@@ -76,9 +74,9 @@ class Dask:
         try:
             if not client.scheduler_info()["workers"]:
                 self.say(f"no Dask worker is connected to {self.address}: waiting for one")
-                client.wait_for_workers(1, timeout=self.workers_s)
+                client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
-            words = f"Dask scheduler {self.address} had no workers for {self.workers_s:g} s"
+            words = f"Dask scheduler {self.address} had no workers for {WORKERS_S:g} s"
             raise CoarticError(f"{words}; start some. {_GOES_ON}") from None
         except Exception as error:
             raise self._lost(error) from None

@@ -158,9 +158,12 @@ def result_of(
     parts: list[Any] = [row["status"], row["proven_bound"], list(rewards)]
     for part in PARTS:
         for m in movements.get(part, ()):
-            assert m.target is not None
-            # SQLite keeps no sign of zero, and 0.0 is added to lose it here as well.
-            points = None if m.waypoints is None else (m.waypoints + 0.0).tolist()
-            target = (m.target + 0.0).tolist()
-            parts.append([part, m.goal, m.hand, m.kind, m.ticks, target, points])
+            parts.append([part, *facts_of(m)])
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
+def facts_of(movement: Movement) -> list[Any]:
+    """A movement as plain data. SQLite keeps no sign of zero; adding 0.0 loses it here as well."""
+    arrays = (movement.target, movement.waypoints)
+    places = [None if array is None else (array + 0.0).tolist() for array in arrays]
+    return [movement.goal, movement.hand, movement.kind, movement.ticks, *places]

@@ -165,7 +165,7 @@ def built_in() -> Mapping[str, Entry]:
     entries: dict[str, Entry] = {}
     for name in MODULES:
         module = importlib.import_module(name)
-        code = code_of(file_of(module))  # once for its methods: it takes a while
+        code = code_of(Path(inspect.getfile(module)))  # once for its methods: it takes a while
         entries |= {method.name: Entry(method, BUILT_IN, name, code) for method in module.METHODS}
     return entries
 
@@ -201,7 +201,7 @@ def current_code(where: str, name: str) -> str:
     with _parsing:
         if where.endswith(".py"):
             return {e.name: e.code for e in entries_of_file(Path(where))}.get(name, "none")
-        return code_of(file_of(importlib.import_module(where)))
+        return code_of(Path(inspect.getfile(importlib.import_module(where))))
 
 
 def add_entries(registered: dict[str, Entry], entries: Iterable[Entry]) -> None:
@@ -254,7 +254,7 @@ def entries_of_module(
     methods = list(methods)
     for method in methods:
         check_declaration(method, origin)
-        file = file_of(module)
+        file = Path(inspect.getfile(module))
         data = tuple(file.parent / name for name in method.files)
         try:
             code = code_of(file, data)
@@ -313,9 +313,3 @@ def methods_in(module: ModuleType) -> list[type[Method]]:
         and not inspect.isabstract(value)
         and value.__module__ == module.__name__
     ]
-
-
-def file_of(module: ModuleType) -> Path:
-    """The file of a module."""
-    assert module.__file__ is not None
-    return Path(module.__file__)

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from coartic.benchmarks.outcome import kept
+from coartic.benchmarks.outcome import facts_of, kept
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.worker import Job, job_of
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.method import Meter
-from coartic.motion.solution import Movement
 from coartic.motion.ticks import Trajectory, trajectory
 from coartic.runs.store import FILE, PARTS, Run, StoredRun, open_store
 from coartic.tasks.task import Task
@@ -110,7 +109,7 @@ def differences(a: Run, b: Run) -> list[str]:
         if a.row[name] != b.row[name]
     ]
     for part, prefix in zip(PARTS, ("", "initial_", "replay_"), strict=True):
-        first, second = (plain_movements(run.movements.get(part, ())) for run in (a, b))
+        first, second = ([*map(facts_of, run.movements.get(part, ()))] for run in (a, b))
         if first != second:
             scores = [
                 f"{run.row[f'{prefix}reward']} with {run.row[f'{prefix}hands']}" for run in (a, b)
@@ -119,17 +118,6 @@ def differences(a: Run, b: Run) -> list[str]:
     if a.rewards != b.rewards:
         changes.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
     return changes
-
-
-def plain_movements(movements: Sequence[Movement]) -> list[Any]:
-    """Movements as plain data, which can be compared."""
-    return [
-        (
-            *(m.goal, m.hand, m.kind, m.ticks),
-            *(None if q is None else q.tolist() for q in (m.target, m.waypoints)),
-        )
-        for m in movements
-    ]
 
 
 def first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:

@@ -21,15 +21,7 @@ from coartic.benchmarks.suites import Cell, Suite, load_suite, select_cells
 from coartic.benchmarks.worker import Answer, Job, job_of
 from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
-from coartic.runs.plan import (
-    Plan,
-    PlannedCell,
-    hash_of,
-    run_id,
-    run_seed,
-    trials_in,
-    variant_of,
-)
+from coartic.runs.plan import Plan, PlannedCell, hash_of, run_id, run_seed, trials_in, variant_of
 from coartic.runs.store import Run, Store, writing
 from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
 from coartic.tasks.task import checked_task

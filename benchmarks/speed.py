@@ -1,4 +1,4 @@
-"""How fast trials are: through each public way, in the learner, and suite ``paper`` as a whole.
+"""How fast trials are: through each public way, and in each of the paper's cells.
 
     python -m coartic.benchmarks.speed
 
@@ -7,10 +7,8 @@ Times depend on the machine; compare ratios, and times of one call.
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -18,13 +16,11 @@ import numpy as np
 import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
 from coartic.baselines.cma_es import Every
-from coartic.benchmarks.pool import Local
 from coartic.benchmarks.run import plan_suite
 from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
 from coartic.method import Session
 from coartic.motion.lanes import LANES
 from coartic.motion.trials import movements_of
-from coartic.runs.store import open_store
 
 
 def main() -> None:
@@ -33,23 +29,12 @@ def main() -> None:
     print(f"{'way':32}{'trials a second':>18}")
     for way, rate in rates.items():
         print(f"{way:32}{rate:18,.0f}")
-    plan = plan_suite("paper")
-    cells = [
-        (load_task(cell.task), cell.method.removeprefix(METHOD_PREFIX)) for cell in plan.plan.cells
-    ]
     warm_up(load_task("ascending"))
     print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
-    for task, condition in cells:
+    for cell in plan_suite("paper").plan.cells:
+        task, condition = load_task(cell.task), cell.method.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        clock = time.perf_counter()
-        plan.perform(folder, executor=Local(2))
-        print(f"through the harness, 2 processes: {time.perf_counter() - clock:.1f} s")
-        clock = time.perf_counter()
-        with open_store(Path(folder)) as store:
-            store.frame("runs")
-        print(f"read back: {time.perf_counter() - clock:.2f} s")
 
 
 def trials_a_second() -> dict[str, float]:

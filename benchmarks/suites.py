@@ -11,23 +11,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import (
-    Field,
-    PlainValidator,
-    ValidationError,
-    model_validator,
-)
+from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from coartic import (
-    CONDITIONS,
-    VARIANTS,
-    CoarticError,
-    Task,
-    builtin_tasks,
-    load_task,
-    parse_task,
-)
+from coartic import CONDITIONS, VARIANTS, CoarticError, Task, builtin_tasks, load_task, parse_task
 from coartic.benchmarks.registry import Entry, Registry
 from coartic.inputs import (
     MOST_CELLS,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coartic import CONDITIONS, Movement, execute, learn_many, load_task
-from coartic.baselines.believed_reward import METHODS, BelievedReward, cheapest, search_of
+from coartic.baselines.believed_reward import METHODS, BelievedReward, cheapest
 from coartic.baselines.cma_es import Bandit
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.errors import SolutionError
@@ -56,13 +56,21 @@ def test_who_is_told_that_ticks_count_plans_as_without_a_penalty():
 
 
 @pytest.mark.parametrize("terms", TERMS)
-def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms):
+def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms, monkeypatch):
     task = with_penalty(SMALL, **TERMS[terms])
-    search = search_of(BelievedReward.Parameters(**QUICK))
+    search = BelievedReward.Parameters(**QUICK)
     plans = cheapest(Session(task, 0, BelievedReward.told, trusted=True), task, search, [])
-    graph = PostureGraph.sampled(task, 30, np.random.default_rng(0), penalty=task.penalty)
     seen = [(plan.cost, i.hands, plan.configurations) for i, plan in plans.ranked]
-    seen += [(chain.length, chain.hands, chain.configurations) for chain in graph.chains()]
+    graph = PostureGraph.sampled(task, 30, np.random.default_rng(0), penalty=task.penalty)
+    costs, chain_of = [], PostureGraph.chain_of
+
+    def noted(self, complete):
+        costs.append(complete.cost.min())
+        return chain_of(self, complete)
+
+    monkeypatch.setattr(PostureGraph, "chain_of", noted)
+    chains = list(graph.chains())
+    seen += [(cost, *chain) for cost, chain in zip(costs, chains, strict=True)]
     assert len(seen) > 5
     for cost, hands, configurations in seen:
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)

@@ -41,10 +41,11 @@ def test_nobody_at_an_address(tmp_path):
                 planned(CELLS).perform(tmp_path, executor=Dask(address))
 
 
-def test_a_cluster_without_workers(tmp_path):
+def test_a_cluster_without_workers(tmp_path, monkeypatch):
     messages = []
+    monkeypatch.setattr(cluster_module, "WORKERS_S", 0.5)
     with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
-        executor = Dask(cluster.scheduler_address, workers_s=0.5, say=messages.append)
+        executor = Dask(cluster.scheduler_address, say=messages.append)
         with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
             planned(CELLS).perform(tmp_path, executor=executor)
     assert len(messages) == 1

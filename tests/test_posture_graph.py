@@ -33,21 +33,25 @@ def cheapest(graph, hands):
     return best
 
 
+def length_of(task, configurations):
+    steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
+    return np.linalg.norm(steps, axis=1).sum()
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_chains_are_the_cheapest(name):
     task = TASKS[name]
     graph = PostureGraph.sampled(task, 5, np.random.default_rng(3))
     chains = list(graph.chains())
     assert len(chains) == len(task.hands) ** len(task.goals)
-    assert len({chain.hands for chain in chains}) == len(chains)
-    for chain in chains:
-        steps = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)
-        assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(chain.length)
-        assert chain.length == pytest.approx(cheapest(graph, chain.hands))
-        for goal, hand in enumerate(chain.hands):
+    assert len(dict(chains)) == len(chains)
+    for hands, configurations in chains:
+        steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
+        assert length_of(task, configurations) == pytest.approx(cheapest(graph, hands))
+        for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}
             assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
-            miss = task.robot.forward_kinematics(chain.configurations[goal], hand)
+            miss = task.robot.forward_kinematics(configurations[goal], hand)
             assert np.hypot(*(miss - task.goals[goal])) <= task.radius
 
 
@@ -75,13 +79,13 @@ def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
 def test_a_free_arm_is_spread_over_its_way():
     task = TASKS["two-armed-2"]
     graph = PostureGraph.sampled(task, 10, np.random.default_rng(6))
-    (chain,) = graph.chains(("left", "right", "right", "left"))
-    spread = spread_out(task, chain)
+    ((hands, chain),) = graph.chains(("left", "right", "right", "left"))
+    spread = spread_out(task, hands, chain)
     left = task.robot.joints("left")
-    first, last = chain.configurations[0, left], chain.configurations[3, left]
+    first, last = chain[0, left], chain[3, left]
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
-    assert np.array_equal(spread[[0, 3]][:, left], chain.configurations[[0, 3]][:, left])
-    assert np.array_equal(spread[:, :2], chain.configurations[:, :2])
+    assert np.array_equal(spread[[0, 3]][:, left], chain[[0, 3]][:, left])
+    assert np.array_equal(spread[:, :2], chain[:, :2])
 
 
 def test_a_goal_without_a_posture_is_named():
@@ -95,20 +99,19 @@ def test_a_goal_without_a_posture_is_named():
 def test_a_beam_keeps_the_cheapest_beginnings():
     task = TASKS["two-armed-1"]
     graph = PostureGraph.sampled(task, 12, np.random.default_rng(8))
-    every = list(graph.chains())
+    by_hands = dict(graph.chains())
+    assert list(by_hands) == list(itertools.product(("left", "right"), repeat=4))
     for most in (16, 64):
-        assert [c.hands for c in graph.chains(most=most)] == [c.hands for c in every]
-    by_hands = {chain.hands: chain for chain in every}
+        assert [hands for hands, _ in graph.chains(most=most)] == list(by_hands)
     for most in (1, 5, 15):
         kept = list(graph.chains(most=most))
         assert len(kept) == most
-        for chain in kept:
-            assert chain.length == by_hands[chain.hands].length
-            assert np.array_equal(chain.configurations, by_hands[chain.hands].configurations)
-    best = min(every, key=lambda chain: chain.length)
-    assert best.hands in {chain.hands for chain in graph.chains(most=5)}
+        for hands, configurations in kept:
+            assert np.array_equal(configurations, by_hands[hands])
+    best = min(by_hands, key=lambda hands: length_of(task, by_hands[hands]))
+    assert best in dict(graph.chains(most=5))
     # A width of one is the cheapest hand, goal by goal.
-    (greedy,) = graph.chains(most=1)
+    ((greedy, _),) = graph.chains(most=1)
     first = {hands[0]: graph.layers[0, hands[0]] for hands in by_hands}
     nearest = {h: np.linalg.norm(layer - task.q0, axis=1).min() for h, layer in first.items()}
-    assert greedy.hands[0] == min(nearest, key=nearest.get)
+    assert greedy[0] == min(nearest, key=nearest.get)

@@ -189,8 +189,8 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch):
-    connect = store_module.connect
-    monkeypatch.setattr(store_module, "connect", lambda where, _: connect(where, 0.01))
+    opened = store_module.opened
+    monkeypatch.setattr(store_module, "opened", lambda where, _: opened(where, 0.01))
     plan = planned(ONE, **FEW)
     busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
     with writing(tmp_path):
@@ -252,8 +252,14 @@ def foreign(path):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (sql(f"PRAGMA user_version = {FORMAT + 1}"), "newer version.*update coartic"),
-        (sql(f"PRAGMA user_version = {FORMAT - 1}"), "older version.*another --out"),
+        (
+            sql(f"PRAGMA user_version = {FORMAT + 1}"),
+            "this version.*reads.*update coartic",
+        ),
+        (
+            sql(f"PRAGMA user_version = {FORMAT - 1}"),
+            "this version.*reads.*another --out",
+        ),
         (foreign, "is not a file of coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),

@@ -84,14 +84,14 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
     graph = PostureGraph.sampled(task, 60, np.random.default_rng(0))
-    (chain,) = graph.chains(hands)
+    ((_, chain),) = graph.chains(hands)
     problem = trajectory_problem(task.robot, task.hands, 2, cost)
-    plan = problem.solve(instance, chain.configurations)
+    plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
     free = ~instance.held
 
     def configurations(x):
-        steps = np.zeros_like(chain.configurations)
+        steps = np.zeros_like(chain)
         steps[free] = x
         return task.q0 + np.cumsum(steps, axis=0)
 
@@ -109,7 +109,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
         ]
 
     rng = np.random.default_rng(1)
-    start = np.diff(np.vstack([task.q0, chain.configurations]), axis=0)[free]
+    start = np.diff(np.vstack([task.q0, chain]), axis=0)[free]
     optimum = minimize(
         objective,
         start + 0.1 * rng.standard_normal(start.shape),
@@ -192,11 +192,10 @@ def test_whole_ticks_are_what_is_executed():
         instance = Instance.of(task, sequence, still=True, radius=task.radius)
         problem = trajectory_problem(task.robot, task.hands, len(hands), "path-length")
         plan = problem.solve(instance, corrective_trial(task, hands).configurations)
-        rounding = Rounding(problem, instance, PAPER.step)
+        session = Session(task, 0, ())
+        rounding = Rounding(session, problem, instance)
         rounded = rounding.nearest(plan)
-        solution, _ = movements(
-            task, rounded.hands, rounded.configurations, instance.held, PAPER, rounded.steps
-        )
+        solution = movements(session, task, instance, rounded.configurations, rounded.steps)
         execution = execute(task, solution)
         assert execution.corrections == 0
         assert execution.ticks <= rounded.ticks

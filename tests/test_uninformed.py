@@ -179,7 +179,7 @@ def one_by_one(method, task, seed, parameters):
         if hands in centres:
             centre, reward = centres[hands]
             values = centre + parameters.sigma * rng.standard_normal(len(centre))
-            attempt = practice.by_targets(hands, mask, values[None])
+            attempt = practice.by_targets([hands], [mask], [values])
         else:
             attempt, reward = practice.by_correction(hands), -np.inf
         if attempt.rewards[0] == reward == -np.inf:
@@ -228,7 +228,7 @@ class HalfOfAPlain:
     def by_correction(self, hands):
         return SimpleNamespace(rewards=np.array([-300.0]), reached=np.zeros((1, 1, 3)))
 
-    def by_targets(self, hands, mask, values):
+    def by_targets(self, hands, masks, values):
         self.failed = values[:, 0] > 0.5
         rewards = -100.0 * ((values - 1.0) ** 2).sum(axis=1)
         return SimpleNamespace(rewards=np.where(self.failed, -np.inf, rewards))

@@ -82,8 +82,8 @@ _DTYPES: dict[str, Any] = {
         for name, kind in RESULTS.items()
     },
     **dict.fromkeys(("suite", "task", "method", "variant", "label", "hand", "kind"), "string"),
-    **dict.fromkeys(("told", "parameters", "commit", "code", "packages"), "string"),
-    **dict.fromkeys(("order", "goal", "ticks", "waypoint"), "Int64"),
+    **dict.fromkeys(("told", "parameters", "commit", "code", "packages", "part"), "string"),
+    **dict.fromkeys(("result_id", "order", "goal", "ticks", "waypoint"), "Int64"),
     "warm": "boolean",
 }
 """How columns of views are read: with types that have room for what is missing."""
@@ -302,7 +302,6 @@ class Store:
         row = self._one(
             "SELECT content, command, date FROM suite JOIN environments ON id = environment"
         )
-        assert row is not None
         how = {"command": json.loads(row["command"]), "date": row["date"]}
         return {**json.loads(row["content"]), **how}
 
@@ -366,11 +365,8 @@ class Store:
         if len(ids) != 1:
             raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs in {self.folder}")
         row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
-        assert row is not None
         setting = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
-        assert setting is not None
-        assert environment is not None
         task = parse_task(json.loads(setting["definition"]), str(self.folder))
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
@@ -404,17 +400,8 @@ class Store:
 
     def frame(self, view: str) -> pd.DataFrame:
         """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""
-        import pandas as pd
-
-        rows = self._db.execute(f"SELECT * FROM {view}")
-        names = [column[0] for column in rows.description]
-        columns = list(zip(*rows, strict=True)) or [() for _ in names]
-        arrays = {
-            name: pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
-            for name, column in zip(names, columns, strict=True)
-            if name not in ("result_id", "part")
-        }
-        return pd.DataFrame(arrays)
+        inner = ["result_id", "part"]
+        return self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
@@ -451,9 +438,9 @@ class Store:
         marks = ", ".join("?" for _ in names)
         self._db.executemany(f"INSERT INTO {table} ({listed}) VALUES ({marks})", rows)
 
-    def _one(self, query: str, *values: object) -> sqlite3.Row | None:
-        row: sqlite3.Row | None = self._db.execute(query, values).fetchone()
-        return row
+    def _one(self, query: str, *values: object) -> Any:
+        """The first row of a query, or None."""
+        return self._db.execute(query, values).fetchone()
 
     def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
         """Id of the row with these keys, which is inserted where there is none."""
@@ -489,13 +476,17 @@ class Store:
             self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
 
     def _table(self, query: str, *values: object) -> pd.DataFrame:
-        """The rows of a query."""
+        """The rows of a query, with nullable types."""
         import pandas as pd
 
         rows = self._db.execute(query, values)
-        return pd.DataFrame(
-            list(map(tuple, rows)), columns=[column[0] for column in rows.description]
-        )
+        names = [column[0] for column in rows.description]
+        columns = list(zip(*rows, strict=True)) or [() for _ in names]
+        arrays = {
+            name: pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
+            for name, column in zip(names, columns, strict=True)
+        }
+        return pd.DataFrame(arrays)
 
 
 def open_store(folder: Path) -> Store:
@@ -552,19 +543,14 @@ def check_place(folder: Path) -> None:
         )
 
 
-def connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """A connection to a path or a ``file:`` address, which waits so long for a lock."""
+@contextmanager
+def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+    """A connection to a path or a ``file:`` address, which waits so long for a lock; it stays
+    open, unless something is wrong with it."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
     connection.row_factory = sqlite3.Row
-    return connection
-
-
-@contextmanager
-def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
-    """A connection that stays open, unless something is wrong with it."""
-    connection = connect(where, timeout_s)
     try:
         yield connection
     except BaseException:
@@ -577,11 +563,9 @@ def has_our_tables(connection: sqlite3.Connection, folder: Path) -> bool:
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application == _APPLICATION and version != FORMAT:
-        age, do = ("newer", "update coartic") if version > FORMAT else ("older", "choose another")
+        do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(
-            f"{folder / FILE} was written by a{'n' * (age == 'older')} {age} version of coartic "
-            f"(format {version}; this version reads {FORMAT}); "
-            + (do if age == "newer" else "run the suite again with another --out")
+            f"{folder / FILE} has format {version}; this version of coartic reads {FORMAT}: {do}"
         )
     if application != _APPLICATION:
         tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]

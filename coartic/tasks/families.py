@@ -163,10 +163,6 @@ class Family(FileData):
     bent: Parts = 200
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
-    def key(self, stream: str) -> tuple[int, int]:
-        """Of the generator, for the instances of a stream."""
-        return key_of(f"coartic {self.name}/{stream}")
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -288,7 +284,7 @@ def corrective_hands(candidate: Candidate) -> str | None:
 def candidate_of(address: Address, attempt: int) -> Candidate:
     """What is drawn for an instance at the given attempt, from 0. Raises TaskError."""
     family = load_family(address.family)
-    key = family.key(address.stream)
+    key = key_of(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
     count, links = structure.integer(*family.goals), structure.integer(*family.links)
     base, postures = structure.one_of(family.base), structure.one_of(family.start)
@@ -425,12 +421,9 @@ def named_by(text: str) -> list[str]:
 
 def families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
-    return {name: read_family(path) for name, path in family_files().items()}
-
-
-def family_files() -> dict[str, Path]:
-    """Files of the shipped families by name with version."""
-    return {family_name(path): path for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))}
+    return {
+        family_name(path): read_family(path) for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))
+    }
 
 
 def family_name(path: Path) -> str:
@@ -440,10 +433,10 @@ def family_name(path: Path) -> str:
 
 def load_family(name: str) -> Family:
     """A family by name with version, as ``two-armed/v1``. Raises TaskError."""
-    files = family_files()
-    if name not in files:
-        raise TaskError(unknown("family", name, files))
-    return read_family(files[name])
+    shipped = families()
+    if name not in shipped:
+        raise TaskError(unknown("family", name, shipped))
+    return shipped[name]
 
 
 @cache
