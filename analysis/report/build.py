@@ -188,7 +188,10 @@ def title(study: Study) -> str:
 def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them, supported ones first, those used for choosing last."""
     order = get_args(Verdict)
-    rows = tables.claims(study).reset_index(names="id").to_dict("records")
+    rows = tables.claims(study).reset_index(names="id")
+    of = facts.claims(study)
+    if of and not of["decided"]:  # most of them lack their runs
+        rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]
     return [
         {
             **{
@@ -200,5 +203,5 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
             "ensemble": row["ensemble"] or NONE,
             "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }
-        for row in sorted(rows, key=lambda row: order.index(row["verdict"]))
+        for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["verdict"]))
     ]
