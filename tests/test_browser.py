@@ -221,13 +221,22 @@ def test_the_address_holds_the_view(opened, address):
     page = opened(reduced_motion="reduce")
     untouched = page.evaluate(STATE)
     assert page.url == address
+    page.focus("#next-goal-moved")
     page.select_option("#next-goal-moved", "2")
     page.locator("#next-goal-place").fill("5")
+    page.wait_for_url("**?next-goal-moved=2&next-goal-place=5#next-goal")
+    # A link is not changed by what moves by itself, and by being scrolled to.
+    moving = opened(link=page.url, reduced_motion="no-preference")
+    moving.locator("#player").scroll_into_view_if_needed()
+    moving.wait_for_function("Number(document.getElementById('player-tick').value) > 20")
+    assert "player" not in moving.url
+    page.focus("#player-view")
     page.select_option("#player-view", "own")
     page.select_option("#player-0", "ascending initial")
     page.select_option("#player-1", "two-armed-1 dual-process/EC4")
     page.locator("#player-tick").fill("57")
     page.get_by_label("One tick back").click()
+    page.focus("#claims-verdict")
     page.select_option("#claims-verdict", "undecided")
     page.locator("#price").scroll_into_view_if_needed()
     page.evaluate("document.getElementById('price').scrollIntoView()")

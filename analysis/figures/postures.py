@@ -9,17 +9,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.figures.robot import MARKERS, box
+from coartic.analysis.figures.robot import MARKERS
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study
 
 _LETTERS = 9  # points: the page shows it small
-_RUNS: Any = {"linewidth": 0.4, "alpha": 0.25, "zorder": 1}
+_OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
 
 
 @figure(
@@ -33,7 +34,7 @@ def postures(study: Study) -> Parts:
     shared = shared_goal(study)
     if shared is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    drawing = Figure(figsize=(style.ONE, 1.6), layout="constrained")
+    drawing = Figure(figsize=(4.3, 2.3), layout="constrained")
     draw_postures(drawing.subplots(), shared)
     parts = []
     for task, runs in zip(shared.tasks, shared.postures, strict=True):
@@ -55,22 +56,31 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
     axes.set_aspect("equal")
     means = [runs.mean(axis=0) for runs in shared.postures]
     goals = np.array([task.goals[shared.goal] for task in shared.tasks])
-    low, high = box(shared.tasks[0], means)
-    low = np.minimum(low, goals.min(axis=0) - 0.6)
-    high = np.maximum(high, goals.max(axis=0) + 0.6)
-    axes.set_xlim(low[0], high[0] + 1.5)
-    axes.set_ylim(low[1], high[1])
+    robot = shared.tasks[0].robot
+    drawn = [*(robot.base_outline(q) for q in means), goals]
+    drawn += [robot.joint_positions(q, shared.hand) for q in means]
+    low, high = np.vstack(drawn).min(axis=0), np.vstack(drawn).max(axis=0)
+    axes.set_xlim(low[0] - 0.2, high[0] + 1.2)
+    axes.set_ylim(low[1] - 0.35, high[1] + 0.35)
     at, radius = shared.tasks[0].goals[shared.goal - 1], shared.tasks[0].radius
     words: Any = {"textcoords": "offset points", "fontsize": _LETTERS}
     colors = (style.BLUE, style.VERMILLION)
     rows = zip(shared.tasks, colors, shared.postures, means, goals.tolist(), strict=True)
     for task, color, runs, mean, following in rows:
+        faint: Any = {"linewidth": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
         for q in runs:
-            axes.plot(*task.robot.joint_positions(q, shared.hand).T, color=color, **_RUNS)
+            axes.plot(*task.robot.joint_positions(q, shared.hand).T, color=color, **faint, zorder=1)
         outline = task.robot.base_outline(mean)
         axes.fill(*outline.T, facecolor=color, alpha=0.12, edgecolor=color, linewidth=0.8)
         joints = task.robot.joint_positions(mean, shared.hand).T
-        axes.plot(*joints, color=color, linewidth=1.6, zorder=3, **MARKERS[shared.hand])
+        axes.plot(
+            *joints,
+            color=color,
+            linewidth=1.6,
+            zorder=3,
+            path_effects=_OUTLINE,
+            **MARKERS[shared.hand],
+        )
         arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
         axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
         axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))

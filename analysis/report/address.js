@@ -4,10 +4,14 @@
   const controls = [...document.querySelectorAll("select[id], input[id]")];
   const atStart = new Map(controls.map((control) => [control, control.value]));
   const headings = [...document.querySelectorAll("h2[id]")];
+  /* Boxes of controls that the reader used; what moves by itself is not kept. */
+  const boxOf = (element) => element.closest?.(".touch, .player, .tools");
+  const used = new Set();
 
   const read = () => {
     const asked = new URLSearchParams(window.location.search);
     controls.filter((control) => asked.has(control.id)).forEach((control) => {
+      used.add(boxOf(control));
       const before = control.value;
       control.value = asked.get(control.id);
       if (control.value !== asked.get(control.id)) control.value = before; // an old link
@@ -16,7 +20,8 @@
   };
 
   const write = () => {
-    const changed = controls.filter((control) => control.value !== atStart.get(control) && !control.closest("[hidden]"));
+    const changed = controls.filter((control) => used.has(boxOf(control))
+      && control.value !== atStart.get(control) && !control.closest("[hidden]"));
     const query = new URLSearchParams(changed.map((control) => [control.id, control.value])).toString();
     const typing = document.activeElement.type === "search" && document.activeElement.closest("section");
     const inView = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);
@@ -28,12 +33,9 @@
     window.history.replaceState(null, "", window.location.pathname + (query && `?${query}`) + hash);
   };
 
-  /* Waits until nothing changes. What moves by itself before the reader does anything is not kept. */
-  let touched = false;
+  /* Waits until nothing changes. */
   let waiting;
-  const later = (event) => {
-    touched ||= event.isTrusted;
-    if (!touched) return;
+  const later = () => {
     clearTimeout(waiting);
     waiting = setTimeout(write, 200);
   };
@@ -42,5 +44,6 @@
     if (details.open) window.history.replaceState(null, "", `#${details.closest("tr").id}`);
   }));
   read();
+  ["pointerdown", "keydown", "focusin"].forEach((kind) => window.addEventListener(kind, (event) => used.add(boxOf(event.target))));
   ["input", "change", "scroll"].forEach((kind) => window.addEventListener(kind, later));
 })();

@@ -33,6 +33,8 @@ from coartic.files import check_folder, publish
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
+LONG = 20
+"""Rows of a table above which it scrolls in a box of its own."""
 _MAGNIFIED = 1.3  # figures on the page
 _PHONE = 320 / 72  # inches: a phone scrolls what is wider
 
@@ -127,6 +129,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
         table = {
             "html": html_table(frame, section["table"], section["caption"]),
             "searched": len(frame) > SEARCHED,
+            "long": len(frame) > LONG,
             "example": f"'{frame.index[0]}'",
         } if len(frame) else None  # fmt: skip
         words = {"note": "", "finding": "" if of is None else sentence(name, of), **section}

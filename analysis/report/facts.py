@@ -26,6 +26,7 @@ from coartic.analysis.methods import (
     is_learner,
     is_variant,
     main_methods,
+    most_exploring,
     name_of,
 )
 from coartic.analysis.published import RUNS, TRIALS
@@ -218,12 +219,12 @@ def hands(study: Study) -> list[Facts]:
 
 @cached
 def learning(study: Study) -> list[Facts]:
-    """Trials after which half of the gain of the learner's best condition is there, by task."""
+    """Trials after which half of the gain of the learner that explores most is there, by task."""
     half = tables.learning(study).half_gain
-    rows = {task: f"{task} {best_condition(study, task)}" for task in study.tasks}
+    rows = [(task, f"{name} {most_exploring(task)}") for name, task in study.tasks.items()]
     return [
-        {"task": study.tasks[task].label.lower(), "trials": float(half[row])}
-        for task, row in rows.items()
+        {"task": task.label, "hands": len(task.hands), "trials": float(half[row])}
+        for task, row in rows
         if row in half.index and half[row] < math.inf
     ]
 

@@ -163,8 +163,8 @@ class Mover {
       goal.classList.toggle("hit", k < now.hit);
       goal.classList.toggle("current", k === now.hit);
     });
-    const goal = now.hit < goals.length ? `goal ${now.hit + 1} with the ${now.hand} hand` : "all goals hit";
-    this.words = `${now.ticks} ticks, ${goal}`;
+    const goal = now.hit < goals.length ? `on the way to goal ${now.hit + 1} with the ${now.hand} hand` : "all goals hit";
+    this.words = `tick ${now.ticks}, ${goal}`;
   }
 }
 

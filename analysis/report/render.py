@@ -106,12 +106,18 @@ def word(value: Any, column: Column) -> str:
 
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
-    """A table for the page. Its first column holds while the others scroll; rows are named."""
+    """A table for the page. Its first column holds while the others scroll; rows are named.
+
+    The caption says what is the same in all rows.
+    """
     cells: list[list[str]] = []
     heads = []
     for column, header in columns_of(frame).items():
         texts = list(map(html.escape, texts_of(frame, column)))
         head = html.escape(header)
+        if cells and len(texts) > 2 and len(set(texts)) == 1 and not is_number(frame[column]):
+            caption += f" ({header}: {html.unescape(texts[0])})"
+            continue
         if column_of(column).method:
             ids = [html.escape(one_line(str(label))) for label in frame[column]]
             pairs = zip(texts, ids, strict=True)
