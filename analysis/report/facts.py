@@ -22,6 +22,7 @@ from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.human import judge
 from coartic.analysis.methods import (
     CONDITIONS,
+    KNOWN_METHODS,
     LEARNER,
     is_learner,
     is_variant,
@@ -159,7 +160,18 @@ def nearest(study: Study) -> Facts | None:
         "proven": sum(best.proven for best in optima),
         "tasks": len(optima),
         "settings": sum(map(is_variant, tables.variants(study).method)),
+        "from_files": from_files(study),
     }
+
+
+def from_files(study: Study) -> list[Any]:
+    """Rows of the ranking of methods that are not built in and stand beside the learner."""
+    labels = {label for _, label in study.cells if label.partition(" ")[0] not in KNOWN_METHODS}
+    if not labels:
+        return []
+    rows = tables.ranking(study)
+    rows = rows[rows.method.isin(labels) & rows.better.notna()]
+    return rows.assign(gap=100 * rows.gap).to_dict("records")
 
 
 @cached
@@ -211,9 +223,10 @@ def hands(study: Study) -> list[Facts]:
         label = best_condition(study, name)
         good = study.cells[name, label].good if label else None
         if good is not None and good.initial_hands.notna().any():
-            before, after = good.initial_hands.dropna().iloc[0], good.hands.mode().iloc[0]
-            if before != after:
-                changes.append({"task": task.label, "before": before, "after": after})
+            before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
+            if before not in most_frequent:
+                change = f"{before} to {' or '.join(most_frequent)}"
+                changes.append({"task": task.label, "change": change})
     return changes
 
 
