@@ -145,7 +145,10 @@ def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
 
 
 def verdict_of_test(test: Test, ends: tuple[float, float, float], tasks: int) -> str:
-    """Of a value with its interval on one test; undecided where both verdicts fit."""
+    """The verdict of one test, by a value with its interval; undecided where both verdicts fit.
+
+    A value at the bound is neither above nor below it.
+    """
     if not tasks:
         return NO_CASES
     _, low, high = ends
@@ -153,17 +156,17 @@ def verdict_of_test(test: Test, ends: tuple[float, float, float], tasks: int) ->
     assert bound is not None
     wrong = bound if test.disagree is None else test.disagree
     near, far = sorted((sign * low, sign * high))
-    agrees, disagrees = near >= sign * bound, far < sign * wrong
+    agrees, disagrees = near > sign * bound, far < sign * wrong
     if tasks < FEWEST_TASKS or agrees == disagrees:
         return UNDECIDED
     return AGREES if agrees else DISAGREES
 
 
 def verdict_of(tests: Sequence[str]) -> str:
-    """Of a finding, from the verdicts of its tests."""
+    """The verdict of a finding, from those of its tests: one on the wrong side disagrees."""
     if len(set(tests)) == 1:
         return tests[0]
-    return next((kind for kind in (NO_CASES, DISAGREES) if kind in tests), UNDECIDED)
+    return next((kind for kind in (DISAGREES, NO_CASES) if kind in tests), UNDECIDED)
 
 
 def separating(study: Study) -> dict[str, list[str]]:
