@@ -29,6 +29,7 @@ from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
 from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
@@ -44,7 +45,7 @@ def nothing():
 
 
 def test(p):
-    return Inference(1.0, (20,), "planted", p=p)
+    return Inference(1.0, (20,), "planted", p=p, resamples=9_999)
 
 
 def planted(holds, *p, ids=("r",), against=None, **more):
@@ -109,6 +110,24 @@ def _few_starts(monkeypatch):
 def test_verdicts(claim, verdict, monkeypatch):
     (entry,) = judge_planted(monkeypatch, claim)
     assert entry.verdict == verdict
+
+
+def test_one_value_decides_nothing():
+    (alone, several) = (replace(test(float("nan")), n=(n,)) for n in (1, 20))
+    for tests, verdict in (
+        ([several], "supported"), ([alone], "undecided"), ([several, alone], "undecided")
+    ):  # fmt: skip
+        finding = Finding(True, "planted", tuple(tests))
+        assert by_tests(finding, float("nan"), float("nan")) == verdict
+
+
+def test_the_opposite_counts_as_many_resamples_as_the_test():
+    claim, values = planted(False)[0], np.random.default_rng(1).normal(-3, 1, 12)
+    for resamples in (999, 9_999):
+        greater, less = (
+            bootstrap_test(values, 0.0, tail, resamples=resamples) for tail in ("greater", "less")
+        )
+        assert opposite_p(claim, Finding(False, "planted", (greater,))) == pytest.approx(less.p)
 
 
 def test_most_admissible_goals_decide(monkeypatch):
@@ -299,6 +318,16 @@ def test_means_of_other_methods_are_exact_only_where_they_draw_nothing():
     for method, n in (("cma-es/bandit", (8, 8)), ("trajectory-optimisation/jerk", (8,))):
         (test,) = higher(data, comparing(f"EC4 > {method}")).tests
         assert test.n == n
+
+
+def test_a_comparison_within_runs_heeds_its_margin():
+    rows = [
+        entry | {"early_corrections": 2_000 + k, "late_corrections": 1_800}
+        for k, entry in enumerate(learner(T1, "EC4", HIGH))
+    ]
+    data = Data(planted_study(rows))
+    for pair, holds in (("early EC4 > late EC4", True), ("early EC4 > late EC4 by few", False)):
+        assert higher(data, comparing(pair)).holds == holds
 
 
 def comparing(pair):

@@ -63,7 +63,8 @@ def higher(data: Data, claim: Claim) -> Finding:
         for first, second, margin in map(sides, pairs):
             a, b = data.values(task, first), data.values(task, second)
             same_runs = b.ndim and (first.who, first.hands) == (second.who, second.hands)
-            tests.append(bootstrap_test(a - b, 0.0) if same_runs else bootstrap_test(a - margin, b))
+            compare = (a - b, margin) if same_runs else (a - margin, b)
+            tests.append(bootstrap_test(*compare))
             parts.append((first.what, f"{task}, {first}: {compared(task, first, second, a, b)}"))
     return all_hold(tests, [*parts, *shown_beside(data, claim)])
 

@@ -57,6 +57,8 @@ class Inference:
     """Of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     p: float = math.nan
+    resamples: int = 0
+    """Resamples that p was counted in; 0 for an exact test."""
     note: str = ""
     """Why there is no interval or p-value, or why it is a special one."""
 
