@@ -152,7 +152,8 @@ def apart_p(study: Study, first: str, second: str) -> float:
     """Two-tailed p of the difference of mean gaps of two methods over the tasks of both.
 
     A sign-flip test of runs paired by seed within their task; a method that is run once is compared
-    with every run of the other. All tasks count the same; NaN without pairs on one of them.
+    with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
+    that only one of them has do not count, unlike in the table ``against-learner``.
     """
     frame = gaps(study)
     one, two = (frame[frame.method == method] for method in (first, second))

@@ -51,6 +51,9 @@ def against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
     Of methods that solved every run. A method that draws nothing has one reward, which is exact.
+    The test takes samples as independent, though runs have the same seeds
+    (:func:`~coartic.analysis.comparisons.standings.apart_p` pairs them): where the learner has 100
+    runs and the other method 20, pairs would leave out 80.
     """
     rows: list[tuple[str, Row]] = []
     for (task, label), cell in study.cells.items():
