@@ -22,7 +22,7 @@ from coartic.analysis.claims.register import (
     MARGINS,
     Claim,
     Finding,
-    side,
+    read_side,
 )
 from coartic.analysis.claims.rules import higher
 from coartic.analysis.claims.single import shortest_reach
@@ -307,7 +307,7 @@ def test_the_initial_solution_is_no_other_methods_first_trial():
         for k in range(3)
     ]
     rows = learner("ascending", "EC1", [-300, -301, -302], initial=-319)
-    assert Data(planted_study(start + rows)).values("ascending", side("initial")) == -319
+    assert Data(planted_study(start + rows)).values("ascending", read_side("initial")) == -319
 
 
 def test_means_of_other_methods_are_exact_only_where_they_draw_nothing():
@@ -842,7 +842,7 @@ def test_a_claim_that_is_not_the_papers_is_corrected_apart(monkeypatch):
     first, second = judge_planted(monkeypatch, (paper, decide), (ours, decide))
     assert [entry.claim.group for entry in (first, second)] == ["paper", "ours"]
     assert first.adjusted_p == second.adjusted_p == pytest.approx(0.03)
-    assert side("receding-horizon").who == "receding-horizon"
+    assert read_side("receding-horizon").who == "receding-horizon"
 
 
 def test_what_goals_were_admitted_by_has_no_count_over_them():

@@ -117,7 +117,7 @@ def judged(study: Study) -> list[Judged]:
 
 def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     """The claims judged; those with a test are corrected over their groups among ``claims``."""
-    seen = [(claim, *see(claim, Data(study))) for claim in claims]
+    seen = [(claim, *apply_rule(claim, Data(study))) for claim in claims]
     adjusted: dict[str, tuple[float, float]] = {}
     for group in get_args(Group):
         members = [(claim, finding) for claim, finding, _ in seen if claim.group == group]
@@ -131,7 +131,7 @@ def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     ]
 
 
-def see(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
+def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     """What a claim's rule finds, and the ids of the runs that it read."""
     try:
         finding = RULES[claim.rule](data, claim)

@@ -28,7 +28,7 @@ from coartic.analysis.words import estimate
 from coartic.motion.costs import joint_costs, segment_lengths
 
 RESAMPLES_OF_STUDIES = 99_999
-"""As many as for families of tasks: p-values are corrected over many claims."""
+"""Resamples of a test, as many as on families of tasks: p-values are corrected over many claims."""
 PLANNER = "receding-horizon"
 ALL_GOALS = "all"
 HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
@@ -115,8 +115,8 @@ def mean_of(values: pd.Series) -> str:
 
 
 def finding(parts: dict[str, tuple[pd.Series, float, int]]) -> Finding:
-    """What is seen of values by their words, each with a bound and the side (1, -1) it is on."""
-    tests = tuple(over_tasks(side * v, side * bound) for v, bound, side in parts.values())
+    """What is seen of values by their words, each with a bound and 1 (above it) or -1."""
+    tests = tuple(over_tasks(sign * v, sign * bound) for v, bound, sign in parts.values())
     words = "; ".join(f"{name} {mean_of(values)}" for name, (values, _, _) in parts.items())
     return Finding(all(test.estimate > 0 for test in tests), f"{words}.", tests)
 

@@ -159,7 +159,8 @@ class Targets:
     def crossing(self, level: float) -> Interval:
         """The least budget within which ``level`` of the pairs are reached; infinite without any.
 
-        With its percentile interval: runs are drawn anew within their task. No interval where a
+        With its percentile interval: runs are drawn anew within their task, and the tasks stay.
+        It is not widened as means over tasks are, as a budget can be infinite. No interval where a
         task has too few runs.
         """
         steps = np.append(self.values, math.inf)

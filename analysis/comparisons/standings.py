@@ -32,7 +32,7 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.trajectories import initial_reward
 
 ALL_TASKS = "all tasks"
-"""In the column of tasks: the mean over all of them."""
+"""What stands in the column of tasks for the mean over all of them."""
 
 
 @cached
@@ -122,7 +122,8 @@ def over_all(study: Study) -> Iterator[tuple[str, str, float, float, float, int]
 
 
 def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
-    """The same of methods with a solution to every run of a task."""
+    """Methods with a solution to every run of a task: the task, label, gap with its interval, and
+    number of runs."""
     for (task, label), cell in study.cells.items():
         has_gap = not math.isnan(method_rows(study).gap[task, label])
         if has_gap and len(cell.good) == len(cell.runs):

@@ -26,7 +26,7 @@ from coartic.analysis.tables.studies import stops as stops_table
 
 PLACES = [str(h) for h in HORIZONS]
 COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
-"""Of the lines of a panel."""
+"""Colours of the lines of a panel."""
 
 
 @figure(

@@ -69,10 +69,10 @@ def rewards(study: Study) -> pd.DataFrame:
         term, weight = term_of(task)
         seen: dict[str, tuple[float, CellRuns]] = {}
         best = -np.inf
-        for (of, label), cell in study.cells.items():
+        for (run_on, label), cell in study.cells.items():
             method = label.partition(" ")[0]
             who = _METHODS.get(method) or _METHODS.get(method.partition("/")[0])
-            if of == name and who is not None and len(cell.good):
+            if run_on == name and who is not None and len(cell.good):
                 seen[who] = float(cell.rewards.mean()), cell
                 best = max(best, float(cell.rewards.max()))
         for who, (movements, cell) in plans.get(base_of(name), {}).items():
@@ -91,7 +91,7 @@ def rewards(study: Study) -> pd.DataFrame:
 
 @cached
 def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Solution, CellRuns]]]:
-    """By task without a penalty, the plans of those that know of none, and their runs."""
+    """Plans of those that know of no penalty, and their runs, by task without a penalty."""
     movements, waypoints = study.movements
     plans: dict[str, dict[str, tuple[Solution, CellRuns]]] = {}
     for (name, label), cell in study.cells.items():
@@ -113,18 +113,18 @@ def on_random_tasks(study: Study) -> pd.DataFrame:
 
 
 def advantage(study: Study, first: str, second: str, term: str) -> pd.DataFrame:
-    """By how much less ``first`` regrets than ``second``, in per cent of the best known reward.
+    """Regret of ``second`` less that of ``first``, in per cent of the best known reward.
 
     A row for each random task that both solved under every weight of a term, a column for each
     weight, 0 first; indexed by family and task.
     """
     frame = on_random_tasks(study)
     frame = frame[frame.term == term]
-    sides = [
+    second_regret, first_regret = (
         frame[frame.who == who].pivot_table("regret", index=["family", "task"], columns="weight")
         for who in (second, first)
-    ]
-    return (sides[0] - sides[1]).dropna()
+    )
+    return (second_regret - first_regret).dropna()
 
 
 def crossing(weights: Array, means: Array) -> float:
@@ -145,8 +145,9 @@ def crossing(weights: Array, means: Array) -> float:
 def crossings(study: Study) -> pd.DataFrame:
     """Where trial and error overtakes the planner of ticks, by term: the weight, with its interval.
 
-    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %. An
-    infinite end: beyond the largest weight, if at all.
+    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %, which are
+    not widened as means over tasks are: a crossing can be infinite. An infinite end: beyond the
+    largest weight, if at all.
     """
     rows = []
     for term, who in itertools.product(TERMS, UNTOLD):
