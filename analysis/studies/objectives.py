@@ -21,11 +21,19 @@ from coartic.robot import Array
 from coartic.tasks.task import address_of
 
 Solution = tuple[Movement, ...]
-TERMS = ("joints", "region", "distinct")
-"""Penalties, each by its one weight."""
-WHO = ("told", "ticks", "smooth", "learner", "from plan", "cma-es")
-"""Planners that are told of the penalty, that believe that ticks count alone, that believe in
-smoothness; the learner, from the corrective process and from the plan of ticks; CMA-ES."""
+TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
+"""Penalties, each by its one weight, in words."""
+WHO = {
+    "told": "the planner, told of the penalty",
+    "ticks": "the planner of ticks",
+    "smooth": "the planner of smoothness",
+    "learner": "the learner",
+    "from plan": "the learner from the plan of ticks",
+    "cma-es": "CMA-ES",
+}
+"""Who makes movements, in words: planners that are told of the penalty, that believe that ticks
+count alone, that believe in smoothness; the learner, from the corrective process and from the plan
+of ticks; CMA-ES."""
 UNTOLD = ("learner", "cma-es")
 """Who learns by trial and error, and from no plan."""
 _METHODS = {

@@ -292,7 +292,7 @@ def objectives(study: Study) -> Rows:
         helped = advantage(study, "from plan", "learner", term)
         for (weight, who), rows in sorted(
             frame[frame.term == term].groupby(["weight", "who"]),
-            key=lambda part: (part[0][0], WHO.index(part[0][1])),
+            key=lambda part: (part[0][0], list(WHO).index(str(part[0][1]))),
         ):
             row: Row = {"term": term, "weight": weight, "who": who, "tasks": len(rows)}
             row |= mean_of("regret", rows.regret)
