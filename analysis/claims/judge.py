@@ -121,7 +121,7 @@ def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     adjusted: dict[str, tuple[float, float]] = {}
     for group in get_args(Group):
         members = [(claim, finding) for claim, finding, _ in seen if claim.group == group]
-        both = [holm([of(*each) for each in members], len(members)) for of in (p_of, opposite_p)]
+        both = [holm([p(*each) for each in members], len(members)) for p in (p_of, opposite_p)]
         adjusted |= {
             each[0].id: p for each, p in zip(members, zip(*both, strict=True), strict=True)
         }

@@ -188,10 +188,10 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     p = np.asarray(p_values, dtype=np.float64)
     if ((p < 0) | (p > 1)).any():
         raise ValueError("a p-value lies between 0 and 1")
-    made = int((~np.isnan(p)).sum())
-    planned = made if family is None else family
-    if planned < made:
-        raise ValueError(f"fewer tests planned than made: {planned} of {made}")
+    tested = int((~np.isnan(p)).sum())
+    planned = tested if family is None else family
+    if planned < tested:
+        raise ValueError(f"fewer tests planned than made: {planned} of {tested}")
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
     adjusted = np.empty_like(p)
