@@ -231,10 +231,10 @@ def stop_at_equal_times(data: Data, _: Claim) -> Finding:
 def less_regret(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap tests over random tasks that the first regrets less than the second by \
 more than {regret:g} % of the best known reward"""
-    tests, parts = [], []
-    for where, pair in claim.cells.items():
+    tests = []
+    by_pair: dict[str, list[str]] = {}
+    for where, (first, second) in claim.cells.items():
         terms, _, weight = where.partition(" ")
-        first, second = pair
         for term in TERMS if terms == "every" else (terms,):
             table = advantage(data.study, first, second, term)
             if len(table) < FEWEST or float(weight) not in table.columns:
@@ -242,13 +242,11 @@ more than {regret:g} % of the best known reward"""
             values = np.array(table[float(weight)], dtype=np.float64)
             test = bootstrap_test(values, MARGINS["regret"], resamples=RESAMPLES_OF_STUDIES)
             tests.append(test)
-            penalty = (
-                f"with {TERMS[term]} of weight {weight}" if float(weight) else "without a penalty"
-            )
-            parts.append(
-                f"{penalty} {WHO[first]} regrets {estimate(mean(values), 1)} points less than "
-                f"{WHO[second]} on {len(values)} random tasks"
+            at = f"at weight {weight} ({TERMS[term]})" if float(weight) else "without a penalty"
+            by_pair.setdefault(f"{WHO[first]} regrets less than {WHO[second]}", []).append(
+                f"{estimate(mean(values), 1)} points {at} on {len(values)} random tasks"
             )
     data.run_ids.extend(data.study.runs.run_id)
-    seen = f"{one_sentence(parts)} Points are per cent of the best known reward."
+    seen = one_sentence([f"{pair}: {', '.join(parts)}" for pair, parts in by_pair.items()])
+    seen += " Points are per cent of the best known reward."
     return Finding(all(test.estimate > 0 for test in tests), seen, tuple(tests))

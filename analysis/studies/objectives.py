@@ -24,7 +24,7 @@ Solution = tuple[Movement, ...]
 TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
 """Penalties, each by its one weight, in words."""
 WHO = {
-    "told": "the planner, told of the penalty",
+    "told": "the planner told of the penalty",
     "ticks": "the planner of ticks",
     "smooth": "the planner of smoothness",
     "learner": "the learner",
