@@ -66,7 +66,7 @@ def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dic
 
 
 def of_counts(rng: np.random.Generator, n: int) -> dict[str, bool]:
-    """The same of the procedures for shares and counts, at a true share of three quarters."""
+    """Whether procedures for shares and counts hold or reject, at a share of three quarters."""
     counts = rng.multinomial(n, [SHARE, 0.15, 0.10], size=2).tolist()
     first = counts[0][0]
     return {
@@ -77,14 +77,14 @@ def of_counts(rng: np.random.Generator, n: int) -> dict[str, bool]:
 
 
 def of_postures(rng: np.random.Generator, n: int) -> dict[str, bool]:
-    """The same of the permutation test of postures: two joints that vary together."""
+    """Whether the permutation test of postures rejects, of two joints that vary together."""
     first, second = rng.exponential(0.1, (2, n, 2)) @ np.array([[1.0, 0.5], [0.0, 1.0]])
     p = permutation_p(first, second, rng, resamples=RESAMPLES)
     return {"test of postures (permutation)": bool(p <= LEVEL)}
 
 
 def of_instances(rng: np.random.Generator, n: int) -> dict[str, bool]:
-    """The same of the mean over n random tasks, five runs each, whose gaps are skewed."""
+    """Whether the interval over n random tasks, five runs each, holds the mean of skewed gaps."""
     centres = rng.exponential(0.1, n)
     mean = other_tasks({"a": [(centre + rng.exponential(0.02, 5),) for centre in centres]})
     return {"interval over random tasks": holds(mean, 0.12)}

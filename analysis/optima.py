@@ -36,7 +36,7 @@ class ShippedOptimum(FileData):
 
     task: str
     essence: str
-    """Of the task, as :func:`essence` has it."""
+    """The task's :func:`essence`."""
     base: str
     """Directions in which the base is locked; ``task``: as the task locks it."""
     other_arm: OtherArm

@@ -58,7 +58,7 @@ class Number(Entry):
 
     kind: Literal["constant", "reward", "sd", "count", "gain"]
     value: Decimal
-    """With the decimals that are printed."""
+    """The number with its printed decimals."""
     rounding: float
     """The value's half-width as printed: half a unit of its last decimal, more where derived."""
     difference_of: tuple[str, ...] = ()
@@ -182,7 +182,7 @@ class Summary(NamedTuple):
     mean: float
     sd: float | None
     runs: int
-    """As printed, or the paper's general 20."""
+    """Number of runs that is printed, or the paper's general 20."""
     printed_runs: int | None = None
     """Runs with the hand sequence, where their number stands beside the mean."""
     derived: bool = False
@@ -195,9 +195,9 @@ class PublishedCell(NamedTuple):
     """What the paper prints about one task under one condition."""
 
     summary: Summary | None
-    """Over all runs."""
+    """Mean and spread over all runs."""
     sequences: dict[str, Summary]
-    """By hand sequence, where they are told apart."""
+    """Runs by hand sequence, where the paper tells them apart."""
 
 
 def published_initial(task: str) -> Number | None:

@@ -53,7 +53,7 @@ class CellRuns:
 
     @cached_property
     def rewards(self) -> Array:
-        """Of those runs, shape ``(n,)``."""
+        """Rewards of the solved runs, shape ``(n,)``, ticks."""
         return self.good.reward.to_numpy(dtype=np.float64)
 
 
@@ -181,13 +181,16 @@ class Study:
         """
         key = task, label
         if key not in self._trajectories:
-            (movements, waypoints), cell, of = self.movements, self.cells[key], self.tasks[task]
+            (movements, waypoints), cell = self.movements, self.cells[key]
+            run_on = self.tasks[task]
             solutions = (
-                movements_from(of, movements[run_id], waypoints.get(run_id))
+                movements_from(run_on, movements[run_id], waypoints.get(run_id))
                 for run_id in _executed_of(cell)
             )
-            runs = tuple(trajectory(of, solution, self.model) for solution in solutions)
-            self._trajectories[key] = Trajectories(of, cell.method, cell.variant, runs, self.model)
+            runs = tuple(trajectory(run_on, solution, self.model) for solution in solutions)
+            self._trajectories[key] = Trajectories(
+                run_on, cell.method, cell.variant, runs, self.model
+            )
         return self._trajectories[key]
 
     @cached_property

@@ -62,7 +62,7 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 
 def cosine_and_sine(angles: Array) -> tuple[Array, Array]:
-    """Of angles in rad: less k quarters of a turn (π/2 in three parts), by the Taylor series."""
+    """Cosine and sine of angles in rad: less k quarters of a turn (π/2), by the Taylor series."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z = x * x

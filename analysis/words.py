@@ -52,7 +52,7 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def two_figures(value: float) -> str:
-    """With two figures: 0.46, 13, 7300, 980 000."""
+    """A number with two figures: 0.46, 13, 7300, 980 000."""
     rounded = float(f"{value:.2g}")
     return number(rounded, 1 if 1 <= abs(rounded) < 10 else None)
 
@@ -74,9 +74,9 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def estimate(of: Inference, digits: int | None = None) -> str:
+def estimate(value: Inference, digits: int | None = None) -> str:
     """``2.1 [1.3, 2.9]``; without the brackets where there is no interval."""
-    return f"{number(of.estimate, digits)} {in_brackets(of.low, of.high, digits)}".strip()
+    return f"{number(value.estimate, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
 def marked(name: str, task: Task) -> str:

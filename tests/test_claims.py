@@ -13,7 +13,7 @@ from scipy import stats
 from coartic import corrective_trial, load_task, trajectory
 from coartic.analysis import tables
 from coartic.analysis.claims import judge, single
-from coartic.analysis.claims.data import MissingError
+from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import held_by
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
 from coartic.analysis.claims.register import (
@@ -22,12 +22,14 @@ from coartic.analysis.claims.register import (
     MARGINS,
     Claim,
     Finding,
-    side,
+    read_side,
 )
+from coartic.analysis.claims.rules import higher
 from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
 from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
@@ -43,7 +45,7 @@ def nothing():
 
 
 def test(p):
-    return Inference(1.0, (20,), "planted", p=p)
+    return Inference(1.0, (20,), "planted", p=p, resamples=9_999)
 
 
 def planted(holds, *p, ids=("r",), against=None, **more):
@@ -108,6 +110,24 @@ def _few_starts(monkeypatch):
 def test_verdicts(claim, verdict, monkeypatch):
     (entry,) = judge_planted(monkeypatch, claim)
     assert entry.verdict == verdict
+
+
+def test_one_value_decides_nothing():
+    (alone, several) = (replace(test(float("nan")), n=(n,)) for n in (1, 20))
+    for tests, verdict in (
+        ([several], "supported"), ([alone], "undecided"), ([several, alone], "undecided")
+    ):  # fmt: skip
+        finding = Finding(True, "planted", tuple(tests))
+        assert by_tests(finding, float("nan"), float("nan")) == verdict
+
+
+def test_the_opposite_counts_as_many_resamples_as_the_test():
+    claim, values = planted(False)[0], np.random.default_rng(1).normal(-3, 1, 12)
+    for resamples in (999, 9_999):
+        greater, less = (
+            bootstrap_test(values, 0.0, tail, resamples=resamples) for tail in ("greater", "less")
+        )
+        assert opposite_p(claim, Finding(False, "planted", (greater,))) == pytest.approx(less.p)
 
 
 def test_most_admissible_goals_decide(monkeypatch):
@@ -197,6 +217,8 @@ def verdict_of(claim, study):
     )
 
 
+BELOW = [-710, -712, -708, -711, -709, -713, -707, -710]
+"""Below the initial solution of two-armed-1, -675."""
 LOW = [-610, -612, -608, -611, -609, -613, -607, -610]
 MIDDLE = [-505, -503, -507, -504, -506, -508, -502, -505]
 HIGH = [-484, -482, -486, -483, -485, -487, -481, -484]
@@ -224,7 +246,7 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
         ("ec3-beats-exhaustive", learner(T1, "EC3", LOW), "not supported"),
         ("ec3-beats-exhaustive", learner(T1, "EC3", [-533, -600, -470]), "undecided"),
         ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR, initial=-500), "not supported"),
+        ("ec2-improves", learner(T1, "EC2", MIDDLE + BELOW, RRLR), "not supported"),
         # Against other runs, all of several comparisons, runs with certain hands.
         ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH), "supported"),
         ("ec4-beats-ec3", learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE), "not supported"),
@@ -276,6 +298,41 @@ def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
 def test_judges_on_planted_runs(claim, rows, verdict):
     judged = verdict_of(claim, planted_study(rows))
     assert judged.verdict == verdict, judged.evidence
+
+
+def test_the_initial_solution_is_no_other_methods_first_trial():
+    """A learner that starts from a plan has another one."""
+    start = [
+        row("believed-reward/EC1", -292, task="ascending", run=k, initial_reward=-292)
+        for k in range(3)
+    ]
+    rows = learner("ascending", "EC1", [-300, -301, -302], initial=-319)
+    assert Data(planted_study(start + rows)).values("ascending", read_side("initial")) == -319
+
+
+def test_means_of_other_methods_are_exact_only_where_they_draw_nothing():
+    rows = learner(T1, "EC4", HIGH)
+    drawn = [row("cma-es/bandit", reward, run=k) for k, reward in enumerate(LOW)]
+    plan = [row("trajectory-optimisation/jerk", LOW[0])]
+    data = Data(planted_study(rows + drawn + plan))
+    for method, n in (("cma-es/bandit", (8, 8)), ("trajectory-optimisation/jerk", (8,))):
+        (test,) = higher(data, comparing(f"EC4 > {method}")).tests
+        assert test.n == n
+
+
+def test_a_comparison_within_runs_heeds_its_margin():
+    rows = [
+        entry | {"early_corrections": 2_000 + k, "late_corrections": 1_800}
+        for k, entry in enumerate(learner(T1, "EC4", HIGH))
+    ]
+    data = Data(planted_study(rows))
+    for pair, holds in (("early EC4 > late EC4", True), ("early EC4 > late EC4 by few", False)):
+        assert higher(data, comparing(pair)).holds == holds
+
+
+def comparing(pair):
+    """A claim that compares two sides on two-armed-1."""
+    return Claim(id="planted", section="s", statement="So.", rule="higher", pairs={T1: [pair]})
 
 
 def seven(replays):
@@ -785,7 +842,7 @@ def test_a_claim_that_is_not_the_papers_is_corrected_apart(monkeypatch):
     first, second = judge_planted(monkeypatch, (paper, decide), (ours, decide))
     assert [entry.claim.group for entry in (first, second)] == ["paper", "ours"]
     assert first.adjusted_p == second.adjusted_p == pytest.approx(0.03)
-    assert side("receding-horizon").who == "receding-horizon"
+    assert read_side("receding-horizon").who == "receding-horizon"
 
 
 def test_what_goals_were_admitted_by_has_no_count_over_them():

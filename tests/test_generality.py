@@ -1,12 +1,14 @@
 """What holds over instances of families: gaps, contrasts and signs, on planted rewards."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from coartic import load_task
 from coartic.analysis import tables
-from coartic.analysis.claims import judge
+from coartic.analysis.claims import data, judge
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.generality.sample import one_by_one, sample, signs
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
@@ -145,7 +147,9 @@ def test_presence():
     assert f"hand, {EC1}, one-armed/v1" not in present.index
 
 
-def test_claims_of_generality():
+def test_claims_of_generality(monkeypatch):
+    alone = SimpleNamespace(reward=ALONE)
+    monkeypatch.setattr(data, "initial_solution", lambda task, model: alone)
     study = with_signs(rewarded({**RISING, EC4: lambda n: -540 - n}, families=ONE + TWO))
     entries = {entry.claim.id: entry for entry in judge.judged(study)}
     assert set(entries) == {

@@ -37,6 +37,7 @@ ABOVE, BETWEEN, RATIO = (
         (ABOVE, [(0.06, 0.2)], 10, AGREES),
         (ABOVE, [(0.04, 0.2)], 10, UNDECIDED),
         (ABOVE, [(-0.02, 0.04)], 10, DISAGREES),
+        (ABOVE, [(0.05, 0.2)], 10, UNDECIDED),  # may be at the bound, which is not above it
         (ABOVE, [(0.06, 0.2)], 9, UNDECIDED),
         (ABOVE, [(math.nan, math.nan)], 0, NO_CASES),
         (BETWEEN, [(1.2, 2.5)] * 2, 10, AGREES),
@@ -55,6 +56,11 @@ def test_verdicts(finding, ends, tasks, verdict):
         for test, end in zip(finding.tests, ends, strict=True)
     ]
     assert verdict_of(of_tests) == verdict
+
+
+def test_a_test_without_cases_does_not_hide_one_on_the_wrong_side():
+    assert verdict_of([NO_CASES, DISAGREES]) == verdict_of([AGREES, DISAGREES]) == DISAGREES
+    assert verdict_of([NO_CASES, AGREES]) == NO_CASES
 
 
 def test_an_interval_covers_as_often_as_it_says(monkeypatch):

@@ -110,6 +110,8 @@ def test_the_rule_compares_regrets(study):
     values = advantage(study, "learner", "ticks", "distinct")[300.0]
     assert finding.tests[0].estimate == pytest.approx(values.mean() - 1.0)
     assert finding.holds == (values.mean() > 1.0)
+    assert finding.evidence.startswith("The learner regrets less than the planner of ticks: ")
+    assert " points at weight 300 (postures alike) on 3 random tasks." in finding.evidence
     missing = claim.model_copy(update={"cells": {"region 300": ["learner", "ticks"]}})
     with pytest.raises(MissingError, match="region"):
         less_regret(Data(study), missing)

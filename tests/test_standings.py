@@ -13,12 +13,15 @@ from coartic.analysis.comparisons.reached import WAY, Targets, price, targets
 from coartic.analysis.comparisons.standings import (
     ALL_TASKS,
     apart_p,
-    ends,
     gaps,
+    initial_and_optimum,
     leaders,
     standings,
 )
+from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.trajectories import initial_reward
+from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
 
@@ -45,7 +48,7 @@ def test_gaps_of_a_results_folder():
     optima = made_up_optima("two-armed-1")
     seen = MadeUp(results, optima=optima)
     optimum = optima["two-armed-1"].reward
-    assert ends(seen) == {"two-armed-1": (-675.0, optimum)}
+    assert initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
     first, second = gaps(seen).gap
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
@@ -142,3 +145,15 @@ def test_targets_are_evenly_spaced_rewards():
     paid = price(seen).loc["posture-based/two-goals"]
     assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
     assert paid.reached == reached.share()
+
+
+def test_the_initial_reward_loses_the_penalty():
+    """It is the scale of targets, of gaps and of the table of learning."""
+    plain = load_task("ascending")
+    dear = plain.model_copy(update={"penalty": Penalty(joints=20.0, costly="base")})
+    rows = row("dual-process/EC1", -350, task="ascending")
+    best = {"ascending": KnownOptimum(-340, None)}
+    seen = MadeUp(study_of(pd.DataFrame([rows]), [dear]), optima=best)
+    without, initial = (initial_reward(task, seen.model) for task in (plain, dear))
+    assert initial < -340 < without
+    assert initial_and_optimum(seen) == {"ascending": (initial, -340)}

@@ -1,6 +1,7 @@
 """Our own studies, how far ahead and stops: planted results, and small versions of both suites."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -93,7 +94,11 @@ def test_gaps_are_those_that_were_planted():
 
 
 def test_claims_hold_where_they_were_planted():
-    assert set(verdicts(planted()).values()) == {"supported"}
+    study = planted()
+    assert set(verdicts(study).values()) == {"supported"}
+    first = next(e.finding for e in judged(study) if e.claim.id == CLAIMS["first"])
+    sentence = r"The first goal ahead gains [\d.]+ \[.*\] points more than all others together \("
+    assert re.match(sentence, first.evidence)
 
 
 @pytest.mark.parametrize(

@@ -82,14 +82,14 @@ class Data:
         if who == "best":
             return np.array(self.best_sequences(task)[1])
         if who == "initial":
-            return np.array(self.initial_reward(task))
+            return np.array(self.initial(task).reward, dtype=np.float64)
         runs = self.runs(task, who, hands)
         if what == "reward":
             rewards = runs.reward.to_numpy(dtype=np.float64)
-            # Planners have one run, or runs that are all the same.
-            return (
-                rewards if self.label(task, who).startswith(LEARNER) else np.array(rewards.mean())
-            )
+            # A method that draws nothing has one reward, which is exact.
+            method = self.study.cells[task, self.label(task, who)].method
+            stochastic = self.study.plan.methods[method].stochastic
+            return rewards if stochastic else np.array(rewards.mean())
         if what == "replay":
             # Not the learned reward, which as the best of all trials is never below trial 0's.
             values = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -146,14 +146,6 @@ class Data:
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {name}")
         return execution
-
-    def initial_reward(self, task: str) -> float:
-        """Reward of the learner's trial 0: the corrective process alone."""
-        runs = self.study.runs
-        of_task = runs[runs.task.eq(task) & runs.initial_reward.notna()]
-        if not len(of_task):
-            raise MissingError(f"no run on {task} has an initial reward")
-        return float(of_task.initial_reward.iloc[0])
 
     def sequences(self, task: str) -> dict[str, float]:
         """Reward of the corrective process alone by hand sequence; NaN where it fails."""

@@ -18,7 +18,7 @@ DATA = Path(__file__).with_name("ensemble.csv")
 
 @cache
 def held_by(claim: str) -> tuple[Any, ...]:
-    """Of a claim's id, a row a task; none for a claim that does not rest on two-armed tasks.
+    """Counts of verdicts on a claim, a row a task; none unless it rests on two-armed tasks.
 
     ``task`` whose goals are the members'; how often ``supported``, ``refuted``, of ``members``.
     """

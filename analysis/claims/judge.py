@@ -26,7 +26,7 @@ from coartic.analysis.claims import rules, single, studies
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import mostly_refuted
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
-from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES
+from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
 
@@ -58,7 +58,7 @@ class Judged:
 
     @property
     def verdict(self) -> Verdict:
-        """As the module says."""
+        """The verdict by corrected p-values, the chosen goals and the admissible goals."""
         if self.claim.fitted and mostly_refuted(self.claim.id) and self.finding.holds is not None:
             return "not supported"
         verdict = by_tests(self.finding, self.adjusted_p, self.adjusted_opposite_p)
@@ -68,7 +68,8 @@ class Judged:
 
 def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
     """The verdict of the tests alone, by their p-values and those of the opposite."""
-    if finding.holds is None:
+    untested = any(math.isnan(test.p) and min(test.n) < 2 for test in finding.tests)
+    if finding.holds is None or (finding.holds and untested):
         return "undecided"
     if finding.holds:
         # NaN: counted exactly, or no spread in any sample.
@@ -93,11 +94,14 @@ def p_of(claim: Claim, finding: Finding) -> float:
 
 
 def opposite_p(claim: Claim, finding: Finding) -> float:
-    """Smallest p-value of the opposites times their number (Bonferroni); NaN without any."""
+    """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
+
+    The other tail of a test by resampling counts the observed sample as well.
+    """
     if finding.against is not None:
         p = [test.p for test in finding.against]
     else:
-        p = [min(1.0, 1 - test.p + 1 / (RESAMPLES + 1)) for test in finding.tests]
+        p = [min(1.0, 1 - test.p + 1 / (test.resamples + 1)) for test in finding.tests]
     values = [value for value in p if not math.isnan(value)]
     return min(1.0, min(values) * len(values)) if values and claim.group else math.nan
 
@@ -113,11 +117,11 @@ def judged(study: Study) -> list[Judged]:
 
 def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     """The claims judged; those with a test are corrected over their groups among ``claims``."""
-    seen = [(claim, *see(claim, Data(study))) for claim in claims]
+    seen = [(claim, *apply_rule(claim, Data(study))) for claim in claims]
     adjusted: dict[str, tuple[float, float]] = {}
     for group in get_args(Group):
         members = [(claim, finding) for claim, finding, _ in seen if claim.group == group]
-        both = [holm([of(*each) for each in members], len(members)) for of in (p_of, opposite_p)]
+        both = [holm([p(*each) for each in members], len(members)) for p in (p_of, opposite_p)]
         adjusted |= {
             each[0].id: p for each, p in zip(members, zip(*both, strict=True), strict=True)
         }
@@ -127,7 +131,7 @@ def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
     ]
 
 
-def see(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
+def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     """What a claim's rule finds, and the ids of the runs that it read."""
     try:
         finding = RULES[claim.rule](data, claim)

@@ -60,7 +60,7 @@ def is_method(who: str) -> bool:
     return "/" in who or who in KNOWN_METHODS
 
 
-def side(text: str) -> Side:
+def read_side(text: str) -> Side:
     """A side as it is written, such as ``replay EC2 RRRR``."""
     match = re.fullmatch(_SIDE, text)
     if match is None:
@@ -68,11 +68,11 @@ def side(text: str) -> Side:
     return Side(match["what"] or "reward", match["who"], match["hands"] or "")
 
 
-def sides(pair: str) -> tuple[Side, Side, float]:
+def read_comparison(pair: str) -> tuple[Side, Side, float]:
     """Both sides of a comparison such as ``arm EC4 > 0 by ticks``, and its margin."""
     first, second = pair.split(" > ")
     second, _, margin = second.partition(" by ")
-    return side(first), side(second), MARGINS[margin] if margin else 0.0
+    return read_side(first), read_side(second), MARGINS[margin] if margin else 0.0
 
 
 @dataclass(frozen=True)

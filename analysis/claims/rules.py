@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.register import MARGINS, QUANTITIES, Claim, Finding, Side, side, sides
+from coartic.analysis.claims.register import (
+    MARGINS,
+    QUANTITIES,
+    Claim,
+    Finding,
+    Side,
+    read_comparison,
+    read_side,
+)
 from coartic.analysis.generality.sample import sample
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.published import (
@@ -60,10 +68,11 @@ def higher(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap test of the mean reward for each comparison"""
     tests, parts = [], []
     for task, pairs in claim.pairs.items():
-        for first, second, margin in map(sides, pairs):
+        for first, second, margin in map(read_comparison, pairs):
             a, b = data.values(task, first), data.values(task, second)
             same_runs = b.ndim and (first.who, first.hands) == (second.who, second.hands)
-            tests.append(bootstrap_test(a - b, 0.0) if same_runs else bootstrap_test(a - margin, b))
+            compare = (a - b, margin) if same_runs else (a - margin, b)
+            tests.append(bootstrap_test(*compare))
             parts.append((first.what, f"{task}, {first}: {compared(task, first, second, a, b)}"))
     return all_hold(tests, [*parts, *shown_beside(data, claim)])
 
@@ -84,7 +93,7 @@ def in_every_family(data: Data, claim: Claim) -> Finding:
 known reward, in each family"""
     tests, parts = [], []
     for pair in claim.compared:
-        first, second, margin = sides(pair)
+        first, second, margin = read_comparison(pair)
         for family in claim.families:
             values = over_instances(data, family, first, second)
             tests.append(bootstrap_test(values, margin, resamples=RESAMPLES_OF_FAMILIES))
@@ -153,12 +162,12 @@ def count_runs(data: Data, task: str, how: str, condition: str, what: str) -> Fi
     if how == "half":
         return about_half(task, condition, what, words, count, total)
     bound = MARGINS["majority" if how == "majority" else "most"]
-    sides_of_test: tuple[Alternative, Alternative] = ("greater", "less")
+    alternatives: tuple[Alternative, Alternative] = ("greater", "less")
     if how == "not most":
-        sides_of_test = ("less", "greater")
-    limits = stats.binomtest(count, total, alternative=sides_of_test[0]).proportion_ci()
+        alternatives = ("less", "greater")
+    limits = stats.binomtest(count, total, alternative=alternatives[0]).proportion_ci()
     limit = f"at least {limits.low:.0%}" if how != "not most" else f"at most {limits.high:.0%}"
-    test, against = (share_test(count, total, bound, tail) for tail in sides_of_test)
+    test, against = (share_test(count, total, bound, tail) for tail in alternatives)
     holds = share < bound if how == "not most" else share > bound
     if limits.low > 0 or limits.high < 1:
         words += f", {limit} of all (95 %)"
@@ -266,7 +275,7 @@ def shown_beside(data: Data, claim: Claim) -> Parts:
     """What the claim shows beside its comparisons, as far as the folder has it."""
     parts = []
     for task, texts in claim.shown.items():
-        for beside in map(side, texts):
+        for beside in map(read_side, texts):
             with suppress(MissingError):
                 values = np.atleast_1d(data.values(task, beside))
                 parts.append((beside.what, f"{task}, {beside}: {in_words(beside.what, values)}"))
@@ -311,13 +320,13 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
     return f"{seen}; published {printed[0]} and {printed[1]}" if None not in printed else seen
 
 
-def as_printed(task: str, of: Side) -> str | None:
+def as_printed(task: str, side: Side) -> str | None:
     """Mean reward of one side as the paper has it, in words; None where it does not print it."""
     alone = {"initial": published_initial, "best": published_exhaustive}
-    cell = published_cell(task, of.who) if of.what in REWARDS else None
-    if of.who in alone and (solution := alone[of.who](task)):
+    cell = published_cell(task, side.who) if side.what in REWARDS else None
+    if side.who in alone and (solution := alone[side.who](task)):
         value, derived = solution.number, bool(solution.difference_of)
-    elif cell and (summary := cell.sequences.get(of.hands) if of.hands else cell.summary):
+    elif cell and (summary := cell.sequences.get(side.hands) if side.hands else cell.summary):
         value, derived = summary.mean, summary.derived
     else:
         return None

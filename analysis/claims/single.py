@@ -86,7 +86,7 @@ def sequences_change(data: Data, claim: Claim) -> Finding:
     # Against it: on one of the tasks most runs keep a sequence, under both conditions.
     against = [
         max(
-            (count_runs(data, one, "most", of, name).tests[0] for of in conditions),
+            (count_runs(data, one, "most", label, name).tests[0] for label in conditions),
             key=lambda test: test.p,
         )
         for name in names
@@ -193,7 +193,7 @@ def printed_p_values(_: Data, claim: Claim) -> Finding:
     for entry in ENTRIES.values():
         if not isinstance(entry, Order) or entry.p_below is None:
             continue
-        first, second = (printed_summary(entry.task, of) for of in (entry, entry.than))
+        first, second = (printed_summary(entry.task, side) for side in (entry, entry.than))
         if first is None or second is None:
             continue
         rounding = sum(0.5 * 10.0**-s.digits for s in (first, second))
@@ -213,11 +213,11 @@ def printed_p_values(_: Data, claim: Claim) -> Finding:
     return Finding(all(holds), f"{'; '.join(parts)}.")
 
 
-def printed_summary(task: str | None, of: Solved) -> Summary | None:
+def printed_summary(task: str | None, solved: Solved) -> Summary | None:
     """What is printed of one side of an order; None without its SD."""
-    cell = published_cell(task or "", of.condition or "")
+    cell = published_cell(task or "", solved.condition or "")
     if cell is None:
         return None
     by_hands = cell.sequences
-    summary = by_hands.get(of.hands) if of.hands and len(by_hands) > 1 else cell.summary
+    summary = by_hands.get(solved.hands) if solved.hands and len(by_hands) > 1 else cell.summary
     return None if summary is None or summary.sd is None else summary

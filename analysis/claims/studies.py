@@ -22,13 +22,13 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST, Inference, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import gap_share
-from coartic.analysis.studies.objectives import TERMS, advantage
+from coartic.analysis.studies.objectives import TERMS, WHO, advantage
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import estimate
 from coartic.motion.costs import joint_costs, segment_lengths
 
 RESAMPLES_OF_STUDIES = 99_999
-"""As many as for families of tasks: p-values are corrected over many claims."""
+"""Resamples of a test, as many as on families of tasks: p-values are corrected over many claims."""
 PLANNER = "receding-horizon"
 ALL_GOALS = "all"
 HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
@@ -108,28 +108,35 @@ def over_tasks(values: pd.Series, margin: float = 0.0) -> Inference:
     return bootstrap_test(there, margin, resamples=RESAMPLES_OF_STUDIES)
 
 
-def mean_of(values: pd.Series) -> str:
-    """The mean over tasks with its interval, in words."""
+def in_words(sentence: str, values: pd.Series) -> str:
+    """A sentence with the mean over tasks and its interval, and with how many tasks there are."""
     there = values.dropna()
-    return f"{estimate(mean(there.to_numpy(dtype=np.float64)), 2)} ({len(there)} tasks)"
+    seen = estimate(mean(there.to_numpy(dtype=np.float64)), 2)
+    return f"{sentence.format(seen)} ({len(there)} tasks)"
 
 
 def finding(parts: dict[str, tuple[pd.Series, float, int]]) -> Finding:
-    """What is seen of values by their words, each with a bound and the side (1, -1) it is on."""
-    tests = tuple(over_tasks(side * v, side * bound) for v, bound, side in parts.values())
-    words = "; ".join(f"{name} {mean_of(values)}" for name, (values, _, _) in parts.items())
-    return Finding(all(test.estimate > 0 for test in tests), f"{words}.", tests)
+    """What is seen of values, by sentences that each have a place for a mean over tasks.
+
+    With each: the values by task, a bound, and 1 where they should be above it, -1 below.
+    """
+    tests = tuple(over_tasks(sign * v, sign * bound) for v, bound, sign in parts.values())
+    seen = [in_words(sentence, values) for sentence, (values, _, _) in parts.items()]
+    return Finding(all(test.estimate > 0 for test in tests), one_sentence(seen), tests)
+
+
+def one_sentence(parts: list[str]) -> str:
+    """Parts of the evidence as one sentence."""
+    words = "; ".join(parts)
+    return f"{words[0].upper()}{words[1:]}."
 
 
 def first_goal_ahead_gains_most(data: Data, _: Claim) -> Finding:
     """one-tailed bootstrap test over random tasks of the difference of both gains"""
     gaps = gaps_of(data)
     gained, left = gaps[0] - gaps[1], gaps[1] - gaps[ALL_GOALS]
-    return finding(
-        {
-            "The first goal ahead gains, more than all others, per cent:": (gained - left, 0.0, 1),
-        }
-    )
+    sentence = "The first goal ahead gains {} points more than all others together"
+    return finding({sentence: (gained - left, 0.0, 1)})
 
 
 def further_goals_gain_little(data: Data, _: Claim) -> Finding:
@@ -137,8 +144,8 @@ def further_goals_gain_little(data: Data, _: Claim) -> Finding:
     gaps, least = gaps_of(data), MARGINS["gain"]
     return finding(
         {
-            "The second goal ahead gains, per cent:": (gaps[1] - gaps[2], least, 1),
-            "the fourth": (gaps[3] - gaps[4], least, -1),
+            "The second goal ahead gains {} points": (gaps[1] - gaps[2], least, 1),
+            "the fourth gains {} points": (gaps[3] - gaps[4], least, -1),
         }
     )
 
@@ -148,12 +155,11 @@ def most_of_the_loss_is_posture(data: Data, _: Claim) -> Finding:
 the loss"""
     planned, given = gaps_of(data)[0], gaps_of(data, hands="optimal")[0]
     share = MARGINS["share_of_loss"]
-    return finding(
-        {
-            f"Without look-ahead, given hands lose more than {share:.0%} of what planned "
-            "hands lose, by per cent of the best:": (given - share * planned, 0.0, 1),
-        }
+    sentence = (
+        "Without look-ahead the planner with given hands loses {} points more than "
+        f"{share:.0%} of what it loses with its own"
     )
+    return finding({sentence: (given - share * planned, 0.0, 1)})
 
 
 def dear_joints_keep_the_horizon(data: Data, _: Claim) -> Finding:
@@ -161,10 +167,10 @@ def dear_joints_keep_the_horizon(data: Data, _: Claim) -> Finding:
     parts, least = {}, MARGINS["gain"]
     for costs in DEAR:
         gaps = gaps_of(data, costs=costs)
-        parts[f"{costs} dear: the second goal ahead gains, per cent:"] = (
-            gaps[1] - gaps[2], least, 1
-        )  # fmt: skip
-        parts[f"{costs} dear: those beyond the fourth"] = (gaps[4] - gaps[ALL_GOALS], least, -1)
+        dear = f"with a dear {costs.replace('-', ' ')}"
+        parts[f"{dear} the second goal ahead gains {{}} points"] = gaps[1] - gaps[2], least, 1
+        beyond = gaps[4] - gaps[ALL_GOALS]
+        parts[f"{dear} those beyond the fourth gain {{}} points together"] = beyond, least, -1
     return finding(parts)
 
 
@@ -182,7 +188,8 @@ def learner_behind_one_goal_ahead(data: Data, _: Claim) -> Finding:
             learner[name] = 100 * float(share.mean())
             data.run_ids.extend(cell.good.run_id)
     behind = pd.Series(learner, dtype=np.float64) - gaps[1]
-    return finding({"Per cent by which the learner loses more:": (behind, MARGINS["gain"], 1)})
+    sentence = "The learner loses {} points more than the planner with one goal ahead"
+    return finding({sentence: (behind, MARGINS["gain"], 1)})
 
 
 def served_next_goal(data: Data, timing: str, stop: int) -> pd.Series:
@@ -203,7 +210,7 @@ def postures_serve_after_a_stop(data: Data, _: Claim) -> Finding:
     """one-tailed bootstrap tests over random tasks, with free and with equal times"""
     least = MARGINS["ticks"]
     return finding({
-        f"Ticks by which postures leave the next goal nearer, {timing} times:": (
+        f"Ticks by which postures leave the next goal nearer, {timing} times: {{}}": (
             served_next_goal(data, timing, 1), least, 1
         )
         for timing in ("free", "fixed")
@@ -216,7 +223,7 @@ def stop_at_equal_times(data: Data, _: Claim) -> Finding:
     return finding(
         {
             "Ticks by which postures leave the next goal nearer when passing than with "
-            "a full stop, at equal times:": (passing - stopping, 0.0, 1),
+            "a full stop, at equal times: {}": (passing - stopping, 0.0, 1),
         }
     )
 
@@ -224,10 +231,10 @@ def stop_at_equal_times(data: Data, _: Claim) -> Finding:
 def less_regret(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap tests over random tasks that the first regrets less than the second by \
 more than {regret:g} % of the best known reward"""
-    tests, parts = [], []
-    for where, pair in claim.cells.items():
+    tests = []
+    by_pair: dict[str, list[str]] = {}
+    for where, (first, second) in claim.cells.items():
         terms, _, weight = where.partition(" ")
-        first, second = pair
         for term in TERMS if terms == "every" else (terms,):
             table = advantage(data.study, first, second, term)
             if len(table) < FEWEST or float(weight) not in table.columns:
@@ -235,9 +242,11 @@ more than {regret:g} % of the best known reward"""
             values = np.array(table[float(weight)], dtype=np.float64)
             test = bootstrap_test(values, MARGINS["regret"], resamples=RESAMPLES_OF_STUDIES)
             tests.append(test)
-            parts.append(
-                f"{term} {weight}: {first} {estimate(mean(values), 1)} % less regret than "
-                f"{second} on {len(values)} random tasks"
+            at = f"at weight {weight} ({TERMS[term]})" if float(weight) else "without a penalty"
+            by_pair.setdefault(f"{WHO[first]} regrets less than {WHO[second]}", []).append(
+                f"{estimate(mean(values), 1)} points {at} on {len(values)} random tasks"
             )
     data.run_ids.extend(data.study.runs.run_id)
-    return Finding(all(test.estimate > 0 for test in tests), f"{'; '.join(parts)}.", tuple(tests))
+    seen = one_sentence([f"{pair}: {', '.join(parts)}" for pair, parts in by_pair.items()])
+    seen += " Points are per cent of the best known reward."
+    return Finding(all(test.estimate > 0 for test in tests), seen, tuple(tests))

@@ -115,7 +115,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 def median(values: pd.Series) -> float:
-    """Of the values that are known; NaN where none is, as for runs that crashed."""
+    """Median of the known values; NaN where none is, as for runs that crashed."""
     present = numbers(values)
     present = present[~np.isnan(present)]
     return float(np.median(present)) if len(present) else math.nan

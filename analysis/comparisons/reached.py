@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from coartic.analysis.comparisons.methods import group_of, numbers, solve_times
-from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps
+from coartic.analysis.comparisons.standings import ALL_TASKS, gaps, initial_and_optimum
 from coartic.analysis.methods import in_order, is_search, is_variant
 from coartic.analysis.optima import locks_base
 from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Interval, interval
@@ -159,7 +159,8 @@ class Targets:
     def crossing(self, level: float) -> Interval:
         """The least budget within which ``level`` of the pairs are reached; infinite without any.
 
-        With its percentile interval: runs are drawn anew within their task. No interval where a
+        With its percentile interval: runs are drawn anew within their task, and the tasks stay.
+        It is not widened as means over tasks are, as a budget can be infinite. No interval where a
         task has too few runs.
         """
         steps = np.append(self.values, math.inf)
@@ -200,10 +201,11 @@ def targets(study: Study) -> dict[tuple[str, str, str], Targets]:
     """Pairs of run and target by task, method and spend; over :data:`ALL_TASKS` where some method
     ran on all of several.
 
-    Of the tasks of :func:`~.standings.ends`, and of all methods but variants and searches for
-    the optimum. A run whose steps are not known, such as the time of a cold one, has no part.
+    Tasks are those of :func:`~.standings.initial_and_optimum`, methods all but variants and
+    searches for the optimum. A run whose steps are not known, such as the time of a cold one,
+    has no part.
     """
-    scale = ends(study)
+    scale = initial_and_optimum(study)
     spends: dict[tuple[str, str, str], Array] = {}
     for cell, spend, runs in cells_by_spend(study):
         if cell.task in scale and runs and not is_variant(cell.label) | is_search(cell.label):

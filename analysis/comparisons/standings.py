@@ -29,25 +29,28 @@ from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.statistics.hypotheses import holm, sign_flip_test
 from coartic.analysis.statistics.instances import gap_share, task_mean
 from coartic.analysis.study import Study, cached
-from coartic.analysis.trajectories import initial_solution
+from coartic.analysis.trajectories import initial_reward
 
 ALL_TASKS = "all tasks"
-"""In the column of tasks: the mean over all of them."""
+"""What stands in the column of tasks for the mean over all of them."""
 
 
 @cached
-def ends(study: Study) -> dict[str, tuple[float, int]]:
-    """Rewards of the initial solution and of the optimum by task, where both are known.
+def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
+    """Rewards of the initial solution and of the optimum by task, where the optimum is better.
 
-    The initial solution is the corrective process alone with the task's initial hands, the
-    optimum that with all joints free.
+    Without tasks where one of them is not known or the optimum is 0. The initial solution is the
+    corrective process alone with the task's initial hands, the optimum that with all joints free.
     """
     by_task = {}
     for name, task in study.tasks.items():
         best = study.optima.get(name)
-        initial = initial_solution(task, study.model)
-        if best is not None and initial is not None and 0 != best.reward > -initial.ticks:
-            by_task[name] = float(-initial.ticks), best.reward
+        initial = initial_reward(task, study.model)
+        if best is not None:
+            can_improve = best.reward > initial  # never from NaN: no initial solution
+            gap_is_a_share = best.reward != 0
+            if can_improve and gap_is_a_share:
+                by_task[name] = initial, best.reward
     return by_task
 
 
@@ -59,17 +62,18 @@ def optimum_in_words(study: Study) -> str:
 
 @cached
 def gaps(study: Study) -> pd.DataFrame:
-    """One row a run of every task of :func:`ends`.
+    """One row a run of every task of :func:`initial_and_optimum`.
 
     Columns ``task``, ``method`` (its label, or the learner's conditions together), ``label``,
     ``run``, ``seed``, ``gap`` as a share of the optimum, NaN for a run without a solution.
     """
     frame = pd.DataFrame(columns=["task", "method", "label", "run", "seed", "gap"])
-    parts = []
+    rewards_by_task, parts = initial_and_optimum(study), []
     for (task, label), cell in study.cells.items():
-        if task in ends(study):
+        if task in rewards_by_task:
+            _, optimum = rewards_by_task[task]
             rewards = cell.runs.reward.where(cell.runs.status == "ok")
-            gap = gap_share(rewards.to_numpy(np.float64, na_value=math.nan), ends(study)[task][1])
+            gap = gap_share(rewards.to_numpy(np.float64, na_value=math.nan), optimum)
             of_cell = cell.runs[["run", "seed"]].assign(
                 task=task, method=label, label=label, gap=gap
             )
@@ -109,7 +113,7 @@ def standings(study: Study) -> pd.DataFrame:
 def over_all(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
     """Methods with a solution to every run of every task, where there are several: ``all tasks``,
     method, gap with its interval, and runs."""
-    tasks = ends(study)
+    tasks = initial_and_optimum(study)
     for name, runs in gaps(study).groupby("method", sort=False):
         by_task = {str(task): of_task.gap.to_numpy() for task, of_task in runs.groupby("task")}
         if len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
@@ -118,7 +122,8 @@ def over_all(study: Study) -> Iterator[tuple[str, str, float, float, float, int]
 
 
 def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
-    """The same of methods with a solution to every run of a task."""
+    """Methods with a solution to every run of a task: the task, label, gap with its interval, and
+    number of runs."""
     for (task, label), cell in study.cells.items():
         has_gap = not math.isnan(method_rows(study).gap[task, label])
         if has_gap and len(cell.good) == len(cell.runs):
@@ -148,12 +153,14 @@ def apart_p(study: Study, first: str, second: str) -> float:
     """Two-tailed p of the difference of mean gaps of two methods over the tasks of both.
 
     A sign-flip test of runs paired by seed within their task; a method that is run once is compared
-    with every run of the other. All tasks count the same; NaN without pairs on one of them.
+    with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
+    that only one of them has do not count, unlike in the table ``against-learner``.
     """
     frame = gaps(study)
     one, two = (frame[frame.method == method] for method in (first, second))
     differences = []
-    for task in (task for task in ends(study) if task in set(one.task) & set(two.task)):
+    shared = set(one.task) & set(two.task)
+    for task in (task for task in initial_and_optimum(study) if task in shared):
         a, b = one[one.task == task], two[two.task == task]
         both = a.merge(b, on="seed" if min(len(a), len(b)) > 1 else "task")
         differences.append((both.gap_x - both.gap_y).to_numpy(np.float64))

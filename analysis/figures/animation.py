@@ -190,4 +190,4 @@ def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]
         axes.set_title("", loc="left")
         for text in list(axes.texts):
             text.remove()
-    return figure, [Scene(*of) for of in zip(figure.axes, movements, strict=True)]
+    return figure, [Scene(*each) for each in zip(figure.axes, movements, strict=True)]

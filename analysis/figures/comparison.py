@@ -21,7 +21,7 @@ from coartic.analysis.methods import in_order, is_learner, name_of
 from coartic.analysis.study import Study
 from coartic.analysis.tables import comparison
 from coartic.analysis.tables.comparison import price_curves
-from coartic.analysis.trajectories import initial_solution
+from coartic.analysis.trajectories import initial_reward
 from coartic.analysis.words import in_brackets, number
 
 
@@ -176,10 +176,10 @@ def draw_curves(
         axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
         axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
     floor, top = data.best.min(), data.best_high.max()
-    initial = initial_solution(task, study.model)
-    if initial is not None:
-        axes.axhline(-initial.ticks, **style.INITIAL)
-        floor, top = -initial.ticks, max(top, -initial.ticks)
+    initial = initial_reward(task, study.model)
+    if not math.isnan(initial):
+        axes.axhline(initial, **style.INITIAL)
+        floor, top = initial, max(top, initial)
     optimum = study.optima.get(task.name)
     if optimum is not None:
         axes.axhline(optimum.reward, **style.OPTIMUM)

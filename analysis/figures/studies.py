@@ -16,6 +16,7 @@ from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.human import judge
 from coartic.analysis.human.measures import MODELS
 from coartic.analysis.methods import name_of
+from coartic.analysis.studies.objectives import TERMS, WHO
 from coartic.analysis.study import Study
 from coartic.analysis.tables.studies import SMOOTH, horizon_beside
 from coartic.analysis.tables.studies import crossings as crossings_table
@@ -26,7 +27,7 @@ from coartic.analysis.tables.studies import stops as stops_table
 
 PLACES = [str(h) for h in HORIZONS]
 COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
-"""Of the lines of a panel."""
+"""Colours of the lines of a panel."""
 
 
 @figure(
@@ -148,16 +149,15 @@ def stops(study: Study) -> Parts:
     return drawing, drawn, f"Posture and velocity by stop. {'; '.join(each)}.", ()
 
 
-TITLES = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
-WHO_LOOKS: dict[str, tuple[str, Any, str]] = {
-    "told": (style.INK, style.SOLID, "planner, told of the penalty"),
-    "ticks": (style.VERMILLION, style.SOLID, "planner of ticks"),
-    "smooth": (style.ORANGE, style.DASHED, "planner of smoothness"),
-    "learner": (style.BLUE, style.SOLID, "learner"),
-    "from plan": (style.SKY, style.DASHED, "learner from the plan of ticks"),
-    "cma-es": (style.GREEN, style.SOLID, "CMA-ES"),
+WHO_LOOKS: dict[str, tuple[str, Any]] = {
+    "told": (style.INK, style.SOLID),
+    "ticks": (style.VERMILLION, style.SOLID),
+    "smooth": (style.ORANGE, style.DASHED),
+    "learner": (style.BLUE, style.SOLID),
+    "from plan": (style.SKY, style.DASHED),
+    "cma-es": (style.GREEN, style.SOLID),
 }
-"""Colour, dash and words of each line."""
+"""Colour and dash of each line."""
 
 
 @figure(
@@ -174,11 +174,11 @@ def objectives(study: Study) -> Parts:
     data = objectives_table(study)
     if not len(data):
         raise missing(study, "no random tasks with a penalty")
-    drawing, panels = style.figure_of((1, len(TITLES)), (style.TWO, 2.8), sharey=True)
+    drawing, panels = style.figure_of((1, len(TERMS)), (style.TWO, 2.8), sharey=True)
     weights = sorted(data.weight.unique())
     edge = 1.05 * weights[-1]
     crossings = crossings_table(study)
-    for axes, (term, title) in zip(panels, TITLES.items(), strict=True):
+    for axes, (term, title) in zip(panels, TERMS.items(), strict=True):
         axes.set_title(title)
         axes.set_xscale("function", functions=(np.sqrt, np.square))
         axes.set_xticks(weights, [f"{weight:g}" for weight in weights])
@@ -187,11 +187,11 @@ def objectives(study: Study) -> Parts:
         for at in crossings[crossings.term == term].to_dict("records"):
             band: Any = {"color": WHO_LOOKS[at["who"]][0], "alpha": 0.15, "linewidth": 0}
             axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
-        for who, (color, dash, words) in WHO_LOOKS.items():
+        for who, (color, dash) in WHO_LOOKS.items():
             rows = data[(data.term == term) & (data.who == who)]
             line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
             axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
-            axes.plot(rows.weight, rows.regret, **line, label=words)
+            axes.plot(rows.weight, rows.regret, **line, label=WHO[who].removeprefix("the "))
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("regret (%)")
     style.letters(panels)

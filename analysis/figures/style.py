@@ -39,7 +39,7 @@ RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
 SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
 CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
-"""Of all intervals, for captions."""
+"""Coverage of all intervals, for captions."""
 PAPER = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""

@@ -82,7 +82,7 @@ class Sample:
         return most_exploring(self.tasks[name]) if label == "learner" else label
 
     def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
-        """Of each solved run (n,), as a share of the best known reward; None without any.
+        """Gaps of the solved runs (n,), as shares of the best known reward; None without any.
 
         The gap to the optimum is at least this. To the proven bound, which it is at most, it is
         None where nothing is proven.
@@ -119,7 +119,7 @@ class Sample:
 
     @cached_property
     def by_hands(self) -> dict[str, dict[str, int]]:
-        """By instance: best reward of any run of the folder with each hand sequence on it.
+        """Best reward of any run of the folder with each hand sequence, by instance.
 
         The corrective process alone with every sequence counts as well. The best that a sequence
         can give is at least that.
@@ -159,15 +159,16 @@ def sample(study: Study) -> Sample | None:
 
 
 THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
-"""From where on a sign of :data:`~coartic.analysis.signatures.signs.SIGNS` is there: a tenth of the
-goals, or of the way; more than a tick, which rounding can make."""
+"""Least values with which signs of :data:`~coartic.analysis.signatures.signs.SIGNS` are there: a
+tenth of the goals, or of the way; more than a tick, which rounding can make."""
 
 
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Of every instance and condition of the learner, by name and label.
+    """Values of signs (n,) on every instance under every condition of the learner.
 
-    Signs by the names of :data:`THERE`, of the runs (n,) that have a value; without none of it.
+    By the instance's name and the condition's label, then by the sign's name in :data:`THERE`; a
+    value for each run that has one. A sign without any is left out.
     """
     by_cell = {}
     instances = sample(study)

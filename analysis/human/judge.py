@@ -31,7 +31,7 @@ class Test(BaseModel):
     above: float | None = None
     below: float | None = None
     disagree: float | None = None
-    """Beyond which, on the wrong side, it is a disagreement; the bound itself if not given."""
+    """Bound beyond which, on the wrong side, it is a disagreement; the first bound if not given."""
 
     @model_validator(mode="after")
     def is_one_inequality(self) -> Test:
@@ -104,19 +104,21 @@ def judged(study: Study) -> pd.DataFrame:
                 mean_of([]) if silent else MEASURES[test.measure](study, MODELS[model])
                 for test in finding.tests
             ]
-            ends = [bootstrapped(of, LEVEL / len(finding.tests)) for of in values]
-            counts = [len(of.by_task) for of in values]
+            level = LEVEL / len(finding.tests)
+            estimates = [bootstrapped(measured, level) for measured in values]
+            counts = [len(measured.by_task) for measured in values]
             of_tests = [
-                SILENT if silent else verdict_of_test(test, end, count)
-                for test, end, count in zip(finding.tests, ends, counts, strict=True)
+                SILENT if silent else verdict_of_test(test, estimate, count)
+                for test, estimate, count in zip(finding.tests, estimates, counts, strict=True)
             ]
             verdict = verdict_of(of_tests)
             built_in = finding.built_in.get(model) == verdict
-            for test, end, count, alone in zip(finding.tests, ends, counts, of_tests, strict=True):
+            rows_of_tests = zip(finding.tests, estimates, counts, of_tests, strict=True)
+            for test, estimate, count, alone in rows_of_tests:
                 bound = (
                     f"above {test.above:g}" if test.above is not None else f"below {test.below:g}"
                 )
-                measured = (name, model, test.measure, bound, *end, count)
+                measured = (name, model, test.measure, bound, *estimate, count)
                 rows.append((*measured, alone, verdict, built_in, silent))
     columns = "finding model measure bound value low high tasks of_test verdict built_in because"
     return pd.DataFrame(rows, columns=columns.split())
@@ -126,7 +128,8 @@ def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
     """A statistic of all tasks, and its interval over tasks drawn with replacement.
 
     Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without
-    tasks, and without an interval of one.
+    tasks, and without an interval of one. Unlike in :mod:`~coartic.analysis.statistics.instances`
+    the statistic can be another than a mean over families, and runs are not drawn.
     """
     count = len(values.by_task)
     if not count:
@@ -144,26 +147,29 @@ def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
     return estimate, float(low), float(high)
 
 
-def verdict_of_test(test: Test, ends: tuple[float, float, float], tasks: int) -> str:
-    """Of a value with its interval on one test; undecided where both verdicts fit."""
+def verdict_of_test(test: Test, estimate: tuple[float, float, float], tasks: int) -> str:
+    """The verdict of one test, by a value with its interval; undecided where both verdicts fit.
+
+    A value at the bound is neither above nor below it.
+    """
     if not tasks:
         return NO_CASES
-    _, low, high = ends
+    _, low, high = estimate
     sign, bound = (1, test.above) if test.above is not None else (-1, test.below)
     assert bound is not None
     wrong = bound if test.disagree is None else test.disagree
     near, far = sorted((sign * low, sign * high))
-    agrees, disagrees = near >= sign * bound, far < sign * wrong
+    agrees, disagrees = near > sign * bound, far < sign * wrong
     if tasks < FEWEST_TASKS or agrees == disagrees:
         return UNDECIDED
     return AGREES if agrees else DISAGREES
 
 
 def verdict_of(tests: Sequence[str]) -> str:
-    """Of a finding, from the verdicts of its tests."""
+    """The verdict of a finding, from those of its tests: one on the wrong side disagrees."""
     if len(set(tests)) == 1:
         return tests[0]
-    return next((kind for kind in (NO_CASES, DISAGREES) if kind in tests), UNDECIDED)
+    return next((kind for kind in (DISAGREES, NO_CASES) if kind in tests), UNDECIDED)
 
 
 def separating(study: Study) -> dict[str, list[str]]:

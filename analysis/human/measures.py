@@ -108,7 +108,7 @@ def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories
     return {cell.task: study.trajectories(cell.task, cell.label) for cell in cells}
 
 
-def still(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
+def unmoved_tasks(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
     """Runs on tasks with so many arms and fewer than six goals, of which none was moved."""
     return {
         name: runs
@@ -147,7 +147,7 @@ def run_ids(study: Study, name: str, where: str) -> str:
 
 
 def squared_slopes(group: list[Trajectories], moving: int, at: int) -> Array:
-    """Of each joint's slope on the place of the goal that moves, squared, shape ``(dof,)``.
+    """Squared slope of each joint on the place of the goal that moves, shape ``(dof,)``.
 
     The posture at goal ``at``, in rad or length unit per length unit. Of several runs the products
     of different ones, whose mean is right however much runs differ; below 0 by chance only.
@@ -198,8 +198,8 @@ def practice(study: Study, model: Model, statistic: Callable[[Array], float]) ->
         for trials in (PRACTISED, BEGUN)
         for distance in (1, 2)
     ]
-    tasks = [task for task in norms[0] if all(task in of for of in norms)]
-    return Values([np.array([[of[task] for of in norms]]) for task in tasks], statistic)
+    tasks = [task for task in norms[0] if all(task in by_task for by_task in norms)]
+    return Values([np.array([[by_task[task] for by_task in norms]]) for task in tasks], statistic)
 
 
 def horizon_rise(rows: Array) -> float:
@@ -219,7 +219,7 @@ def benefit_correlation(study: Study, model: Model) -> Values:
     What can be saved: ticks with no goal ahead less the fewest of any run, where no goal moved.
     """
     norms = slope_norms(study, model, 1)
-    alone = still(study, MODELS["no goal ahead"], 1)
+    alone = unmoved_tasks(study, MODELS["no goal ahead"], 1)
     highest = study.runs[study.runs.status == "ok"].groupby("task").reward.max()
     rows = [
         np.array([[norm, alone[task].runs[0].ticks + float(highest[task])]])
@@ -268,15 +268,15 @@ def bows(run: Trajectory) -> Iterator[tuple[float, float, float]]:
         path = stations(hand_path(run, k + 1))
         chord = path[-1] - path[0]
         away = path - path[0]
-        side = (chord[0] * away[:, 1] - chord[1] * away[:, 0]) / np.linalg.norm(chord)
-        yield float(side.mean()), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])
+        bow = (chord[0] * away[:, 1] - chord[1] * away[:, 0]) / np.linalg.norm(chord)
+        yield float(bow.mean()), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])
 
 
 def bow_slope(study: Study, model: Model) -> Values:
     """Slope of the bow on the next turn, given the last one, over the reaches of all tasks."""
     by_task = [
         np.array([row for run in runs.runs for row in bows(run)])
-        for runs in still(study, model, 1).values()
+        for runs in unmoved_tasks(study, model, 1).values()
     ]
 
     def statistic(rows: Array) -> float:
@@ -300,10 +300,10 @@ def turn_at_goals(run: Trajectory) -> float:
 
 def turn_saved(study: Study, model: Model) -> Values:
     """Turn at goals under the corrective process alone less that of the model, on one arm."""
-    alone = still(study, MODELS["corrective process"], 1)
+    alone = unmoved_tasks(study, MODELS["corrective process"], 1)
     return mean_of([
         np.array(turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)]))
-        for task, runs in still(study, model, 1).items()
+        for task, runs in unmoved_tasks(study, model, 1).items()
         if task in alone
     ])  # fmt: skip
 
@@ -338,8 +338,8 @@ def changed_by_practice(
         return mean_of([])
     values = []
     for arms in (1, 2):
-        alone = still(study, MODELS["corrective process"], arms)
-        for task, runs in still(study, model, arms).items():
+        alone = unmoved_tasks(study, MODELS["corrective process"], arms)
+        for task, runs in unmoved_tasks(study, model, arms).items():
             if task in alone:
                 learned = np.mean([measured(run) for run in runs.runs])
                 values.append(np.array(sign * (learned - measured(alone[task].runs[0]))))
@@ -352,7 +352,7 @@ def changed_by_practice(
 def first_movement(study: Study, model: Model) -> Values:
     """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
     values = []
-    for runs in still(study, model, 2).values():
+    for runs in unmoved_tasks(study, model, 2).values():
         excess = []
         for run in runs.runs:
             alone = isolated_reach(run.task, run.task.q0, 1, run.hands[0])
@@ -367,7 +367,7 @@ def needs_other_hands(study: Study) -> set[str]:
     """Tasks whose best solution takes a hand that is slower for some goal that others follow."""
     best: dict[str, Trajectory] = {}
     for model in MODELS.values():
-        for task, runs in still(study, model, 2).items():
+        for task, runs in unmoved_tasks(study, model, 2).items():
             for run in runs.runs:
                 if task not in best or run.ticks < best[task].ticks:
                     best[task] = run
@@ -378,7 +378,7 @@ def late_less_early(study: Study, model: Model) -> Values:
     """Share of goals hit with the quicker hand for them: the last but one, less those before."""
     return mean_of([
         np.array(np.mean([agree[-2] - np.mean(agree[:-2]) for agree in agreements]))
-        for task, runs in still(study, model, 2).items()
+        for task, runs in unmoved_tasks(study, model, 2).items()
         if task in needs_other_hands(study)
         and (agreements := [np.array(isolated_agreement(run), float) for run in runs.runs])
     ])  # fmt: skip
@@ -387,7 +387,7 @@ def late_less_early(study: Study, model: Model) -> Values:
 def near_tie_repeats(study: Study, model: Model) -> Values:
     """Share of near ties in which the hand stays the same."""
     by_task = []
-    for runs in still(study, model, 2).values():
+    for runs in unmoved_tasks(study, model, 2).values():
         repeats = [
             run.hands[goal - 1] == run.hands[goal - 2]
             for run in runs.runs
@@ -412,7 +412,7 @@ def near_ties(run: Trajectory) -> Iterator[int]:
 
 def waiting_hand(study: Study, model: Model) -> Values:
     """Share of the way to its next goal that the waiting hand covers, mean over goals."""
-    of_tasks = [SIGNS["other arm"].of(runs) for runs in still(study, model, 2).values()]
+    of_tasks = [SIGNS["other arm"].of(runs) for runs in unmoved_tasks(study, model, 2).values()]
     return mean_of([np.array(values.mean()) for values in of_tasks if len(values)])
 
 

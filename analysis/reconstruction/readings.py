@@ -149,7 +149,7 @@ def one_armed() -> tuple[Task, ...]:
 
 
 def likelihoods(figures: Sequence[Figure], runs: pd.DataFrame) -> list[Likelihood]:
-    """Of the counts of a cell, and of mean and SD of each group of runs that are printed.
+    """Likelihoods of the counts of a cell, and of the printed mean and SD of each group of runs.
 
     A group with fewer than FEWEST of our runs is left out: that they are few lowers the
     likelihood of the counts, and that runs fail is a part of its own.
@@ -171,7 +171,7 @@ def likelihoods(figures: Sequence[Figure], runs: pd.DataFrame) -> list[Likelihoo
 
 
 def likelihood_of_gain(gain: float, initial: float, mean: Figure) -> list[Likelihood]:
-    """Of a printed gain over the initial solution, given the printed mean; none if certain.
+    """Likelihood of a printed gain on the initial reward, given the printed mean; none if certain.
 
     Both are rounded from one mean: where it rounds to what is printed, the initial reward
     decides the gain but for a mean on the border.

@@ -140,7 +140,7 @@ def judge_view(
             if task in claim.pairs:
                 fields = {"pairs": claim.pairs, "shown": claim.shown}
                 alone = {
-                    name: {of: texts for of, texts in by_task.items() if of == task}
+                    name: {other: texts for other, texts in by_task.items() if other == task}
                     for name, by_task in fields.items()
                 }
                 wanted[number] = claim.model_copy(update=alone)

@@ -39,7 +39,7 @@ class Figure:
     runs: int
     """Runs that it rests on; of a share, those of the experiment."""
     hands: str | None = None
-    """Those runs alone that learned this sequence; None for all."""
+    """Hand sequence of the runs that count; None for all runs."""
     sd: float | None = None
     """Printed SD of the runs, for a mean."""
     digits: int = 0
@@ -53,7 +53,7 @@ class Figure:
         return " ".join(filter(None, (self.condition, self.hands, self.kind)))
 
     def compare(self, cells: Mapping[str, pd.DataFrame]) -> tuple[float, float]:
-        """The same figure of our runs, and its difference in standard errors.
+        """This figure of our runs, and its difference to the printed one in standard errors.
 
         ``cells``: runs by condition. NaN where too few runs learned the sequence.
         """

@@ -30,7 +30,7 @@ from coartic.text import did_you_mean
 
 GRID_BLOCK = 100_000  # points of the grid that are tried at once
 DIFFERENCE = 0.1
-"""Of the finite differences, length unit: rewards are whole ticks, some 100 a length unit."""
+"""Step of the finite differences, length unit: rewards are whole ticks, some 100 a length unit."""
 SOLVER_STEPS = 12
 LONGEST_STEP = 0.5  # of the solver, length unit
 
@@ -43,7 +43,7 @@ class Search:
     layout: Layout
     constraints: tuple[Constraint, ...]
     readings: tuple[ChosenReading, ...] = ()
-    """Of the model and of the exploration conditions; the task is as they have it."""
+    """Readings of the model and of the exploration conditions; the task is as they have it."""
     jobs: int = 2
     near: float = 12.0
     """Ticks by which the rewards of a point of the grid may miss the printed ones."""
@@ -52,7 +52,7 @@ class Search:
 
     @property
     def model(self) -> MotionModel:
-        """As the readings have it."""
+        """The motion model under the readings."""
         return model_under(self.readings)
 
     @property

@@ -50,7 +50,7 @@ class TwoContexts:
 
     @property
     def tasks(self) -> tuple[Task, Task]:
-        """Of either context."""
+        """The tasks of both contexts."""
         return self.first.task, self.second.task
 
     @property
@@ -60,18 +60,18 @@ class TwoContexts:
 
     @property
     def place(self) -> Row:
-        """Of every value."""
+        """Where every value belongs: the goal, the hand and the other task."""
         return {"goal": self.goal, "hand": self.hand, "against": self.second.task.name}
 
     @cached_property
     def runs(self) -> tuple[tuple[Trajectory, ...], tuple[Trajectory, ...]]:
-        """Of either context."""
+        """Runs of either context that hit the goal with the hand."""
         hand, goal = self.hand, self.goal
         return self.first.with_hand(hand, goal), self.second.with_hand(hand, goal)
 
     @cached_property
     def postures(self) -> tuple[Array, Array]:
-        """Of either context at the goal, ``(runs, dof)``."""
+        """Configurations at the goal in either context, ``(runs, dof)``, length unit and rad."""
         first, second = self.runs
         return postures(first, self.goal), postures(second, self.goal)
 
@@ -87,7 +87,7 @@ class TwoContexts:
 
     @property
     def spreads(self) -> float:
-        """That distance in pooled SDs of the runs; NaN where there is none."""
+        """Distance of the mean postures in pooled SDs of the runs; NaN without a spread."""
         return context_dependence(*self.postures)
 
     @property
@@ -104,18 +104,21 @@ class TwoContexts:
 
     @property
     def parts(self) -> tuple[float, float]:
-        """Of the difference of mean postures, what leaves the hand in place and what moves it."""
+        """Parts of the difference of mean postures: leaving the hand in place, and moving it."""
         joints, jacobian = self.jacobian
         first, second = (configurations.mean(axis=0) for configurations in self.postures)
         return motor_equivalence((first - second)[joints], jacobian)
 
     @cached_property
     def p(self) -> float:
-        """Of the permutation test over runs; NaN where a context has one run."""
+        """P-value of the permutation test over runs; NaN where a context has one run."""
         return self.p_within("context dependence")
 
     def p_within(self, signature: str, basis: Array | None = None) -> float:
-        """The same within the span of an orthonormal ``basis`` (dof, d), with draws of its own."""
+        """P-value of that test within the span of an orthonormal ``basis`` (dof, d).
+
+        Each ``signature`` has draws of its own.
+        """
         return float(permutation_p(*self.postures, rng_of(signature, self.place), basis=basis))
 
 

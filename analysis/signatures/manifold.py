@@ -37,7 +37,7 @@ def subspaces(jacobian: Array) -> tuple[Array, Array]:
 
 
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
-    """Of a difference between configurations, the motor-equivalent and the other part.
+    """The motor-equivalent and the other part of a difference between configurations.
 
     ``difference`` has shape ``(k,)``, length unit and rad mixed. Each part, ≥ 0, is its length
     over the root of the dimension of its space, so that a difference in a random direction has

@@ -81,7 +81,7 @@ def rows_of_cells(study: Study) -> Rows:
 
 
 def of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
-    """Of every shared goal with every hand that hit it in both contexts."""
+    """Rows for every shared goal and every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
         by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
         in_both = [contexts for contexts in by_hand if all(contexts.runs)]

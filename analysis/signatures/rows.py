@@ -79,12 +79,14 @@ def row(signature: str, place: Row, **values: Any) -> Row:
 
 
 def estimated(signature: str, place: Row, interval: Interval, n: int, **values: Any) -> Row:
-    """The same of a value with its interval or test, over so many runs."""
+    """A row for a value with its interval or test, over ``n`` runs."""
     why = "one run: no interval" if n == 1 else ""
     return row(signature, place, **{"why_not": why, "n": n, **interval._asdict(), **values})
 
 
-def without(of: Iterable[Signature], why: str, place: Row | None = None, n: int = 0) -> Rows:
-    """That none of them applies."""
-    for signature in of:
+def without(
+    signatures: Iterable[Signature], why: str, place: Row | None = None, n: int = 0
+) -> Rows:
+    """Rows of signatures none of which applies, and why."""
+    for signature in signatures:
         yield row(signature.name, place or {}, n=n, why_not=why, unit="")

@@ -26,7 +26,7 @@ class Sign(NamedTuple):
 
 
 def slower_hands(cell: Trajectories) -> Array:
-    """Of the goals that others follow, the share hit with a hand that is slower for them alone."""
+    """Share of goals before the last hit with a hand slower for them alone, ``(runs,)``."""
     if len(cell.task.hands) < 2 or len(cell.task.goals) < 2:
         return np.empty(0)
     return np.array([1.0 - np.mean(isolated_agreement(run)[:-1]) for run in cell.runs])

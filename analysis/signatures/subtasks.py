@@ -13,7 +13,7 @@ from coartic.robot import HANDS, Array
 ROUNDING = 1
 """Ticks that a planned movement can lose to rounding alone."""
 NO_LENGTH = 1e-9
-"""Of a displacement in joint space: shorter ones are rounding."""
+"""Length of a displacement in joint space below which it is rounding."""
 
 
 def isolated_reach(task: Task, q: Array, goal: int, hand: Hand) -> tuple[int, Array] | None:

@@ -69,7 +69,7 @@ def equivalence(first: ArrayLike, second: ArrayLike | float, margin: float) -> E
 
 
 def _variance(values: Array) -> tuple[float, int]:
-    """Of a sample, with its number of values."""
+    """Variance of the values of a sample (n - 1 degrees of freedom), and their number."""
     count = len(values)
     return float(np.var(centred(values), ddof=1)) if count > 1 else math.nan, count
 

@@ -29,11 +29,11 @@ CONFIDENCE = 0.95
 TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
 """The quantiles that such an interval lies between."""
 LEVEL = 0.05
-"""Of a test."""
+"""Level of a test."""
 RESAMPLES = 9_999
 """With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
 SEED = 0
-"""Of every resampling."""
+"""Seed of every resampling."""
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
 LARGE, RESAMPLES_OF_LARGE = 500, 1_999
@@ -54,9 +54,11 @@ class Inference:
     method: str
     """The interval or test, in words."""
     low: float = math.nan
-    """Of the interval, of coverage :data:`CONFIDENCE`."""
+    """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     p: float = math.nan
+    resamples: int = 0
+    """Resamples that p was counted in; 0 for an exact test."""
     note: str = ""
     """Why there is no interval or p-value, or why it is a special one."""
 
@@ -70,12 +72,12 @@ class Interval(NamedTuple):
     p: float = math.nan
 
 
-def interval(name: str, of: Inference | Interval | None) -> dict[str, float]:
+def interval(name: str, estimated: Inference | Interval | None) -> dict[str, float]:
     """An estimate with its interval, as three columns of a table; nothing where there is none."""
-    if of is None:
+    if estimated is None:
         return {}
-    estimate = of.value if isinstance(of, Interval) else of.estimate
-    return {name: estimate, f"{name}_low": of.low, f"{name}_high": of.high}
+    value = estimated.value if isinstance(estimated, Interval) else estimated.estimate
+    return {name: value, f"{name}_low": estimated.low, f"{name}_high": estimated.high}
 
 
 def sample(values: ArrayLike) -> Array:
@@ -204,7 +206,7 @@ def student_mean(values: Array) -> Interval:
 
 
 def standard_deviation(values: Array) -> float:
-    """Of values (n,), n - 1 degrees of freedom; 0 without spread, NaN of fewer than two."""
+    """SD of values (n,), n - 1 degrees of freedom; 0 without spread, NaN of fewer than two."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan
 
 

@@ -95,7 +95,8 @@ def bootstrap_test(
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
-    return replace(inference, p=float(1 + extreme.sum()) / (1 + resamples))
+    p = float(1 + extreme.sum()) / (1 + resamples)
+    return replace(inference, p=p, resamples=resamples)
 
 
 def sign_flip_test(differences: ArrayLike) -> Inference:
@@ -182,11 +183,15 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     Those at or below α are rejected with a family-wise error rate of at most α, whatever
     the dependence. NaN, a test that could not be made, stays NaN and does not count; with a
     ``family``, the number of tests that were planned, those that are missing count as p = 1.
+    Raises ValueError for a p-value outside 0 to 1, and for fewer tests planned than made.
     """
     p = np.asarray(p_values, dtype=np.float64)
     if ((p < 0) | (p > 1)).any():
         raise ValueError("a p-value lies between 0 and 1")
-    planned = int((~np.isnan(p)).sum()) if family is None else family
+    tested = int((~np.isnan(p)).sum())
+    planned = tested if family is None else family
+    if planned < tested:
+        raise ValueError(f"fewer tests planned than made: {planned} of {tested}")
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
     adjusted = np.empty_like(p)

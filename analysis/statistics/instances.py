@@ -33,12 +33,12 @@ from coartic.analysis.statistics.estimates import (
 from coartic.robot import Array
 
 RESAMPLES = 1_999
-"""Of both levels, for an interval of one number."""
+"""Resamples of instances and runs, for an interval of one number."""
 Runs = tuple[Array, ...]
 """Scores of the runs (n,) on an instance; of two methods, whose difference counts: first less
 second."""
 Scores = Mapping[str, Sequence[Runs]]
-"""By family, of each of its instances."""
+"""Scores of the runs on each instance, by family."""
 
 
 def gap_share(rewards: ArrayLike, optimum: float) -> Array:
@@ -57,7 +57,7 @@ def task_mean(values: Mapping[str, ArrayLike]) -> Inference:
 
 
 def value(runs: Runs) -> float:
-    """Of an instance: the mean over runs, or the difference of two."""
+    """Score of an instance: the mean over its runs, or the difference of two means."""
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
@@ -105,7 +105,7 @@ def greatest_value(runs: Runs, sign: int) -> float:
 def resampled_deviations(
     instances: Sequence[Runs], values: Array, rng: np.random.Generator
 ) -> Array:
-    """Of resampled means of one family from its mean, shape ``(RESAMPLES,)``."""
+    """Deviations of resampled means of one family from its mean, shape ``(RESAMPLES,)``."""
     count = len(instances)
     which = rng.integers(count, size=(RESAMPLES, count))
     drawn = values[which]

@@ -21,11 +21,19 @@ from coartic.robot import Array
 from coartic.tasks.task import address_of
 
 Solution = tuple[Movement, ...]
-TERMS = ("joints", "region", "distinct")
-"""Penalties, each by its one weight."""
-WHO = ("told", "ticks", "smooth", "learner", "from plan", "cma-es")
-"""Planners that are told of the penalty, that believe that ticks count alone, that believe in
-smoothness; the learner, from the corrective process and from the plan of ticks; CMA-ES."""
+TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
+"""Penalties, each by its one weight, in words."""
+WHO = {
+    "told": "the planner told of the penalty",
+    "ticks": "the planner of ticks",
+    "smooth": "the planner of smoothness",
+    "learner": "the learner",
+    "from plan": "the learner from the plan of ticks",
+    "cma-es": "CMA-ES",
+}
+"""Who makes movements, in words: planners that are told of the penalty, that believe that ticks
+count alone, that believe in smoothness; the learner, from the corrective process and from the plan
+of ticks; CMA-ES."""
 UNTOLD = ("learner", "cma-es")
 """Who learns by trial and error, and from no plan."""
 _METHODS = {
@@ -69,10 +77,10 @@ def rewards(study: Study) -> pd.DataFrame:
         term, weight = term_of(task)
         seen: dict[str, tuple[float, CellRuns]] = {}
         best = -np.inf
-        for (of, label), cell in study.cells.items():
+        for (run_on, label), cell in study.cells.items():
             method = label.partition(" ")[0]
             who = _METHODS.get(method) or _METHODS.get(method.partition("/")[0])
-            if of == name and who is not None and len(cell.good):
+            if run_on == name and who is not None and len(cell.good):
                 seen[who] = float(cell.rewards.mean()), cell
                 best = max(best, float(cell.rewards.max()))
         for who, (movements, cell) in plans.get(base_of(name), {}).items():
@@ -91,7 +99,7 @@ def rewards(study: Study) -> pd.DataFrame:
 
 @cached
 def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Solution, CellRuns]]]:
-    """By task without a penalty, the plans of those that know of none, and their runs."""
+    """Plans of those that know of no penalty, and their runs, by task without a penalty."""
     movements, waypoints = study.movements
     plans: dict[str, dict[str, tuple[Solution, CellRuns]]] = {}
     for (name, label), cell in study.cells.items():
@@ -113,18 +121,18 @@ def on_random_tasks(study: Study) -> pd.DataFrame:
 
 
 def advantage(study: Study, first: str, second: str, term: str) -> pd.DataFrame:
-    """By how much less ``first`` regrets than ``second``, in per cent of the best known reward.
+    """Regret of ``second`` less that of ``first``, in per cent of the best known reward.
 
     A row for each random task that both solved under every weight of a term, a column for each
     weight, 0 first; indexed by family and task.
     """
     frame = on_random_tasks(study)
     frame = frame[frame.term == term]
-    sides = [
+    second_regret, first_regret = (
         frame[frame.who == who].pivot_table("regret", index=["family", "task"], columns="weight")
         for who in (second, first)
-    ]
-    return (sides[0] - sides[1]).dropna()
+    )
+    return (second_regret - first_regret).dropna()
 
 
 def crossing(weights: Array, means: Array) -> float:
@@ -145,8 +153,9 @@ def crossing(weights: Array, means: Array) -> float:
 def crossings(study: Study) -> pd.DataFrame:
     """Where trial and error overtakes the planner of ticks, by term: the weight, with its interval.
 
-    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %. An
-    infinite end: beyond the largest weight, if at all.
+    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %, which are
+    not widened as means over tasks are: a crossing can be infinite. An infinite end: beyond the
+    largest weight, if at all.
     """
     rows = []
     for term, who in itertools.product(TERMS, UNTOLD):

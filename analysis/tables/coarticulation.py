@@ -87,8 +87,8 @@ def slopes(study: Study) -> Rows:
             **runs_of(
                 *(
                     cell
-                    for (name, of), cell in study.cells.items()
-                    if of == label and name.partition(".")[0] == base
+                    for (name, cell_label), cell in study.cells.items()
+                    if cell_label == label and name.partition(".")[0] == base
                 )
             ),
         }
@@ -118,7 +118,7 @@ def signatures(study: Study) -> Rows:
                     "task": marked(study.tasks[task].label, study.tasks[task]),
                     "method": label,
                     "runs": len(cell.good),
-                    **{name: means.get(of, math.nan) for name, of in _MEANS.items()},
+                    **{name: means.get(signature, math.nan) for name, signature in _MEANS.items()},
                 }
                 yield f"{task} {label}", row | runs_of(cell)
 

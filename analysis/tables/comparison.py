@@ -11,7 +11,7 @@ import pandas as pd
 from coartic.analysis.comparisons.methods import method_rows
 from coartic.analysis.comparisons.reached import best_so_far, targets
 from coartic.analysis.comparisons.reached import price as price_by_method
-from coartic.analysis.comparisons.standings import ALL_TASKS, ends, gaps, standings
+from coartic.analysis.comparisons.standings import ALL_TASKS, gaps, initial_and_optimum, standings
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.methods import (
     CONDITIONS,
@@ -30,7 +30,7 @@ from coartic.analysis.statistics.instances import Runs, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.coarticulation import corrected
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
-from coartic.analysis.trajectories import initial_solution
+from coartic.analysis.trajectories import initial_reward
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
@@ -51,6 +51,9 @@ def against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
     Of methods that solved every run. A method that draws nothing has one reward, which is exact.
+    The test takes samples as independent, though runs have the same seeds
+    (:func:`~coartic.analysis.comparisons.standings.apart_p` pairs them): where the learner has 100
+    runs and the other method 20, pairs would leave out 80.
     """
     rows: list[tuple[str, Row]] = []
     for (task, label), cell in study.cells.items():
@@ -90,7 +93,7 @@ def ranking(study: Study) -> Rows:
         labels = labels_of(study, str(method))
         row |= {
             f"on {task}": method_rows(study).gap[task, labels[task]] if task in labels else math.nan
-            for task in ends(study)
+            for task in initial_and_optimum(study)
             if task in single
         }
         tested = against_learner(study)
@@ -121,7 +124,7 @@ def variants(study: Study) -> Rows:
         if not is_search(label):
             labels_by_row.setdefault(f"{method} {variant}".strip(), {})[task] = label
     instances = sample(study)
-    single = [name for name in ends(study) if study.tasks[name].family is None]
+    single = [name for name in initial_and_optimum(study) if study.tasks[name].family is None]
     for name, labels in labels_by_row.items():
         rewards = gaps(study).merge(pd.DataFrame(labels.items(), columns=["task", "method"]))
         rewards = rewards[rewards.task.isin(single)]
@@ -200,8 +203,7 @@ def learning(study: Study) -> Rows:
         budgets = np.array([budget for budget in BUDGETS if budget <= trials], dtype=float)
         best = np.array([run.best("trials", budgets) for run in runs])
         best[~np.isfinite(best)] = math.nan
-        solution = initial_solution(study.tasks[task], study.model)
-        initial = math.nan if solution is None else float(-solution.ticks)
+        initial = initial_reward(study.tasks[task], study.model)
         halves = [half_gain(initial, run.rewards, run.spent["trials"]) for run in runs]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {

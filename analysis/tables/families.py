@@ -41,7 +41,7 @@ CONTRASTS = (
 arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
 differ in nothing but the hands that they try."""
 ALL = "all"
-"""In the column of families: the mean over all of them, each counting alike."""
+"""What stands in the column of families for the mean over all of them, each counting alike."""
 
 
 @table("method, instances, gap[], to_bound[], in *")
@@ -61,9 +61,9 @@ def family_gaps(study: Study) -> Rows:
         if not scores:
             continue
         row: Row = {"method": label, "instances": sum(map(len, scores.values())), "gap": math.nan}
-        for name, of in (("gap", scores), ("to_bound", bounded)):
-            if two_armed and set(two_armed) <= of.keys():
-                row |= interval(name, other_tasks({family: of[family] for family in two_armed}))
+        for name, gaps in (("gap", scores), ("to_bound", bounded)):
+            if two_armed and set(two_armed) <= gaps.keys():
+                row |= interval(name, other_tasks({family: gaps[family] for family in two_armed}))
         for family in instances.families:
             row[f"in {family}"] = (
                 other_tasks({family: scores[family]}).estimate if family in scores else math.nan

@@ -118,8 +118,9 @@ def horizon(study: Study) -> Rows:
 def horizon_beside(study: Study) -> Rows:
     """Gaps of other methods, as shares, and the horizon at which the planner has the same.
 
-    Between whole horizons by linear interpolation; 0 and 4 are the ends. Intervals are of
-    bootstrap samples of the tasks.
+    Between whole horizons by linear interpolation; 0 and 4 are the ends. Intervals are percentiles
+    of bootstrap samples of the tasks, which are not widened as means over tasks are: beyond the
+    ends there is no horizon.
     """
     gaps, instances = gaps_by_horizon(study), sample(study)
     if instances is None or not len(gaps):
@@ -128,20 +129,20 @@ def horizon_beside(study: Study) -> Rows:
     curves = curves.droplevel(["hands", "costs"])[list(HORIZONS[:-1])].dropna() / 100
     for method in BESIDE:
         shares = {name: instances.gap(name, method) for name in curves.index}
-        ends = {name: float(of.mean()) for name, of in shares.items() if of is not None}
+        gap_of = {name: float(gap.mean()) for name, gap in shares.items() if gap is not None}
         for arms in ("one", "two", "all"):
-            names = [n for n in ends if arms in ("all", KINDS["arms"](study.tasks[n]))]
+            names = [n for n in gap_of if arms in ("all", KINDS["arms"](study.tasks[n]))]
             if not names:
                 continue
-            end, curve = np.array([ends[n] for n in names]), curves.loc[names].to_numpy(float)
+            gap, curve = np.array([gap_of[n] for n in names]), curves.loc[names].to_numpy(float)
             labels = [instances.label_on(name, method) for name in names]
-            same = same_horizon(curve.mean(axis=0), end.mean())
+            same = same_horizon(curve.mean(axis=0), gap.mean())
             row: Row = {"method": method, "arms": arms, "tasks": len(names)}
-            row |= interval("gap", mean(end))
-            drawn = np.random.default_rng(SEED).integers(len(end), size=(RESAMPLES, len(end)))
-            ways = [same_horizon(curve[k].mean(axis=0), end[k].mean()) for k in drawn]
-            row |= {"horizon": same, "lies": between(curve.mean(axis=0), end.mean())}
-            if len(end) > 2:
+            row |= interval("gap", mean(gap))
+            drawn = np.random.default_rng(SEED).integers(len(gap), size=(RESAMPLES, len(gap)))
+            ways = [same_horizon(curve[k].mean(axis=0), gap[k].mean()) for k in drawn]
+            row |= {"horizon": same, "lies": between(curve.mean(axis=0), gap.mean())}
+            if len(gap) > 2:
                 row["horizon_low"], row["horizon_high"] = np.quantile(ways, TAILS)
             cells = [study.cells[key] for key in zip(names, labels, strict=True)]
             yield f"{method} {arms}", row | runs_of(*cells)
@@ -174,9 +175,9 @@ def horizon_signs(study: Study) -> Rows:
             {
                 str(h): {
                     cell.task: mean_or_nan(sign.of(study.trajectories(cell.task, cell.label)))
-                    for cell in of
+                    for cell in at_horizon
                 }
-                for h, of in cells.items()
+                for h, at_horizon in cells.items()
             }
         ).dropna()
         for h in cells if len(values) else ():
@@ -291,7 +292,7 @@ def objectives(study: Study) -> Rows:
         helped = advantage(study, "from plan", "learner", term)
         for (weight, who), rows in sorted(
             frame[frame.term == term].groupby(["weight", "who"]),
-            key=lambda part: (part[0][0], WHO.index(part[0][1])),
+            key=lambda part: (part[0][0], list(WHO).index(str(part[0][1]))),
         ):
             row: Row = {"term": term, "weight": weight, "who": who, "tasks": len(rows)}
             row |= mean_of("regret", rows.regret)
