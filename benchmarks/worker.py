@@ -207,6 +207,9 @@ def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
+    for part in ("initial", "replay"):
+        if any(movement.kind == "path" for movement in parts.get(part, ())):
+            raise SolutionError(f"movements of {part!r} follow a path; only a solution's may")
     return {"parts": parts, "details": details, "bound": bound}
 
 

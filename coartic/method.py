@@ -146,9 +146,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method wants kept beside it, as plain data. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Of a learner: its first trial, if that hit every goal."""
+    """Of a learner: its first trial, if that hit every goal. Its movements follow no paths."""
     replay: tuple[Movement, ...] = ()
-    """Of a learner: one greedy trial, without noise, with what it has learned."""
+    """Of a learner: one greedy trial, without noise, with what it has learned. No paths either."""
     bound: int | None = None
     """Reward that no solution exceeds, where proven; for searches of this project."""
 

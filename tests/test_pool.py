@@ -60,6 +60,9 @@ HANDLED = {
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
     "bound": ("return Result(corrected(session), bound=-1)", "solver-failed", "states a bound"),
+    "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
+              "        return Result(corrected(session), initial=way)",
+              "solver-failed", "movements of 'initial' follow a path"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
     "trials": ("for _ in range(9): session.trial(corrected(session))",
                "crashed", "all 3 trials of the budget are made"),
