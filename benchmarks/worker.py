@@ -172,6 +172,9 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
     }
     try:
         if isinstance(result, MethodError):
+            if result.outcome not in ("infeasible", "solver-failed"):
+                why = f"it ended with an unknown outcome, {result.outcome!r}: {result}"
+                return Outcome("crashed", why, **spent)
             details = plain_details(result.details)
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
