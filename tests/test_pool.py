@@ -67,6 +67,8 @@ HANDLED = {
               "solver-failed", "movements of 'initial' follow a path"),
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
              "crashed", "unknown outcome, 'ok': x"),
+    "spends": ("for _ in range(2): session.spend(gradients=2**62)",
+               "crashed", "counter 'gradients': it counts to"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
     "trials": ("for _ in range(9): session.trial(corrected(session))",
                "crashed", "all 3 trials of the budget are made"),
