@@ -42,7 +42,7 @@ def kept(
     ``identities`` say which each is: its id, number, seed and so on.
     """
     times = {
-        "wall_s": answer.wall_s / len(identities),
+        "wall_s": None if answer.wall_s is None else answer.wall_s / len(identities),
         "cpu_s": None if answer.cpu_s is None else answer.cpu_s / len(identities),
         "warm": answer.warm,
         "together": len(identities),

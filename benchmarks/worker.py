@@ -88,8 +88,8 @@ class Answer:
     """What a worker states of a job."""
 
     outcomes: list[Outcome]
-    wall_s: float
-    """Of all runs together."""
+    wall_s: float | None
+    """Of all runs together; None where the worker died and nobody knows when it began."""
     cpu_s: float | None = None
     warm: bool | None = None
     """Whether the process had run the method before."""
@@ -98,7 +98,7 @@ class Answer:
     """Where this is not that of the parent process."""
 
 
-def failed(job: Job, status: str, reason: str, wall_s: float) -> Answer:
+def failed(job: Job, status: str, reason: str, wall_s: float | None = None) -> Answer:
     """The answer of a job whose worker gave none: ``timeout`` or ``crashed``."""
     return Answer([Outcome(status, reason)] * len(job.seeds), wall_s)
 

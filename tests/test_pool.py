@@ -111,6 +111,8 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
+    died = name in ("exits", "is_killed")  # after it had waited for others, maybe
+    assert run.isna().wall_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST
 
 
