@@ -341,7 +341,12 @@ def plan_suite(
             runs=count if entry.method.stochastic else 1,
         )
         # What is written in two ways is performed once.
-        planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
+        first = planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
+        if first.runs != planned_cell.runs:
+            raise CoarticError(
+                f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
+                f"then for {planned_cell.runs}; give one number"
+            )
     cells_once = tuple(planned.values())
     plan = Plan(
         suite=suite.name,
