@@ -14,7 +14,7 @@ import numpy as np
 from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.worker import Answer, Outcome
 from coartic.errors import SolutionError
-from coartic.learner.kernel import PARTS as TENTHS
+from coartic.learner.kernel import TENTHS
 from coartic.learner.learning import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import MotionModel
