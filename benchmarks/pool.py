@@ -64,7 +64,8 @@ class Local:
     def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer]]:
-        """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
+        """The number of each job with its answer, for jobs that share workers; foreign ones begin
+        in a folder of their own."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, learned) for (_, learned), task in kernels.items()]

@@ -211,19 +211,8 @@ def select_cells(
     named = [name for name in tasks if not name.endswith(".toml")]
     user_tasks = tasks_of_files([*task_files, *files])
     tasks = [*itertools.chain(*map(named_by, named)), *(load_task(path).name for path in files)]
-    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
-    user_tasks |= {
-        name: load_task(name)
-        for name in tasks
-        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
-    }
-    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
-    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
-    if len(cells) > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
-            "(tasks x moves x methods x grid)"
-        )
+    user_tasks |= generated_tasks(suite, tasks, user_tasks)
+    cells = cells_of_suite(suite, registered, user_tasks)
     added, refused = added_cells(cells, registered, methods, user_tasks)
     cells = distinct([*cells, *added])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
@@ -257,6 +246,19 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     if not named:
         raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *VARIANTS]))
     return named
+
+
+def generated_tasks(
+    suite: Suite, names: Iterable[str], user_tasks: Mapping[str, Task]
+) -> dict[str, Task]:
+    """The instances of families and members of ensembles among these names that neither the suite
+    nor the user has."""
+    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
+    return {
+        name: load_task(name)
+        for name in names
+        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
+    }
 
 
 def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
@@ -313,6 +315,20 @@ def distinct(cells: Iterable[Cell]) -> list[Cell]:
             )
         by_name.setdefault((task.name, cell.label, cell.runs), cell)
     return list(by_name.values())
+
+
+def cells_of_suite(
+    suite: Suite, registered: Registry, user_tasks: Mapping[str, Task]
+) -> list[Cell]:
+    """The cells of all blocks. Raises CoarticError for more than :data:`MOST_CELLS`."""
+    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
+    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
+    if len(cells) > MOST_CELLS:
+        raise CoarticError(
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
+            "(tasks x moves x methods x grid)"
+        )
+    return cells
 
 
 def cells_of_block(

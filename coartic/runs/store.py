@@ -405,6 +405,7 @@ class Store:
     # Inside.
 
     def _write_run(self, run: Run, setting: int, joints: tuple[str, ...]) -> None:
+        """Put a run into the tables, in place of an earlier one of its id."""
         self._forget(run.run_id)
         environment = self._environment(run.environment)
         row = run.row | {"setting": setting, "environment": environment}
