@@ -64,8 +64,7 @@ class Local:
     def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer]]:
-        """The number of each job with its answer, for jobs that share workers; foreign ones begin
-        in a folder of their own."""
+        """Numbers and answers of jobs that share workers; foreign ones begin in a new folder."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, learned) for (_, learned), task in kernels.items()]

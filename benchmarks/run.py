@@ -325,13 +325,13 @@ def plan_suite(
             tasks[name] = checked_task(task_under(chosen, cell.task), model)
         # What is asked for of all cells goes before what the suite says of one.
         count = runs or cell.runs or suite.runs
-        one = planned_cell(cell, entry, read, trials, count)
+        wanted = planned_cell(cell, entry, read, trials, count)
         # What is written in two ways is performed once.
-        first = planned.setdefault(hash_of([name, entry.name, one.complete]), one)
-        if first.runs != one.runs:
+        first = planned.setdefault(hash_of([name, entry.name, wanted.complete]), wanted)
+        if first.runs != wanted.runs:
             raise CoarticError(
                 f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
-                f"then for {one.runs}; give one number"
+                f"then for {wanted.runs}; give one number"
             )
     cells_once = tuple(planned.values())
     plan = Plan(
@@ -352,11 +352,8 @@ def plan_suite(
 def planned_cell(
     cell: Cell, entry: Entry, read: Mapping[str, object], trials: int | None, runs: int
 ) -> PlannedCell:
-    """A cell with all its parameters. Those that the readings of the paper set go before
-    ``trials``, and those that the suite says of the cell before both.
-
-    Raises CoarticError for more trials than are kept.
-    """
+    """A cell with all its parameters: the suite's for it go before those of the readings of the
+    paper, which go before ``trials``. Raises CoarticError for more trials than are kept."""
     defaults = entry.defaults
     parameters = {key: value for key, value in read.items() if key in defaults}
     parameters |= dict(cell.parameters)

@@ -211,7 +211,12 @@ def select_cells(
     named = [name for name in tasks if not name.endswith(".toml")]
     user_tasks = tasks_of_files([*task_files, *files])
     tasks = [*itertools.chain(*map(named_by, named)), *(load_task(path).name for path in files)]
-    user_tasks |= generated_tasks(suite, tasks, user_tasks)
+    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
+    user_tasks |= {
+        name: load_task(name)
+        for name in tasks
+        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
+    }
     cells = cells_of_suite(suite, registered, user_tasks)
     added, refused = added_cells(cells, registered, methods, user_tasks)
     cells = distinct([*cells, *added])
@@ -246,19 +251,6 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     if not named:
         raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *VARIANTS]))
     return named
-
-
-def generated_tasks(
-    suite: Suite, names: Iterable[str], user_tasks: Mapping[str, Task]
-) -> dict[str, Task]:
-    """The instances of families and members of ensembles among these names that neither the suite
-    nor the user has."""
-    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
-    return {
-        name: load_task(name)
-        for name in names
-        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
-    }
 
 
 def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
