@@ -74,7 +74,7 @@ from coartic.robot import HANDS, Array, Hand, directions
 from coartic.tasks.task import LETTERS, MOST_GOALS, hands_of, letters_of
 
 FACES = 16
-"""Of a disc's polygon: it leaves out 2 % of the radius at the most."""
+"""Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
 
 _ANGLES = 2 * np.pi * np.arange(FACES) / FACES
 _NORMALS = directions(_ANGLES)
@@ -96,7 +96,7 @@ class Aim(NamedTuple):
     hand: Hand
     goal: int  # 0-based
     arm_only: bool = False
-    """Of what is looked ahead to: postures before it heed it with this hand's arm alone."""
+    """Whether postures for the goals before this one heed it with this hand's arm alone."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class OptimumParameters(Parameters):
 
 
 class GraphParameters(OptimumParameters):
-    """As above, for the posture graph."""
+    """The restriction, and how many postures, starts and hand sequences to plan with."""
 
     nodes: Annotated[int, Field(ge=10, le=1000)] = 200
     """Postures per goal and hand."""
@@ -58,7 +58,7 @@ class GraphParameters(OptimumParameters):
 
 
 class BoundParameters(GraphParameters):
-    """As above, for the proof."""
+    """Those of the posture graph, and how long the proof may take."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
     """Cone programmes that may be solved for it, some 500 a second with five goals. The search
@@ -66,7 +66,7 @@ class BoundParameters(GraphParameters):
 
 
 class MultistartParameters(OptimumParameters):
-    """As above, for the random starts."""
+    """The restriction, and how many random starts to plan from."""
 
     starts: Annotated[int, Field(ge=1)] = 60
     """Starts per hand sequence. The first is the corrective process's own solution."""

@@ -72,7 +72,7 @@ class TrajectoryParameters(Parameters):
 
 
 class PathLengthParameters(TrajectoryParameters):
-    """As above, and how exactly the reward is known."""
+    """The plans and starts, and how exactly the reward is known."""
 
     whole_ticks: bool = True
     """Whether the plan is rounded to whole control ticks and aims through the rims; else
@@ -80,7 +80,7 @@ class PathLengthParameters(TrajectoryParameters):
 
 
 class SmoothParameters(TrajectoryParameters):
-    """As above, the timing, and the stops."""
+    """The plans and starts, the timing, and the stops."""
 
     timing: Literal["free", "fixed"] = "free"
     """Times at which the goals are hit: free at a constant total, or equal intervals."""

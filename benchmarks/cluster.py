@@ -52,7 +52,7 @@ class Dask:
         try:
             return future.result()
         except KilledWorker:
-            return failed(job, "crashed", "every worker that tried this run died", 0.0)
+            return failed(job, "crashed", "every worker that tried this run died")
         except (Exception, CancelledError) as error:
             raise error if isinstance(error, CoarticError) else self._lost(error) from None
 

@@ -14,7 +14,7 @@ import numpy as np
 from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.worker import Answer, Outcome
 from coartic.errors import SolutionError
-from coartic.learner.kernel import PARTS as TENTHS
+from coartic.learner.kernel import TENTHS
 from coartic.learner.learning import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import MotionModel
@@ -42,7 +42,7 @@ def kept(
     ``identities`` say which each is: its id, number, seed and so on.
     """
     times = {
-        "wall_s": answer.wall_s / len(identities),
+        "wall_s": None if answer.wall_s is None else answer.wall_s / len(identities),
         "cpu_s": None if answer.cpu_s is None else answer.cpu_s / len(identities),
         "warm": answer.warm,
         "together": len(identities),
@@ -61,6 +61,9 @@ def kept(
             executions[n][part] = execution
         else:
             outcomes[n] = ended(outcomes[n], "infeasible", execution.reason)
+    for n, outcome in enumerate(outcomes):
+        if outcome.status == "ok" and "solution" not in executions[n]:
+            outcomes[n] = ended(outcome, "solver-failed", "it says ok, but states no solution")
     return [
         run_of(identity, outcome, parts if outcome.status == "ok" else {}, times, task, made_with)
         for identity, outcome, parts in zip(identities, outcomes, executions, strict=True)

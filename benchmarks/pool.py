@@ -7,12 +7,12 @@ temporary folder: that keeps a careless method out of the results of others.
 from __future__ import annotations
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
 import sys
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -64,7 +64,7 @@ class Local:
     def perform_together(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
     ) -> Iterator[tuple[int, Answer]]:
-        """The same for numbered jobs that share workers, foreign ones in a folder of their own."""
+        """Numbers and answers of jobs that share workers; foreign ones begin in a new folder."""
         workers = min(self.workers, len(jobs))
         kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
         tasks = [(task, learned) for (_, learned), task in kernels.items()]
@@ -73,13 +73,13 @@ class Local:
                 workers, initializer=begin_job_worker, initargs=(folder, foreign, workers, tasks),
                 context=context(),
             )  # fmt: skip
-            running: dict[Future[Answer], tuple[int, float]] = {}
+            running: dict[Future[Answer], tuple[int, Job]] = {}
             waiting = iter(jobs)
             try:
                 while True:
                     for number, job in waiting:
                         future: Any = pool.schedule(perform, args=(job,), timeout=job.time_limit_s)
-                        running[future] = number, time.monotonic()
+                        running[future] = number, job
                         if len(running) == (1 + _AHEAD) * workers:
                             break
                     # While a worker compiles the learner: what it hands over is executed here.
@@ -92,9 +92,8 @@ class Local:
                     if not done and not pool.active:
                         raise BrokenProcessPool  # which leaves what waits as it is
                     for future in done:
-                        number, started = running.pop(future)
-                        seconds = time.monotonic() - started
-                        yield number, answer_of(future, dict(jobs)[number], seconds, Path(folder))
+                        number, job = running.pop(future)
+                        yield number, answer_of(future, job, Path(folder))
             except RuntimeError:  # the pool's own
                 messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
@@ -110,12 +109,12 @@ def owner_of(job: Job) -> str:
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def answer_of(future: Future[Answer], job: Job, seconds: float, folder: Path) -> Answer:
+def answer_of(future: Future[Answer], job: Job, folder: Path) -> Answer:
     """The answer to a job, or that it failed."""
     try:
         return future.result()
     except TimeoutError:
-        limit = job.time_limit_s or seconds
+        limit = job.time_limit_s or math.inf  # there is one
         return failed(job, "timeout", f"time limit of {limit:g} s exceeded", limit)
     except ProcessExpired as error:
         how = f"exit code {error.exitcode}"
@@ -123,11 +122,11 @@ def answer_of(future: Future[Answer], job: Job, seconds: float, folder: Path) ->
             with contextlib.suppress(ValueError):
                 how = f"killed by {signal.Signals(-error.exitcode).name}"
         reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
-        return failed(job, "crashed", reason, seconds)
+        return failed(job, "crashed", reason)
     except BrokenProcessPool:
         raise
     except Exception as error:  # its answer cannot be read
-        return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"), seconds)
+        return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"))
 
 
 def last_words(file: Path) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,6 +39,15 @@ def check_list(name: str, value: object) -> None:
         raise CoarticError(f"{name} is a list: write {name}=[{str(value)!r}]")
     if not isinstance(value, Sequence) or not all(isinstance(item, str | Path) for item in value):
         raise CoarticError(f"{name} is {value!r}; it must be a list of names or paths")
+
+
+def check_number(name: str, number: float | None, least: float, most: int) -> None:
+    """Raises CoarticError for a number out of its bounds, or one that has to be whole, as its
+    least value is, and is not. None stands for the suite's own number."""
+    kind = int if isinstance(least, int) else int | float
+    is_number = isinstance(number, kind) and not isinstance(number, bool)
+    if number is not None and not (is_number and least <= number <= most):
+        raise CoarticError(f"{name} is {number!r}; it must be from {least} to {most:_}")
 
 
 @dataclass(frozen=True)
@@ -298,18 +307,11 @@ def plan_suite(
             methods=select.methods,
             task_files=[Path(path) for path in select.task_files],
         )
-    for name, number, least, most in (
-        ("runs", runs, 1, MOST_RUNS),
-        ("trials", trials, 1, MOST_TRIALS),
-        ("seed", seed, 0, MOST_SEED),
-        ("trial_budget", trial_budget, 1, MOST_TRIALS),
-        ("time_limit_s", time_limit_s, 1e-3, MOST_SECONDS),
-    ):
-        kind = int | float if name == "time_limit_s" else int
-        if number is None:
-            continue
-        if not isinstance(number, kind) or isinstance(number, bool) or not least <= number <= most:
-            raise CoarticError(f"{name} is {number!r}; it must be from {least} to {most:_}")
+    check_number("runs", runs, 1, MOST_RUNS)
+    check_number("trials", trials, 1, MOST_TRIALS)
+    check_number("seed", seed, 0, MOST_SEED)
+    check_number("trial_budget", trial_budget, 1, MOST_TRIALS)
+    check_number("time_limit_s", time_limit_s, 1e-3, MOST_SECONDS)
     chosen = load_readings([*suite.readings, *readings])
     model, read = model_under(chosen), condition_under(chosen)
     trials = suite.trials if trials is None else trials
@@ -318,30 +320,19 @@ def plan_suite(
     tasks: dict[str, Task] = {}
     for cell in cells:
         entry = entries.setdefault(cell.method, cell.entry)
-        name, defaults = cell.task.name, entry.defaults
+        name = cell.task.name
         if name not in tasks:
             tasks[name] = checked_task(task_under(chosen, cell.task), model)
-        parameters = {key: value for key, value in read.items() if key in defaults}
-        parameters |= dict(cell.parameters)
-        default_trials = {"trials": trials} if trials is not None and "trials" in defaults else {}
-        complete = entry.complete(default_trials | parameters)
-        if trials_in(complete) > MOST_TRIALS:
-            raise CoarticError(
-                f"{name} x {cell.label}: {trials_in(complete):_} trials a run; "
-                f"at most {MOST_TRIALS:_} are kept"
-            )
         # What is asked for of all cells goes before what the suite says of one.
         count = runs or cell.runs or suite.runs
-        planned_cell = PlannedCell(
-            task=name,
-            method=entry.name,
-            variant=variant_of(parameters, defaults),
-            parameters=parameters,
-            complete=complete,
-            runs=count if entry.method.stochastic else 1,
-        )
+        wanted = planned_cell(cell, entry, read, trials, count)
         # What is written in two ways is performed once.
-        planned.setdefault(hash_of([name, entry.name, complete]), planned_cell)
+        first = planned.setdefault(hash_of([name, entry.name, wanted.complete]), wanted)
+        if first.runs != wanted.runs:
+            raise CoarticError(
+                f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
+                f"then for {wanted.runs}; give one number"
+            )
     cells_once = tuple(planned.values())
     plan = Plan(
         suite=suite.name,
@@ -356,6 +347,31 @@ def plan_suite(
         cells=cells_once,
     )
     return SuitePlan(plan, entries, tasks)
+
+
+def planned_cell(
+    cell: Cell, entry: Entry, read: Mapping[str, object], trials: int | None, runs: int
+) -> PlannedCell:
+    """A cell with all its parameters: the suite's for it go before those of the readings of the
+    paper, which go before ``trials``. Raises CoarticError for more trials than are kept."""
+    defaults = entry.defaults
+    parameters = {key: value for key, value in read.items() if key in defaults}
+    parameters |= dict(cell.parameters)
+    default_trials = {"trials": trials} if trials is not None and "trials" in defaults else {}
+    complete = entry.complete(default_trials | parameters)
+    if trials_in(complete) > MOST_TRIALS:
+        raise CoarticError(
+            f"{cell.task.name} x {cell.label}: {trials_in(complete):_} trials a run; "
+            f"at most {MOST_TRIALS:_} are kept"
+        )
+    return PlannedCell(
+        task=cell.task.name,
+        method=entry.name,
+        variant=variant_of(parameters, defaults),
+        parameters=parameters,
+        complete=complete,
+        runs=runs if entry.method.stochastic else 1,
+    )
 
 
 def in_parts(numbers: list[int], size: int) -> Iterator[list[int]]:

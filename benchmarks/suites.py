@@ -217,13 +217,7 @@ def select_cells(
         for name in tasks
         if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
     }
-    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
-    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
-    if len(cells) > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
-            "(tasks x moves x methods x grid)"
-        )
+    cells = cells_of_suite(suite, registered, user_tasks)
     added, refused = added_cells(cells, registered, methods, user_tasks)
     cells = distinct([*cells, *added])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
@@ -281,6 +275,7 @@ def added_cells(
     user_tasks: Mapping[str, Task],
 ) -> tuple[list[Cell], list[str]]:
     """What named methods and the user's tasks add to a suite's cells, and why not more."""
+    there = {(cell.task.name, cell.label) for cell in cells}
     of_suite = list(dict.fromkeys(cell.method for cell in cells))
     others = [name for name in methods if name not in of_suite]
     shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
@@ -289,28 +284,43 @@ def added_cells(
     added, refused = [], []
     for task, name in wanted:
         reason = registered[name].why_not(task)
-        if reason is None:
-            added.append(Cell(task, registered[name]))
-        else:
+        if reason is not None:
             refused.append(reason)
+        elif (task.name, name) not in there:
+            added.append(Cell(task, registered[name]))
     return added, refused
 
 
 def distinct(cells: Iterable[Cell]) -> list[Cell]:
     """Every cell once. Results are told apart by names, so one name is one thing only.
 
-    Raises CoarticError where different tasks have the same name.
+    What asks for other numbers of runs stays: :func:`coartic.benchmarks.run.plan_suite` knows
+    which of them hold. Raises CoarticError where different tasks have the same name.
     """
     tasks: dict[str, Task] = {}
-    by_name: dict[tuple[str, str], Cell] = {}
+    by_name: dict[tuple[str, str, int | None], Cell] = {}
     for cell in cells:
         task = tasks.setdefault(cell.task.name, cell.task)
         if task is not cell.task and task != cell.task:
             raise CoarticError(
                 f"two different tasks are called {task.name!r}; give one of them another name"
             )
-        by_name.setdefault((task.name, cell.label), cell)
+        by_name.setdefault((task.name, cell.label, cell.runs), cell)
     return list(by_name.values())
+
+
+def cells_of_suite(
+    suite: Suite, registered: Registry, user_tasks: Mapping[str, Task]
+) -> list[Cell]:
+    """The cells of all blocks. Raises CoarticError for more than :data:`MOST_CELLS`."""
+    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
+    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
+    if len(cells) > MOST_CELLS:
+        raise CoarticError(
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
+            "(tasks x moves x methods x grid)"
+        )
+    return cells
 
 
 def cells_of_block(

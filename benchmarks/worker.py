@@ -88,8 +88,8 @@ class Answer:
     """What a worker states of a job."""
 
     outcomes: list[Outcome]
-    wall_s: float
-    """Of all runs together."""
+    wall_s: float | None
+    """Of all runs together; None where the worker died and nobody knows when it began."""
     cpu_s: float | None = None
     warm: bool | None = None
     """Whether the process had run the method before."""
@@ -98,7 +98,7 @@ class Answer:
     """Where this is not that of the parent process."""
 
 
-def failed(job: Job, status: str, reason: str, wall_s: float) -> Answer:
+def failed(job: Job, status: str, reason: str, wall_s: float | None = None) -> Answer:
     """The answer of a job whose worker gave none: ``timeout`` or ``crashed``."""
     return Answer([Outcome(status, reason)] * len(job.seeds), wall_s)
 
@@ -172,6 +172,9 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
     }
     try:
         if isinstance(result, MethodError):
+            if result.outcome not in ("infeasible", "solver-failed"):
+                why = f"it ended with an unknown outcome, {result.outcome!r}: {result}"
+                return Outcome("crashed", why, **spent)
             details = plain_details(result.details)
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
@@ -207,6 +210,9 @@ def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
+    for part in ("initial", "replay"):
+        if any(movement.kind == "path" for movement in parts.get(part, ())):
+            raise SolutionError(f"movements of {part!r} follow a path; only a solution's may")
     return {"parts": parts, "details": details, "bound": bound}
 
 

@@ -136,6 +136,8 @@ class Meter:
 
 
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
+MOST_COUNT = 2**63 - 1
+"""What a counter can hold where runs are stored."""
 
 
 @dataclass(frozen=True)
@@ -146,9 +148,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method wants kept beside it, as plain data. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Of a learner: its first trial, if that hit every goal."""
+    """Of a learner: its first trial, if that hit every goal. Its movements follow no paths."""
     replay: tuple[Movement, ...] = ()
-    """Of a learner: one greedy trial, without noise, with what it has learned."""
+    """Of a learner: one greedy trial, without noise, with what it has learned. No paths either."""
     bound: int | None = None
     """Reward that no solution exceeds, where proven; for searches of this project."""
 
@@ -404,7 +406,8 @@ class Session:
     def spend(self, **counts: int) -> None:
         """Add to counters that the session cannot see: a solver's evaluations, say.
 
-        Raises ValueError for a negative count and for one that the session keeps itself.
+        Raises ValueError for a negative count, for one beyond :data:`MOST_COUNT` in all, and for
+        one that the session keeps itself.
         """
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
@@ -412,6 +415,8 @@ class Session:
                 raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
             if count < 0:
                 raise ValueError(f"counter {name!r}: {count} is negative")
+            if getattr(self._meter, name) + count > MOST_COUNT:
+                raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:_} at most")
         self._count(counts)
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:

@@ -20,6 +20,7 @@ from coartic import (
 from coartic.analysis.comparisons.paper import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Entry, registry
+from coartic.benchmarks.run import Selection, plan_suite
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.learner.rows import movements_from
@@ -202,6 +203,19 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
     compared = {(row["cell"].task, row["cell"].label) for row in beside_paper(study)}
     assert ("ascending", "dual-process/EC1") in compared
     assert all(variant == "" or f"EC1 {variant}" not in str(compared) for _, variant in labels)
+
+
+def test_a_cell_has_one_number_of_runs(tmp_path):
+    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
+    cells = suite_of(tmp_path, ec1, ec1 + "runs = 7")
+    with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
+        plan_suite(tmp_path / "own.toml")
+    assert [cell.runs for cell in planned(cells, runs=2).plan.cells] == [2]
+    task, select = tmp_path / "mine.toml", Selection(task_files=[tmp_path / "mine.toml"])
+    task.write_text(GOOD, encoding="utf-8")
+    suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
+    own = plan_suite(tmp_path / "own.toml", select=select)
+    assert {cell.runs for cell in own.plan.cells if cell.task == "mine"} == {7}
 
 
 def test_verdicts_only_for_runs_as_long_as_the_papers(tmp_path):

@@ -10,10 +10,12 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
+from coartic.benchmarks.outcome import kept
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import job_of
+from coartic.benchmarks.worker import Answer, Outcome, job_of
+from coartic.model import PAPER
 from tests.support.suites import KNOWN, run_and_write
 
 METHODS = """
@@ -60,6 +62,13 @@ HANDLED = {
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
     "bound": ("return Result(corrected(session), bound=-1)", "solver-failed", "states a bound"),
+    "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
+              "        return Result(corrected(session), initial=way)",
+              "solver-failed", "movements of 'initial' follow a path"),
+    "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
+             "crashed", "unknown outcome, 'ok': x"),
+    "spends": ("for _ in range(2): session.spend(gradients=2**62)",
+               "crashed", "counter 'gradients': it counts to"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
     "trials": ("for _ in range(9): session.trial(corrected(session))",
                "crashed", "all 3 trials of the budget are made"),
@@ -102,7 +111,17 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
+    died = name in ("exits", "is_killed")  # after it had waited for others, maybe
+    assert run.isna().wall_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST
+
+
+def test_no_run_is_ok_without_a_solution():
+    (run,) = kept([{}], Answer([Outcome("ok")], 1.0), load_task("ascending"), PAPER)
+    assert (run.status, run.row["reason"]) == (
+        "solver-failed",
+        "it says ok, but states no solution",
+    )
 
 
 def test_other_methods_notice_nothing(runs):

@@ -129,6 +129,9 @@ def test_a_lot_is_there_whole_or_not_at_all(written, tmp_path):
         for _ in range(2):  # the second one replaces the first
             store.write(0, [run])
             assert store.count() == 1
+        unlike = replace(run, movements={"solution": movements, "initial": movements})
+        with pytest.raises(CoarticError, match="EC4 cannot be stored: UNIQUE"):
+            store.write(0, [unlike])  # paths of two parts
     with open_store(tmp_path) as store:
         assert plain(store.run(run.run_id).run) == plain(run)
 

@@ -85,7 +85,7 @@ class Kept(NamedTuple):
     replayed: Any  # (N,) whether the replay hit every goal
     replay_rewards: Any  # (N,)
     counts: Any  # (N, counters) what was spent, without the replay
-    corrections: Any  # (N, 1 + PARTS) made until the end of trial 0, and of each part of the rest
+    corrections: Any  # (N, 1 + TENTHS) made until the end of trial 0, in each tenth of the rest
     first: Log
     best: Log
     replay: Log
@@ -102,8 +102,9 @@ class Count(NamedTuple):
 
 
 COUNT = Count()
-PARTS = 10
+TENTHS = 10
 """Equal parts of the trials after trial 0, of which corrections are counted apart."""
+PARTS = TENTHS  # as coartic.analysis.claims.data imports it
 
 
 class Work(NamedTuple):
@@ -493,7 +494,7 @@ def copy_movements(n: int, source: Any, destination: Any) -> None:
 def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
     """Keep the rewards of a trial after so many; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)
-    part = 0 if earlier == 0 else 1 + (earlier - 1) * PARTS // others
+    part = 0 if earlier == 0 else 1 + (earlier - 1) * TENTHS // others
     for n in range(len(work.trials)):
         trial = work.trials[n]
         kept.corrections[n, part] = trial.counts[COUNT.corrections]

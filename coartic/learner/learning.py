@@ -18,7 +18,7 @@ from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNT,
     LEARNED,
-    PARTS,
+    TENTHS,
     Kept,
     Log,
     empty_log,
@@ -247,7 +247,7 @@ def learn_together(
         replayed=np.zeros(runs, dtype=np.bool_),
         replay_rewards=np.zeros(runs, dtype=np.int64),
         counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
-        corrections=np.zeros((runs, 1 + PARTS), dtype=np.int64),
+        corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
         first=empty_log(runs, task),
         best=empty_log(runs, task),
         replay=empty_log(runs, task),

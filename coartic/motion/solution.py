@@ -305,45 +305,52 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
 
 def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
     """The movements grouped by goal, checked against the task."""
-    locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
     groups: list[tuple[int, list[Movement]]] = []
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {movement!r} is not a Movement")
         if not groups or groups[-1][0] != movement.goal:
             groups.append((movement.goal, []))
+        of_goal = groups[-1][1]
         where = f"task {task.name!r}, goal {movement.goal}"
         if movement.hand not in task.hands:
             raise SolutionError(f"{where}: the robot has no {movement.hand} hand")
-        if groups[-1][1] and movement.hand != groups[-1][1][0].hand:
+        if of_goal and movement.hand != of_goal[0].hand:
             raise SolutionError(f"{where}: two hands for one goal")
-        if movement.kind not in KINDS:
-            raise SolutionError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
-        points: list[Array] = []
-        if movement.kind == "path":
-            points = [] if movement.waypoints is None else list(movement.waypoints)
-            if not points:
-                raise SolutionError(f"{where}: a path needs waypoints")
-            end = np.array(points[-1], dtype=np.float64)
-            if movement.target is not None and not np.array_equal(movement.target, end):
-                raise SolutionError(f"{where}: a path's target is its last waypoint")
-            movement = replace(movement, target=end, waypoints=np.array(points, dtype=np.float64))
-        elif movement.waypoints is not None:
-            raise SolutionError(f"{where}: a {movement.kind} movement has no waypoints")
-        elif movement.target is not None:
-            points = [movement.target]
-        elif movement.kind != "corrective":
-            raise SolutionError(f"{where}: a {movement.kind} movement needs a target")
-        for point in points:
-            try:
-                checked = configuration(task.robot, point)
-            except ValueError as error:
-                raise SolutionError(f"{where}: {error}") from None
-            if np.any(checked[locked] != task.q0[locked]):
-                raise SolutionError(f"{where}: the target moves a locked base coordinate")
-        groups[-1][1].append(movement)
+        of_goal.append(checked_movement(task, movement, where))
     wanted = list(range(1, len(task.goals) + 1))
     if [goal for goal, _ in groups] != wanted:
         given = [goal for goal, _ in groups]
         raise SolutionError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
     return groups
+
+
+def checked_movement(task: Task, movement: Movement, where: str) -> Movement:
+    """A movement that has what its kind needs and leads to configurations that the task allows; a
+    path with its target. Raises SolutionError, which begins with ``where``."""
+    if movement.kind not in KINDS:
+        raise SolutionError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
+    points: list[Array] = []
+    if movement.kind == "path":
+        points = [] if movement.waypoints is None else list(movement.waypoints)
+        if not points:
+            raise SolutionError(f"{where}: a path needs waypoints")
+        end = np.array(points[-1], dtype=np.float64)
+        if movement.target is not None and not np.array_equal(movement.target, end):
+            raise SolutionError(f"{where}: a path's target is its last waypoint")
+        movement = replace(movement, target=end, waypoints=np.array(points, dtype=np.float64))
+    elif movement.waypoints is not None:
+        raise SolutionError(f"{where}: a {movement.kind} movement has no waypoints")
+    elif movement.target is not None:
+        points = [movement.target]
+    elif movement.kind != "corrective":
+        raise SolutionError(f"{where}: a {movement.kind} movement needs a target")
+    locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
+    for point in points:
+        try:
+            checked = configuration(task.robot, point)
+        except ValueError as error:
+            raise SolutionError(f"{where}: {error}") from None
+        if np.any(checked[locked] != task.q0[locked]):
+            raise SolutionError(f"{where}: the target moves a locked base coordinate")
+    return movement

@@ -39,7 +39,7 @@ class Trajectory:
 
     @property
     def ticks(self) -> int:
-        """Number of control ticks, the total reward with its sign turned."""
+        """Number of control ticks; the reward also loses the penalty, where there is one."""
         return self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:

@@ -184,7 +184,8 @@ class Store:
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
         self._db = connection
-        self._cells: list[tuple[int, tuple[str, ...]]] = []  # setting, and joints in their order
+        # Setting, method, and joints in their order.
+        self._cells: list[tuple[int, str, tuple[str, ...]]] = []
 
     def __enter__(self) -> Store:
         return self
@@ -248,7 +249,7 @@ class Store:
                     "told": ", ".join(method.told),
                 }
                 number = self._id_of("settings", setting, "asked", "code")
-                self._cells.append((number, joints[cell.task]))
+                self._cells.append((number, cell.method, joints[cell.task]))
                 self._insert(
                     "cells",
                     {
@@ -334,30 +335,17 @@ class Store:
     def write(self, position: int, runs: Iterable[Run]) -> None:
         """Keep finished runs of a cell together, all of them or none; they replace earlier ones.
 
-        Raises CoarticError where the disk does not take them.
+        Raises CoarticError where the disk does not take them, or the tables a run.
         """
-        setting, joints = self._cells[position]
-        movements: list[tuple[Any, ...]] = []
-        waypoints: list[tuple[Any, ...]] = []
+        setting, method, joints = self._cells[position]
         with self._writing():
             for run in runs:
-                self._forget(run.run_id)
-                environment = self._environment(run.environment)
-                row = run.row | {"setting": setting, "environment": environment}
-                result = self._insert("results", row)
-                for part, solution in run.movements.items():
-                    for order, m in enumerate(solution):
-                        assert m.target is not None
-                        facts = (result, part, order, m.goal, m.hand, m.kind, m.ticks)
-                        movements.append((*facts, *m.target.tolist()))
-                        points = [] if m.waypoints is None else m.waypoints.tolist()
-                        waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
-                if run.rewards:
-                    stored = [FAILED if reward is None else reward for reward in run.rewards]
-                    blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
-                    self._insert("learning", {"result_id": result, "rewards": blob})
-            self._insert_many("movements", (*_MOVEMENT, *joints), movements)
-            self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
+                try:
+                    self._write_run(run, setting, joints)
+                except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
+                    raise CoarticError(
+                        f"run {run.run_id} of method {method} cannot be stored: {error}"
+                    ) from None
 
     def run(self, prefix: str) -> StoredRun:
         """The one run whose id begins so. Raises CoarticError where there is none, or several."""
@@ -415,6 +403,28 @@ class Store:
             yield run_id, np.where(stored == FAILED, np.nan, stored)
 
     # Inside.
+
+    def _write_run(self, run: Run, setting: int, joints: tuple[str, ...]) -> None:
+        """Put a run into the tables, in place of an earlier one of its id."""
+        self._forget(run.run_id)
+        environment = self._environment(run.environment)
+        row = run.row | {"setting": setting, "environment": environment}
+        result = self._insert("results", row)
+        movements: list[tuple[Any, ...]] = []
+        waypoints: list[tuple[Any, ...]] = []
+        for part, solution in run.movements.items():
+            for order, m in enumerate(solution):
+                assert m.target is not None
+                facts = (result, part, order, m.goal, m.hand, m.kind, m.ticks)
+                movements.append((*facts, *m.target.tolist()))
+                points = [] if m.waypoints is None else m.waypoints.tolist()
+                waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
+        self._insert_many("movements", (*_MOVEMENT, *joints), movements)
+        self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
+        if run.rewards:
+            stored = [FAILED if reward is None else reward for reward in run.rewards]
+            blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
+            self._insert("learning", {"result_id": result, "rewards": blob})
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -37,7 +37,7 @@ class Failing(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):
             lost = number in self.numbers
-            yield number, failed(job, "crashed", "exit code 9", 1.0) if lost else perform(job)
+            yield number, failed(job, "crashed", "exit code 9") if lost else perform(job)
 
 
 def paper_cells(**selection):
