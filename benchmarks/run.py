@@ -116,7 +116,7 @@ class RunReport:
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (progress.stale, "made by a different version of the code"),
-                (unasked, "that this command did not ask for"),
+                (unasked, "of earlier commands, which are kept"),
             )
             if count > 0
         ]

@@ -67,7 +67,8 @@ def unknown(kind: str, name: str, names: Iterable[str]) -> str:
     """A sentence on a name that is not among some names: the nearest of them, or all."""
     several = list(names)
     hint = did_you_mean(name, several)
-    more = f" and {len(several) - _MOST_NAMED} others" if len(several) > _MOST_NAMED else ""
+    rest = len(several) - _MOST_NAMED
+    more = f" and {rest} other{'s' * (rest > 1)}" if rest > 0 else ""
     return f"unknown {kind} {name!r}" + (
         hint or f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
     )

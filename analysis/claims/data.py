@@ -17,7 +17,7 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
-from coartic.learner.kernel import PARTS
+from coartic.learner.kernel import TENTHS
 from coartic.robot import Array
 
 PLAN = "trajectory-optimisation/squared-changes"
@@ -95,7 +95,7 @@ class Data:
             values = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         elif what in ("early", "late"):
             # Trial 0 has no other movements by construction.
-            movements = (runs.trials - 1) * len(self.task(task).goals) / PARTS
+            movements = (runs.trials - 1) * len(self.task(task).goals) / TENTHS
             values = (runs[f"{what}_corrections"] / movements).to_numpy(dtype=np.float64)
         elif what == "last":
             values = (runs.solution_corrections / len(self.task(task).goals)).to_numpy(np.float64)

@@ -104,7 +104,6 @@ class Count(NamedTuple):
 COUNT = Count()
 TENTHS = 10
 """Equal parts of the trials after trial 0, of which corrections are counted apart."""
-PARTS = TENTHS  # as coartic.analysis.claims.data imports it
 
 
 class Work(NamedTuple):
