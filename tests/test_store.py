@@ -10,7 +10,6 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from coartic import CoarticError, Movement
@@ -95,7 +94,7 @@ def test_what_is_written_is_read_back(written):
         np.testing.assert_array_equal(rewards, kept)
 
 
-def test_the_views_are_plain_sql_and_go_elsewhere_in_one_call(written, tmp_path):
+def test_the_views_are_plain_sql(written):
     handed, study = written
     with closing(sqlite3.connect(study.folder / FILE)) as plain_sql:
         rows = plain_sql.execute("SELECT run_id, reward FROM runs").fetchall()
@@ -108,8 +107,6 @@ def test_the_views_are_plain_sql_and_go_elsewhere_in_one_call(written, tmp_path)
             query = 'SELECT right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
             points = [q[6] for m in solution if m.waypoints is not None for q in m.waypoints]
             assert [q for (q,) in plain_sql.execute(query, (run_id,))] == points
-    study.runs.to_parquet(tmp_path / "runs.parquet")
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "runs.parquet"), study.runs)
 
 
 def test_a_lot_is_there_whole_or_not_at_all(written, tmp_path):

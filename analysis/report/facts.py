@@ -216,18 +216,19 @@ def price(study: Study) -> Facts | None:
 
 
 @cached
-def hands(study: Study) -> list[Facts]:
+def hands(study: Study) -> Facts:
     """Tasks on which the learner's best condition ends with other hands than it began with."""
-    changes = []
+    changes, tasks = [], 0
     for name, task in study.tasks.items():
         label = best_condition(study, name)
         good = study.cells[name, label].good if label else None
         if good is not None and good.initial_hands.notna().any():
+            tasks += 1
             before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
             if before not in most_frequent:
                 change = f"{before} to {' or '.join(most_frequent)}"
                 changes.append({"task": task.label, "change": change})
-    return changes
+    return {"changes": changes, "tasks": tasks}
 
 
 @cached

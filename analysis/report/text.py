@@ -56,7 +56,7 @@ def sentence(name: str, of: Any) -> str:
     """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
     macros = environment(escape=False).get_template("sentences.jinja").module
     text = str(getattr(macros, name)(of)).replace("\n", " ")
-    return shown(" ".join(part for part in text.split(" ") if part))
+    return shown(" ".join(part for part in text.split(" ") if part).replace(" ,", ","))
 
 
 def answers(study: Study) -> list[dict[str, str]]:
