@@ -83,7 +83,7 @@ def published(study: Study) -> Parts:
 
 def draw_row(axes: Axes, y: float, row: Any) -> None:
     """Margin, interval and difference of one comparison."""
-    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.3)
+    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.2)
     color, marker, face = _MARKS[row["verdict"] if row["runs"] > 1 else ""]
     if not row["runs"]:
         axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)

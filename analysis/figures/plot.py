@@ -15,7 +15,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, Task
-from coartic.analysis.figures.style import BLUE, GREY, INK, PAPER, RC, TIP, styled
+from coartic.analysis.figures.style import GREY, INK, PAPER, RC, TIP, styled
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED
@@ -128,8 +128,8 @@ def svg_for_page(plot: Plot) -> str:
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    one, its grey is ``--grey`` and its blue ``--first``. Marks with a :func:`~.style.tip`
-    show it. Ids begin with the plot's id, so that several can share a page.
+    one, and its grey is ``--grey``. Marks with a :func:`~.style.tip` show it. Ids begin with the
+    plot's id, so that several can share a page.
     """
     stream = io.StringIO()
     with rc_context({**RC, "svg.fonttype": "none"}):
@@ -140,7 +140,7 @@ def svg_for_page(plot: Plot) -> str:
     text = re.sub(r"\n\s*", "\n", text)
     # The backend leaves black fills out: they inherit the root's.
     text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
-    text = text.replace(GREY, f"var(--grey, {GREY})").replace(BLUE, f"var(--first, {BLUE})")
+    text = text.replace(GREY, f"var(--grey, {GREY})")
     head, body = text.split(">", 1)
     head = re.sub(r' (width|height|version|xmlns:xlink)="[^"]*"', "", head)
     # Styles that the backend gives to all elements would apply to the whole page.

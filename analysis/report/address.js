@@ -21,7 +21,7 @@
 
   const write = () => {
     const changed = controls.filter((control) => used.has(boxOf(control))
-      && control.value !== atStart.get(control) && !control.closest("[hidden]"));
+      && control.value !== atStart.get(control) && !control.closest("[hidden], [data-playing]"));
     const query = new URLSearchParams(changed.map((control) => [control.id, control.value])).toString();
     const typing = document.activeElement.type === "search" && document.activeElement.closest("section");
     const inView = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);

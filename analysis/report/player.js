@@ -163,7 +163,7 @@ class Mover {
       goal.classList.toggle("hit", k < now.hit);
       goal.classList.toggle("current", k === now.hit);
     });
-    const goal = now.hit < goals.length ? `on the way to goal ${now.hit + 1} with the ${now.hand} hand` : "all goals hit";
+    const goal = now.hit < goals.length ? `next is goal ${now.hit + 1} with the ${now.hand} hand` : "all goals hit";
     this.words = `tick ${now.ticks}, ${goal}`;
   }
 }
@@ -302,6 +302,7 @@ class Player {
   play() {
     if (this.spent >= this.last) this.go(0);
     this.playing = true;
+    this.button.closest(".player").toggleAttribute("data-playing", true);
     this.button.textContent = "Pause";
     this.status.textContent = "";
     const pace = 60; // ticks a second
@@ -330,6 +331,7 @@ class Player {
   pause() {
     const moved = this.playing;
     this.playing = false;
+    this.button.closest(".player").toggleAttribute("data-playing", false);
     this.button.textContent = "Play";
     if (moved) this.go(this.spent);
   }
