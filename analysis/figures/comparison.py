@@ -131,8 +131,8 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
     "Learning curves",
     "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
     f"the trials themselves (mean over runs and the last {comparison.WINDOW} trials; failed trials "
-    "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials far "
-    "below the initial solution are cut off.",
+    "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
+    "far below the initial solution are cut off.",
 )
 def learning_curves(study: Study) -> Parts:
     """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
