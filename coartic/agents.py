@@ -163,11 +163,11 @@ class SessionEnvs(VecEnv):
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Not supported."""
+        """Refused: all environments are one object, so that none can have its own value."""
         raise NotImplementedError("the environments have no attributes of their own")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Not supported."""
+        """Refused: all environments are one object, so that none can be asked alone."""
         raise NotImplementedError("the environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:

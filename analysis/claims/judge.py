@@ -96,7 +96,8 @@ def p_of(claim: Claim, finding: Finding) -> float:
 def opposite_p(claim: Claim, finding: Finding) -> float:
     """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
 
-    The other tail of a test by resampling counts the observed sample as well.
+    The other tail of a test by resampling counts the observed sample as well. A rule with exact
+    tests gives their opposites itself (``against``).
     """
     if finding.against is not None:
         p = [test.p for test in finding.against]

@@ -137,6 +137,7 @@ class Sample:
         return best
 
 
+@cached
 def one_by_one(study: Study) -> set[str]:
     """Names of the tasks that a report has one by one.
 

@@ -82,6 +82,7 @@ def ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each single one, grouped by what methods know."""
     rows = standings(study)
     single = {name for name, task in study.tasks.items() if task.family is None}
+    tested = against_learner(study)
     named: list[tuple[str, Row]] = []
     for method, of_method in rows.groupby("method", sort=False):
         by_task = of_method.set_index("task")
@@ -96,10 +97,9 @@ def ranking(study: Study) -> Rows:
             for task in initial_and_optimum(study)
             if task in single
         }
-        tested = against_learner(study)
-        tested = tested[tested.index.isin([f"{task} {label}" for task, label in labels.items()])]
-        if len(tested):
-            sure = tested[tested.p_holm < LEVEL]
+        of_labels = tested.index.isin([f"{task} {label}" for task, label in labels.items()])
+        if of_labels.any():
+            sure = tested[of_labels & (tested.p_holm < LEVEL)]
             row |= {"better": sum(sure.reward > sure.learner)}
             row |= {"worse": sum(sure.reward < sure.learner)}
         cells = [study.cells[key] for key in labels.items()]
