@@ -63,7 +63,9 @@ def kept(
             outcomes[n] = ended(outcomes[n], "infeasible", execution.reason)
     for n, outcome in enumerate(outcomes):
         if outcome.status == "ok" and "solution" not in executions[n]:
-            outcomes[n] = ended(outcome, "solver-failed", "it says ok, but states no solution")
+            outcomes[n] = ended(
+                outcome, "solver-failed", "it reported ok, but returned no solution"
+            )
     return [
         run_of(identity, outcome, parts if outcome.status == "ok" else {}, times, task, made_with)
         for identity, outcome, parts in zip(identities, outcomes, executions, strict=True)

@@ -212,7 +212,9 @@ def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     for part in ("initial", "replay"):
         if any(movement.kind == "path" for movement in parts.get(part, ())):
-            raise SolutionError(f"movements of {part!r} follow a path; only a solution's may")
+            raise SolutionError(
+                f"movements in {part!r} follow a path; only those of a solution may"
+            )
     return {"parts": parts, "details": details, "bound": bound}
 
 

@@ -63,12 +63,12 @@ class Arms:
         if isinstance(around, str):
             if {*around} - {*LETTERS} or len(around) != goals:
                 raise ValueError(
-                    f"around is {around!r}; needed is L or R for each of {goals} goals"
+                    f"around is {around!r}; it must have L or R for each of {goals} goals"
                 )
             around = corrective_trial(self.task, around, model=model).configurations
         self.around = None if around is None else np.array(around, dtype=np.float64)
         if self.around is not None and self.around.shape != (goals, dof):
-            raise ValueError(f"around has shape {self.around.shape}; needed is ({goals}, {dof})")
+            raise ValueError(f"around has shape {self.around.shape}; it must be ({goals}, {dof})")
         if observe not in ("learner", "posture"):
             raise ValueError(f"observe is {observe!r}; it is 'learner' or 'posture'")
         self.sees_posture = observe == "posture"
@@ -113,7 +113,7 @@ class Arms:
         chosen = np.asarray(actions, dtype=np.float64)
         shape = len(which), *self.action_space.shape
         if chosen.shape != shape:
-            raise ValueError(f"actions have shape {chosen.shape}; needed is {shape}")
+            raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
         chosen = chosen[rows]
         hands = np.full(len(rows), HANDS.index(self.task.hands[0]))
         if self.two_hands:

@@ -94,9 +94,9 @@ def test_trials_that_fail_and_actions_that_are_none():
         env.reset()
         with pytest.raises(ValueError, match="not finite, or far beyond"):
             env.step(np.full(6, action))
-    with pytest.raises(ValueError, match=r"shape \(1, 3\); needed is \(1, 6\)"):
+    with pytest.raises(ValueError, match=r"shape \(1, 3\); it must be \(1, 6\)"):
         env.unwrapped.step(np.zeros(3))
-    with pytest.raises(ValueError, match="'XYX'; needed is L or R"):
+    with pytest.raises(ValueError, match="'XYX'; it must have L or R"):
         gymnasium.make("coartic/Ascending-v0", around="XYX")
 
 

@@ -64,7 +64,7 @@ HANDLED = {
     "bound": ("return Result(corrected(session), bound=-1)", "solver-failed", "states a bound"),
     "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
               "        return Result(corrected(session), initial=way)",
-              "solver-failed", "movements of 'initial' follow a path"),
+              "solver-failed", "movements in 'initial' follow a path"),
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
              "crashed", "unknown outcome, 'ok': x"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",
@@ -120,7 +120,7 @@ def test_no_run_is_ok_without_a_solution():
     (run,) = kept([{}], Answer([Outcome("ok")], 1.0), load_task("ascending"), PAPER)
     assert (run.status, run.row["reason"]) == (
         "solver-failed",
-        "it says ok, but states no solution",
+        "it reported ok, but returned no solution",
     )
 
 
