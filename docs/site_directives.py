@@ -205,8 +205,6 @@ def claims() -> Iterator[str]:
     def goals(claim: Any) -> str:
         if claim.families:
             return "random tasks"
-        if claim.chosen:
-            return "used to choose the goals"
         return "reconstructed †" if claim.fitted else "printed"
 
     def source(claim: Any) -> str:

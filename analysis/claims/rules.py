@@ -311,7 +311,7 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
         return seen if b == 0 else f"{seen} against {second.who}"
     if not b.ndim:
         seen += f" against {number(float(b))} ({second})"
-    elif first.what != second.what:
+    elif first.what.removeprefix("replayed-") != second.what.removeprefix("replayed-"):
         return f"{seen}, {second.what} {in_words(second.what, b)}"
     else:
         ticks = in_ticks(first.what)
