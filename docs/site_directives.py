@@ -220,6 +220,7 @@ def claims() -> Iterator[str]:
         return (
             f"{text[0].upper()}{text[1:]}."
             + (f" *{'; '.join(what)}.*" if what else "")
+            + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
             + (power if claim.power else "")
         )
 
