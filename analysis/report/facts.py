@@ -11,6 +11,8 @@ from collections import Counter
 from shlex import quote
 from typing import Any
 
+import numpy as np
+
 from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.claims.register import MARGINS
@@ -86,7 +88,10 @@ def slopes(study: Study) -> Facts | None:
     """
     rows = tables.slopes(study)
     rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
-    rows = rows.assign(seen=rows.p_holm < LEVEL, size=rows.slope.abs())
+    # A method that selects its solution from trials has to exceed the placebo as well.
+    chosen = [selects(study, str(label)) for label in rows.method]
+    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
+    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
     for label in (*CONDITIONS, *main_methods(rows.method)):
         of_method = rows[rows.method == label].sort_values(["seen", "size"])
         for row in of_method.tail(1).to_dict("records"):

@@ -12,7 +12,7 @@ from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import in_order, is_search, main_methods
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import families, variants
-from coartic.analysis.signatures.register import placebo_of, selects
+from coartic.analysis.signatures.register import placebo_of, selects, slope_beyond_p
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
@@ -81,7 +81,7 @@ def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
         yield name, row | {"p_holm": adjusted[place]}
 
 
-@table("method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving")
+@table("method, place, kind, hand, runs, norm, p_holm, p_placebo, joint, slope[], goal, moving")
 def slopes(study: Study) -> Rows:
     """How the posture at a goal follows a neighbouring goal that moves."""
     frame = signature_values(study)
@@ -102,6 +102,7 @@ def slopes(study: Study) -> Rows:
             "runs": int(group.n.max()),
             "norm": math.nan,
             "p_holm": math.nan,
+            "p_placebo": slope_beyond_p(study, label, task, goal, moving, hand),
             "joint": "",
             **runs_of(
                 *(
