@@ -106,6 +106,8 @@ class Claim(FileData):
     cells: Mapping[str, Sequence[str]] = {}
     families: Sequence[str] = ()
     compared: Sequence[str] = ()
+    uncounted: str = ""
+    """Why its verdict does not count for or against the model; empty where it does."""
     suite: str = ""
     power: str = ""
     place: str = ""

@@ -85,6 +85,11 @@ class ExplorationCondition:
                 f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
                 "credit to 'subtask'"
             )
+        if self.credit == "subtask" and self.learned == "best":
+            raise ValueError(
+                "a learner with credit 'subtask' is told nothing of the whole, so that its best "
+                "trial is no solution that it knows: set learned to 'replay'"
+            )
 
     def why_not(self, task: Task) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
@@ -117,7 +122,8 @@ VARIANTS = {
     for base in ("EC1", "EC4")
     for name, changes in {
         "uncorrected": {"corrects": False},
-        "subtask": {"credit": "subtask"},
+        # The reward of the whole task must not pick what it has learned from that of subtasks.
+        "subtask": {"credit": "subtask", "learned": "replay"},
     }.items()
 }
 

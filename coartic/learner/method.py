@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from itertools import chain
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -59,6 +59,8 @@ class SubtaskParameters(DualProcessParameters):
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
     """γ of the return from a goal on; 0 is the reward of its own subtask alone."""
+    learned: Literal["replay"] = "replay"  # type: ignore[assignment]
+    """The best trial of the whole task is picked by a reward that it is not told."""
 
 
 class DualProcess(Method):
