@@ -137,7 +137,9 @@ def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     try:
         finding = RULES[claim.rule](data, claim)
     except MissingError as missing:
-        return Finding(None, f"Not judged: {missing}."), ()
+        words = f"Not judged: {missing}."
+        return Finding(None, words, failed=tuple(dict.fromkeys(data.failed))), ()
+    finding = replace(finding, failed=tuple(dict.fromkeys(data.failed)))
     if claim.exact:
         finding = replace(finding, tests=(), against=None)
     return finding, tuple(dict.fromkeys(data.run_ids))

@@ -86,6 +86,8 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Inference, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
+    failed: tuple[tuple[str, str], ...] = ()
+    """Cells that it lacks, as some of their runs failed: task, and label of the method."""
 
 
 class Claim(FileData):

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
 from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.claims.register import MARGINS
-from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
+from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.comparisons.paper import beside_paper
 from coartic.analysis.comparisons.reached import price as price_by_method
-from coartic.analysis.comparisons.standings import leaders
+from coartic.analysis.comparisons.standings import initial_and_optimum, leaders
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.human import judge
 from coartic.analysis.methods import (
@@ -25,6 +26,7 @@ from coartic.analysis.methods import (
     KNOWN_METHODS,
     LEARNER,
     is_learner,
+    is_search,
     is_variant,
     main_methods,
     most_exploring,
@@ -33,12 +35,48 @@ from coartic.analysis.methods import (
 from coartic.analysis.published import RUNS, TRIALS
 from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellKey, Study, cached
 from coartic.analysis.tables.paper import best_condition
 
 Facts = dict[str, Any]
 PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
 """Terms of a penalty in words."""
+
+
+def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
+    """How many runs of the cells behind an answer failed, and whose; None where none did.
+
+    ``runs`` are all of the methods of which some failed.
+    """
+    runs, failed = Counter[str](), Counter[str]()
+    for task, label in dict.fromkeys(cells):
+        cell = study.cells[task, label]
+        runs[label] += len(cell.runs)
+        failed[label] += len(cell.runs) - len(cell.good)
+    who = [label for label in failed if failed[label]]
+    if not who:
+        return None
+    names = " and ".join(map(name_of, who)) if len(who) < 3 else f"{len(who)} methods"
+    return {"failed": failed.total(), "runs": sum(runs[label] for label in who), "who": names}
+
+
+def failed_of(study: Study, label: str) -> Facts | None:
+    """:func:`failed_behind` an answer about one method."""
+    return failed_behind(study, (cell for cell in study.cells if cell[1] == label))
+
+
+def failed_compared(study: Study, *groups: str) -> Facts | None:
+    """:func:`failed_behind` an answer that compares methods on tasks with a known optimum."""
+    tasks = initial_and_optimum(study)
+    return failed_behind(
+        study,
+        (
+            (task, label)
+            for task, label in study.cells
+            if task in tasks and not is_variant(label) and not is_search(label)
+            if not groups or group_of(study, label) in groups
+        ),
+    )
 
 
 @cached
@@ -61,6 +99,7 @@ def coarticulation(study: Study) -> Facts | None:
         "seen": shared.p < LEVEL if tested else shared.apart > 0,
         "too_few": tested and math.isnan(shared.p),
         "row": f"{shared.tasks[0].name} {shared.method} goal {shared.goal} {shared.hand}",
+        "failed": failed_behind(study, [(task.name, shared.method) for task in shared.tasks]),
     }
 
 
@@ -77,7 +116,8 @@ def slopes(study: Study) -> Facts | None:
         of_method = rows[rows.method == label].sort_values(["seen", "size"])
         for row in of_method.tail(1).to_dict("records"):
             words = {"method": name_of(label), "joint": str(row["joint"]).replace("_", " ")}
-            return {str(key): value for key, value in row.items()} | words
+            failed = {"failed": failed_of(study, label)}
+            return {str(key): value for key, value in row.items()} | words | failed
     return None
 
 
@@ -99,6 +139,7 @@ def gain(study: Study) -> Facts | None:
         # Ticks by which the first movement is slower than the corrective process's.
         changes = study.trajectories(best["task"], best["label"]).against_same_hands
         best["first"] = float(changes[:, 0].mean()) if len(changes) else math.nan
+        best["failed"] = failed_behind(study, [(best["task"], best["label"])])
     return best
 
 
@@ -112,6 +153,7 @@ def paper(study: Study) -> Facts | None:
     return {
         "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
         **verdicts_of(entries),
+        "failed": failed_behind(study, (cell for e in entries for cell in e.finding.failed)),
     }
 
 
@@ -161,6 +203,7 @@ def nearest(study: Study) -> Facts | None:
         "tasks": len(optima),
         "settings": sum(map(is_variant, tables.variants(study).method)),
         "from_files": from_files(study),
+        "failed": failed_compared(study),
     }
 
 
@@ -212,6 +255,7 @@ def price(study: Study) -> Facts | None:
         "plan": name_of(str(plans.idxmin())) if len(plans) else "",
         "plan_kinematics": plans.min(),
         "learner_kinematics": learner.kinematics_to_half,
+        "failed": failed_compared(study, BY_TRIAL),
     }
 
 
