@@ -19,9 +19,9 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
-Group = Literal["paper", "beside", "families", "ours"]
+Group = Literal["paper", "beside", "families", "ours", "uncounted"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; and claims of our own, those on one suite."""
+families of random tasks; claims of our own, those on one suite; and those that are not counted."""
 
 _HANDS = "[LR]+"
 QUANTITIES = {
@@ -121,6 +121,8 @@ class Claim(FileData):
         """Which claims it is corrected with; None for what is counted exactly."""
         if self.exact:
             return None
+        if self.uncounted:
+            return "uncounted"
         if not self.place:
             return "ours"
         if self.families:

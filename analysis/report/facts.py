@@ -14,7 +14,6 @@ from typing import Any
 
 from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
-from coartic.analysis.claims.register import MARGINS
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.comparisons.paper import beside_paper
 from coartic.analysis.comparisons.reached import price as price_by_method
@@ -41,6 +40,8 @@ from coartic.analysis.tables.paper import best_condition
 Facts = dict[str, Any]
 PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
 """Terms of a penalty in words."""
+FURTHER = {"2": "the second", "3": "the third", "4": "the fourth", "5+": "the others together"}
+"""Goals ahead beyond the first in words."""
 
 
 def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
@@ -327,23 +328,22 @@ def exploration(study: Study) -> list[Facts]:
 
 @cached
 def horizon(study: Study) -> Facts | None:
-    """Gaps of the planner by goals ahead over all random tasks, and the horizon of the learner.
-
-    ``enough``: the first horizon after which a further goal gains less than the margin.
-    """
+    """Gaps of the planner by goals ahead over random tasks, and what goals gain on tasks that have
+    them."""
     rows = tables.TABLES["horizon"](study)
     rows = rows[rows.group == "all"]
     if not len(rows):
         return None
-    percent = {name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high", "gain")}
-    each = rows.assign(**percent).to_dict("records")
-    little = [row["gain"] < MARGINS["gain"] for row in each]
-    beside = tables.TABLES["horizon-beside"](study)
+    columns = [f"{name}{end}" for name in ("gap", "gain") for end in ("", "_low", "_high")]
+    each = rows.assign(**100 * rows[columns]).to_dict("records")
     return {
         "tasks": each[0]["tasks"],
         "by_h": {row["h"]: row for row in each},
-        "enough": next((each[k - 1]["h"] for k in range(1, len(each)) if all(little[k:])), ""),
-        "learner": next(iter(beside[beside.index == "learner all"].lies), ""),
+        "further": [
+            row | {"words": words}
+            for row in each
+            if (words := FURTHER.get(row["h"])) and not math.isnan(row["gain"])
+        ],
     }
 
 
