@@ -47,8 +47,9 @@ class Guesses(Optimiser):
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Guess until no trial is left."""
+        low, high = objective.bounds.T
         while True:
-            objective.many(rng.uniform(*objective.bounds.T, size=(_TOGETHER, objective.dim)))
+            objective.many(rng.uniform(low, high, (_TOGETHER, objective.dim)))
 
 
 METHODS: tuple[type[Method], ...] = (Guesses,)

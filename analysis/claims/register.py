@@ -18,10 +18,10 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 """Every margin with its value, the reason for it, and its history where it was changed."""
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
-Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
-Group = Literal["paper", "beside", "families", "ours", "uncounted"]
+Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
+Group = Literal["paper", "beside", "families", "ours", "flawed"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; claims of our own, those on one suite; and those that are not counted."""
+families of random tasks; claims of our own, those on one suite, and those that are flawed apart."""
 
 _HANDS = "[LR]+"
 QUANTITIES = {
@@ -31,7 +31,10 @@ QUANTITIES = {
     "last": "share of movements that are corrected, in the learned solution",
     "resemblance": "share of the distance of the initial solution to the plan for least squared "
     "changes that learning has covered (postures at the goals)",
-} | {name.replace(" ", "-"): sign.words for name, sign in SIGNS.items()}
+}
+for _name, _sign in SIGNS.items():
+    QUANTITIES[_name.replace(" ", "-")] = _sign.words
+    QUANTITIES[f"replayed-{_name.replace(' ', '-')}"] = f"in noiseless replays, {_sign.words}"
 """What is measured of runs beside their reward, by its name in comparisons."""
 _WHAT = "|".join(QUANTITIES)
 _METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
@@ -100,7 +103,8 @@ class Claim(FileData):
     test: str = ""
     exact: bool = False
     fitted: bool = False
-    chosen: bool = False
+    short: str = ""
+    """In a few words, for the three claims that carry the paper's point."""
     beside: bool = False
     pairs: Mapping[str, Sequence[str]] = {}
     shown: Mapping[str, Sequence[str]] = {}
@@ -121,10 +125,8 @@ class Claim(FileData):
         """Which claims it is corrected with; None for what is counted exactly."""
         if self.exact:
             return None
-        if self.uncounted:
-            return "uncounted"
         if not self.place:
-            return "ours"
+            return "flawed" if self.uncounted else "ours"
         if self.families:
             return "families"
         return "beside" if self.beside else "paper"

@@ -46,11 +46,11 @@ def horizon(study: Study) -> Parts:
     groups = [group for group in titles if (data.group == group).any()]
     drawing, panels = style.figure_of((1, len(groups)), (style.TWO, 2.6), sharey=True)
     for axes, group in zip(panels, groups, strict=True):
-        parts = data[(data.group == group) & data.h.isin(PLACES)].groupby("value", sort=False)
+        parts = data[data.group == group].groupby("value", sort=False)
         for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
-            if group == "goals" and BEYOND not in set(data[data.value == name].h):
+            if group == "goals" and BEYOND not in set(rows.h):
                 rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
-            curve(axes, rows, color, 0.08 * number, str(name))
+            curve(axes, rows[rows.h.isin(PLACES)], color, 0.08 * number, str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])

@@ -160,7 +160,8 @@ def horizon_signs(study: Study) -> Rows:
             if len(values):
                 row: Row = {"sign": name, "words": sign.words, "h": str(h), "tasks": len(values)}
                 row |= mean_of("mean", values.here)
-                row |= mean_of("to_come", values["all"] - values.here)
+                if h != ALL_GOALS:
+                    row |= mean_of("to_come", values["all"] - values.here)
                 of_tasks = [cell for cell in cells[h] if cell.task in values.index]
                 yield f"{name} h={h}", row | runs_of(*of_tasks)
 
