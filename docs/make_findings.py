@@ -17,6 +17,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import next_goal
 from coartic.analysis.study import load
@@ -36,7 +37,7 @@ KEPT = {
     "agents": ("variants contexts signatures", ""),
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),
-    "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
+    "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
@@ -133,6 +134,7 @@ def filled_pages() -> dict[str, str]:
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
         "seen": seen, "expect": expect, "name_of": name_of,
         "printed": tomllib.loads((ANALYSIS / "published.toml").read_text("utf-8"))["general"],
+        "uncounted": {c.id: c.uncounted for c in CLAIMS.values() if c.uncounted},
         "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
         "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),

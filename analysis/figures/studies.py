@@ -89,7 +89,7 @@ TIMES = {"free": ("free times", style.SOLID), "fixed": ("equal times", style.DAS
     "What a stop at the goals leaves of coarticulation",
     "Smooth plans from passing through the goals (0) to a full stop at each (1), means over tasks, "
     f"of random ones with their {style.CONFIDENCE} interval. a: ticks by which postures leave the "
-    "next goal nearer, against the corrective process's; they come of redundancy. b: the angle by "
+    "next goal nearer, against the corrective process's. b: the angle by "
     "which the path turns at goals, which passing makes 0. Movements have a constant speed here, "
     "so that the direction is all that is left of a plan's velocity.",
 )
