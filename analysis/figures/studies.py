@@ -31,11 +31,11 @@ COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
 @figure(
     "horizon",
     "Gap of a planner by how far it looks ahead",
-    "Gap to the best known solution, mean over random tasks that have so many goals ahead, with "
-    f"its {style.CONFIDENCE} interval (bootstrap over tasks), linear below 1 %. By goals of the "
-    "task: a line ends where all goals are in view. Given hands: hands chosen by each plan, or "
-    "those of the plan with all goals. Dear joints cost three times as much, by weighted path "
-    "length.",
+    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    "(bootstrap over tasks), linear below 1 %, at horizons that all of a line's tasks have. By "
+    "goals of the task: a line ends where all goals are in view. Given hands: hands chosen by each "
+    "plan, or those of the plan with all goals. Dear joints cost three times as much, by weighted "
+    "path length.",
 )
 def horizon(study: Study) -> Parts:
     """The curves by number of goals, with given hands, and with dear joints."""
@@ -50,7 +50,8 @@ def horizon(study: Study) -> Parts:
         for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
             if group == "goals" and BEYOND not in set(rows.h):
                 rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
-            curve(axes, rows[rows.h.isin(PLACES)], color, 0.08 * number, str(name))
+            rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
+            curve(axes, rows, color, 0.08 * number, str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])
