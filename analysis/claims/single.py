@@ -78,10 +78,7 @@ def contexts_of(data: Data, label: str, *, replayed: bool = False) -> TwoContext
 
 
 def slower_hands_are_chosen(data: Data, claim: Claim) -> Finding:
-    """one-tailed Fisher's exact tests: in one of the cells more than {few:.0%} of the runs, and more \
-than of the placebo's, hit a goal that others follow with a hand that is slower for that goal alone \
-and is not the initial solution's (smallest p times their number). For the opposite: in each cell \
-fewer than {few:.0%} of the runs do (exact binomial tests)"""
+    """Whether more runs than of the placebo choose a hand that is slower for its goal alone."""
     ((task, conditions),) = claim.cells.items()
     initial = data.initial(task).hands
     chosen = {who: chosen_slower(data.cell(task, who), initial) for who in (*conditions, PLACEBO)}

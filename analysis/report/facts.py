@@ -298,6 +298,7 @@ def price(study: Study) -> Facts | None:
         "ceiling": learner.reached,
         "rival_ceiling": math.nan if rival is None else rival.reached,
         "by_task": by_task,
+        "never": math.inf in (*ours.values(), *theirs.values()),
         "plan": name_of(plan) if plan else "",
         "plan_kinematics": plans.min(),
         "plan_seconds": rows.seconds_to_half.get(plan, math.nan),

@@ -11,8 +11,8 @@ from itertools import chain
 
 import pandas as pd
 
-from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.comparisons.methods import BY_TRIAL, group_of
+from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, PLACEBO, main_methods
 from coartic.analysis.signatures.between import TwoContexts, between_contexts, slopes
 from coartic.analysis.signatures.context import context_pairs

@@ -10,8 +10,8 @@ import pandas as pd
 
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import in_order, is_search, main_methods
-from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.locus import families, variants
 from coartic.analysis.signatures.register import placebo_of, selects
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.hypotheses import holm
