@@ -225,7 +225,7 @@ def claims() -> Iterator[str]:
             f"{text[0].upper()}{text[1:]}."
             + (f" *{'; '.join(what)}.*" if what else "")
             + (power if claim.power else "")
-            + (f" *Not counted.* {claim.uncounted}." if claim.uncounted else "")
+            + (f" *Not counted:* {claim.uncounted}." if claim.uncounted else "")
         )
 
     rows = (
