@@ -136,7 +136,6 @@ def filled_pages() -> dict[str, str]:
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
         "seen": seen, "expect": expect, "name_of": name_of,
         "printed": tomllib.loads((ANALYSIS / "published.toml").read_text("utf-8"))["general"],
-        "uncounted": {c.id: c.uncounted for c in CLAIMS.values() if c.uncounted},
         "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
         "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
