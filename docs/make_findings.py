@@ -37,7 +37,7 @@ KEPT = {
     "agents": ("variants contexts signatures", ""),
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),
-    "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
+    "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),

@@ -216,7 +216,9 @@ def claims() -> Iterator[str]:
         for by_task in (claim.pairs, claim.runs, claim.cells):
             for task, names in by_task.items():
                 what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
-        power = f" Power, stated before suite `{claim.suite}` was run: {claim.power}."
+        before = f"Power, stated before suite `{claim.suite}` was run: "
+        before = "" if claim.power.startswith("Written after") else before
+        power = f" {before}{claim.power}."
         return (
             f"{text[0].upper()}{text[1:]}."
             + (f" *{'; '.join(what)}.*" if what else "")
