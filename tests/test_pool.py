@@ -105,7 +105,7 @@ def runs(tmp_path_factory):
     cells = [Cell(task, does, (("what", name),)) for name in HANDLED]
     cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
     study = run_and_write(
-        folder / "out", cells, executor=Local(2, wall_times=3), runs=1, time_limit_s=2.0,
+        folder / "out", cells, executor=Local(2, wall_times=10), runs=1, time_limit_s=2.0,
         trial_budget=3,
     )  # fmt: skip
     return study.runs.set_index("label")
