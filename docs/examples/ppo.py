@@ -6,6 +6,7 @@ from coartic.agents import Agent, AgentParameters
 
 
 class Setting(AgentParameters):
+    scale: float = 1.0
     learning_rate: float = 3e-3
     log_std_init: float = -2.0
     steps: int = 16

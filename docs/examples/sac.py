@@ -7,7 +7,7 @@ from coartic.agents import Agent, AgentParameters
 
 class Setting(AgentParameters):
     envs: int = 32
-    scale: float = 0.1
+    scale: float = 0.05
     learning_rate: float = 3e-3
     gradient_steps: int = 1  # after each step of all environments
     entropy: float = 0.01  # its weight in the reward; "auto" is SAC's way to find it
