@@ -205,8 +205,6 @@ def claims() -> Iterator[str]:
     def goals(claim: Any) -> str:
         if claim.families:
             return "random tasks"
-        if claim.chosen:
-            return "used to choose the goals"
         return "reconstructed †" if claim.fitted else "printed"
 
     def source(claim: Any) -> str:
@@ -222,6 +220,7 @@ def claims() -> Iterator[str]:
         return (
             f"{text[0].upper()}{text[1:]}."
             + (f" *{'; '.join(what)}.*" if what else "")
+            + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
             + (power if claim.power else "")
         )
 

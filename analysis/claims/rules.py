@@ -68,12 +68,19 @@ def higher(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap test of the mean reward for each comparison"""
     tests, parts = [], []
     for task, pairs in claim.pairs.items():
+        before = None
         for first, second, margin in map(read_comparison, pairs):
             a, b = data.values(task, first), data.values(task, second)
             same_runs = b.ndim and (first.who, first.hands) == (second.who, second.hands)
             compare = (a - b, margin) if same_runs else (a - margin, b)
             tests.append(bootstrap_test(*compare))
-            parts.append((first.what, f"{task}, {first}: {compared(task, first, second, a, b)}"))
+            seen = compared(task, first, second, a, b)
+            if first == before:  # its value was said
+                words = f"{task}, {first} {seen[seen.index('against') :]}"
+            else:
+                words = f"{task}, {first}: {seen}"
+            parts.append((first.what, words))
+            before = first
     return all_hold(tests, [*parts, *shown_beside(data, claim)])
 
 
@@ -178,14 +185,12 @@ def runs_that(data: Data, task: str, condition: str, what: str) -> NDArray[np.bo
     """Which runs do something, shape ``(runs,)``: ``LRLR``, ``not best``, ``RRLR rightward``.
 
     ``commonest``: have the commonest hand sequence; ``best``, ``initial``: one that is best by the
-    corrective process alone, or the initial one; ``slower-hand``: hit some goal with a hand that is
-    slower for it alone; ``rightward``: of the runs with these hands, the base only moves right.
+    corrective process alone, or the initial one; ``rightward``: of the runs with these hands, the
+    base only moves right.
     """
     inverse, what = what.startswith("not "), what.removeprefix("not ")
     learned = data.runs(task, condition).hands.astype(str).to_numpy()
-    if what == "slower-hand":
-        does = data.values(task, Side("hand", condition)) > 0
-    elif what.endswith(" rightward"):
+    if what.endswith(" rightward"):
         q0, hands = data.task(task).q0, what.partition(" ")[0]
         runs = [r.execution for r in data.cell(task, condition).runs if r.execution.hands == hands]
         if not runs:
@@ -298,8 +303,12 @@ def all_hold(tests: list[Inference], parts: Parts) -> Finding:
 
 def in_words(what: str, values: Array) -> str:
     """The mean with its BCa interval; ticks and rewards with one decimal."""
-    ticks = what in REWARDS or QUANTITIES[what].startswith("ticks")
-    return estimate(mean(values), 1 if ticks else 3)
+    return estimate(mean(values), 1 if in_ticks(what) else 3)
+
+
+def in_ticks(what: str) -> bool:
+    """Whether a quantity is counted in ticks."""
+    return what in REWARDS or "ticks by which" in QUANTITIES[what]
 
 
 def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
@@ -309,13 +318,12 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
         return seen if b == 0 else f"{seen} against {second.who}"
     if not b.ndim:
         seen += f" against {number(float(b))} ({second})"
-    elif first.what != second.what:
+    elif first.what.removeprefix("replayed-") != second.what.removeprefix("replayed-"):
         return f"{seen}, {second.what} {in_words(second.what, b)}"
     else:
-        difference = estimate(difference_of_means(a, b), 1)
-        seen += (
-            f" against {in_words(second.what, b)} ({second}), a difference of {difference} ticks"
-        )
+        ticks = in_ticks(first.what)
+        difference = estimate(difference_of_means(a, b), 1 if ticks else 3) + " ticks" * ticks
+        seen += f" against {in_words(second.what, b)} ({second}), a difference of {difference}"
     printed = [as_printed(task, each) for each in (first, second)]
     return f"{seen}; published {printed[0]} and {printed[1]}" if None not in printed else seen
 

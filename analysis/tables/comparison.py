@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.comparisons.methods import method_rows
-from coartic.analysis.comparisons.reached import best_so_far, targets
+from coartic.analysis.comparisons.methods import BY_TRIAL, method_rows
+from coartic.analysis.comparisons.reached import best_so_far, halfway, targets
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import ALL_TASKS, gaps, initial_and_optimum, standings
 from coartic.analysis.generality.sample import one_by_one, sample
@@ -47,13 +47,13 @@ _POINTS = 120  # trials of a learning curve
 _STEPS = 150  # of a price curve, at most
 
 
-@table("task, method, runs, reward, learner, p_holm")
+@table("task, method, runs, reward, learner, p_holm, least_p")
 def against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
     Of methods that solved every run. A method that draws nothing has one reward, which is exact.
     The test takes samples as independent, though runs have the same seeds
-    (:func:`~coartic.analysis.comparisons.standings.apart_p` pairs them): where the learner has 100
+    (:func:`~coartic.analysis.comparisons.standings.apart` pairs them): where the learner has 100
     runs and the other method 20, pairs would leave out 80.
     """
     rows: list[tuple[str, Row]] = []
@@ -72,7 +72,8 @@ def against_learner(study: Study) -> Rows:
             "runs": len(cell.runs),
             "reward": cell.rewards.mean(),
             "learner": learner.rewards.mean(),
-            "p_holm": bootstrap_test(learner.rewards, rewards, "two-sided").p,
+            "p_holm": (test := bootstrap_test(learner.rewards, rewards, "two-sided")).p,
+            "least_p": test.least_p,
         }
         rows.append((f"{task} {label}", row | runs_of(cell, learner)))
     yield from corrected(rows)
@@ -99,7 +100,9 @@ def ranking(study: Study) -> Rows:
             if task in single
         }
         of_labels = tested.index.isin([f"{task} {label}" for task, label in labels.items()])
-        if of_labels.any():
+        of_method = tested[of_labels]
+        # With Holm's correction over its tasks: could any of its tests have told them apart?
+        if len(of_method) and len(of_method) * of_method.least_p.min() < LEVEL:
             sure = tested[of_labels & (tested.p_holm < LEVEL)]
             row |= {"better": sum(sure.reward > sure.learner)}
             row |= {"worse": sum(sure.reward < sure.learner)}
@@ -170,15 +173,18 @@ def labels_of(study: Study, method: str) -> dict[str, str]:
 
 @table(
     "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
-    "seconds_to_half[]",
+    "seconds_to_half[], half on *",
 )
 def price(study: Study) -> Rows:
-    """What it costs to reach a quarter and half of the targets."""
+    """What it costs to reach a quarter and half of the targets; ``half on``: median trials to the
+    target halfway, by task."""
     for name, row in price_by_method(study).iterrows():
         label = str(name)
         tasks = labels_of(study, label).items()
         cells = [study.cells[key] for key in tasks if row.task in (ALL_TASKS, key[0])]
-        yield label, {"method": label, **row} | runs_of(*cells)
+        medians = halfway(study, label) if row.knows == BY_TRIAL else {}
+        half = {f"half on {task}": trials for task, trials in medians.items()}
+        yield label, {"method": label, **row} | half | runs_of(*cells)
 
 
 @cached
