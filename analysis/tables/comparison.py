@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Sequence
 
@@ -121,8 +120,8 @@ def variants(study: Study) -> Rows:
     """Every method with each of its settings: gap over single tasks and over random ones, and cost.
 
     The learner is one row: EC1 where a task has one arm, EC4 where it has two. What a run costs
-    is the mean over tasks. ``best_trial`` is the gap of the best trials over single tasks, of
-    methods that say so where their solution is another (``best_trial_reward`` in their details).
+    is the mean over tasks. ``best_trial`` is the gap over single tasks of each run's best trial,
+    which need not be its solution; for a method that makes no trials, that of its solution.
     """
     labels_by_row: dict[str, dict[str, str]] = {}
     for task, label in study.cells:
@@ -158,10 +157,10 @@ def variants(study: Study) -> Rows:
 
 
 def best_trial_gaps(study: Study, task: str, label: str) -> Array:
-    """Gap of the best trial of each solved run ``(n,)``, NaN where its details do not say so."""
-    details = map(json.loads, study.cells[task, label].good.details)
-    rewards = [of_run.get("best_trial_reward", math.nan) for of_run in details]
-    return gap_share(np.array(rewards, dtype=np.float64), initial_and_optimum(study)[task][1])
+    """Gap of the best trial of each solved run, shape ``(n,)``."""
+    runs = [best_so_far(study)[str(run)] for run in study.cells[task, label].good.run_id]
+    best = [run.rewards[-1] for run in runs]
+    return gap_share(best, initial_and_optimum(study)[task][1])
 
 
 def labels_of(study: Study, method: str) -> dict[str, str]:
