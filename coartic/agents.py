@@ -1,12 +1,13 @@
 """Agents of Stable-Baselines3 as methods of the benchmark. Needs the extra ``coartic[rl]``.
 
 :class:`SessionEnvs` makes the trials of a session environments; an :class:`Agent` is a method that
-trains on them.
+trains on them and is judged by what it has learned: one trial of its policy without noise.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Annotated, Any
 
@@ -15,13 +16,14 @@ import torch
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pydantic import Field
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
 from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
 from coartic.motion.initial import too_many_sequences
 from coartic.motion.solution import Movement
-from coartic.motion.trials import movements_of
+from coartic.motion.trials import Trials, movements_of
 from coartic.optimisers import TOLD, Objective
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of
@@ -34,6 +36,7 @@ class AgentParameters(Parameters):
     """Parameters of every :class:`Agent`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
+    """All trials: those that try hands, those of the training, and the last one, of the policy."""
     envs: Annotated[int, Field(gt=0)] = 16
     """Environments side by side."""
     scale: Annotated[float, Field(gt=0, le=100)] = 0.5
@@ -61,12 +64,15 @@ class SessionEnvs(VecEnv):
     """
 
     def __init__(self, session: Session, parameters: AgentParameters) -> None:
-        first = Objective(session, trials=parameters.trials)
-        self.solution: tuple[Movement, ...] = first.solution
-        """The movements of the best trial."""
+        trials, left = parameters.trials, session.trials_left
+        if left is not None:
+            trials = min(trials, left)
+        first = Objective(session, trials=trials - 1)  # the last one is the policy's
         self._session, self._scale = session, parameters.scale
-        self._trials_left = parameters.trials - session.meter.trials
-        self._first_cost = self._best_cost = first.best_cost
+        self._trials_left = trials - 1 - session.meter.trials
+        self._first_cost = first.best_cost
+        self.best_reward = -first.best_cost
+        """Reward of the best trial, those in which hands were tried among them."""
         self._postures = first.postures
         self._hands = np.array([HANDS.index(hand) for hand in hands_of(first.hands)])
         self._chooses_hands = parameters.chooses_hands and len(session.hands) == 2
@@ -121,7 +127,7 @@ class SessionEnvs(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in rewards]
         ended: NDArray[np.bool_] = np.full(self.num_envs, self._goal == self._session.goals_count)
         if ended.all():
-            rewards = self._make_trials()
+            rewards = self._rewards_of_trials()
             # An agent that looks at the last observation finds that nothing follows.
             last = np.zeros(self.observation_space.shape, dtype=np.float32)
             infos = [
@@ -131,27 +137,40 @@ class SessionEnvs(VecEnv):
             self._begin()
         return self._observations(), rewards.astype(np.float32), ended, infos
 
-    def _make_trials(self) -> Array:
+    def _rewards_of_trials(self) -> Array:
         """Rewards of the trials, in per cent of what the first one took."""
+        count = min(self.num_envs, self._trials_left)
+        if count == 0:
+            raise BudgetError("all trials are made")
+        costs = -self._make_trials(count).rewards
+        self._trials_left -= count
+        self.best_reward = max(self.best_reward, -float(costs.min()))
+        if count < self.num_envs:
+            raise BudgetError("all trials are made")
+        gains = np.asarray(100.0 * (1.0 - costs / self._first_cost))
+        return np.maximum(gains, WORST)
+
+    def _make_trials(self, count: int) -> Trials:
+        """Make the trials of the first ``count`` robots."""
         for number, hand in enumerate(HANDS):
             if hand in self._session.hands:  # an arm keeps its posture when its last goal is hit
                 later = np.flip(np.flip(self._chosen == number, 1).cumsum(axis=1), 1) > 0
                 self._targets[..., self._session.joints(hand)][~later] = np.nan
-        count = min(self.num_envs, self._trials_left)
-        if count == 0:
-            raise BudgetError("all trials are made")
-        trials = self._session.trials(self._chosen[:count], self._targets[:count])
-        self._trials_left -= count
-        costs = -trials.rewards
-        best = int(costs.argmin())
-        if costs[best] < self._best_cost:
-            self._best_cost = float(costs[best])
-            letters = "".join(HANDS[code][0].upper() for code in self._chosen[best])
-            self.solution = movements_of(letters, trials.targets[best])
-        if len(costs) < self.num_envs:
-            raise BudgetError("all trials are made")
-        gains = np.asarray(100.0 * (1.0 - costs / self._first_cost))
-        return np.maximum(gains, WORST)
+        return self._session.trials(self._chosen[:count], self._targets[:count])
+
+    def trial_of(self, policy: Callable[[NDArray[np.float32]], Array]) -> tuple[Movement, ...]:
+        """Make the last trial, which no training may take: the movements that a policy makes.
+
+        ``policy`` gives actions ``(envs, A)`` for observations ``(envs, O)``.
+        """
+        observations = self.reset()
+        for _ in range(self._session.goals_count):
+            self.step_async(policy(observations))
+            observations = self._observations()
+        trials = self._make_trials(1)
+        self.best_reward = max(self.best_reward, float(trials.rewards[0]))
+        letters = "".join(HANDS[code][0].upper() for code in self._chosen[0])
+        return movements_of(letters, trials.targets[0])
 
     # What Stable-Baselines3 wants of its environments beside this.
 
@@ -178,7 +197,9 @@ class SessionEnvs(VecEnv):
 class Agent(Method):
     """A method of the benchmark that trains an agent of Stable-Baselines3.
 
-    A subclass has a name, a title, a citation and :meth:`train`. The solution is the best trial.
+    A subclass has a name, a title, a citation and :meth:`agent`. The solution is one trial of what
+    the agent has learned: of its policy without noise, made after the training and counted. The
+    details have ``best_trial_reward``, the reward of the best trial of all.
     """
 
     told = TOLD
@@ -189,16 +210,19 @@ class Agent(Method):
         return too_many_sequences(task, len(task.hands))
 
     def solve(self, session: Session) -> Result:
-        """Train until the trials are made."""
+        """Train until one trial is left, and make it with the policy without noise."""
         torch.set_num_threads(1)
         try:
             envs = SessionEnvs(session, self.parameters)
         except BudgetError:
             raise MethodError("infeasible", "the trial budget leaves no trial to make") from None
-        with session.solving(), suppress(BudgetError):
-            self.train(envs, int(session.rng.integers(2**31)))
-        return Result(envs.solution)
+        with session.solving():
+            agent = self.agent(envs, int(session.rng.integers(2**31)))
+            with suppress(BudgetError):
+                agent.learn(10**9)  # until the environments end it
+            solution = envs.trial_of(lambda seen: agent.predict(seen, deterministic=True)[0])
+        return Result(solution, {"best_trial_reward": int(envs.best_reward)})
 
     @abstractmethod
-    def train(self, envs: SessionEnvs, seed: int) -> None:
-        """Train; the environments keep the best trial, and end this when no trial is left."""
+    def agent(self, envs: SessionEnvs, seed: int) -> BaseAlgorithm:
+        """An agent that is not trained yet."""

@@ -38,7 +38,9 @@ class Arms:
     one for each joint that can move. The box from -1 to 1 is ``scale`` (length unit or rad) to
     either side of the present posture, or of the posture for the goal in ``around``, shape
     ``(G, dof)``; a hand sequence (``"RLRL"``) stands for those in which the corrective process
-    alone hits the goals with it. Actions beyond the box are taken as they are.
+    alone hits the goals with it. Actions beyond the box are taken as they are. Where all joints of
+    an action are NaN, no movement is made to a target: the corrective process acts alone, and the
+    step takes 0 ticks if the hand is inside the goal already.
 
     An observation has an entry for each goal, 1 for the next one, and two for the hand that hit
     the one before; with ``observe="posture"`` also the configuration ``(dof,)`` and the goals
@@ -103,7 +105,8 @@ class Arms:
     def step(self, actions: Array, which: Flags) -> tuple[Array, Flags]:
         """Make the next subtask of these robots: rewards ``(N,)``, and whose trials have ended.
 
-        Raises ValueError for actions that are not finite or have another shape.
+        Raises ValueError for actions of another shape, and for entries that are not finite, unless
+        those of all joints are NaN.
         """
         from coartic.motion.penalty import penalties_of_movements
         from coartic.motion.reach import reach_unchecked
@@ -118,10 +121,17 @@ class Arms:
         hands = np.full(len(rows), HANDS.index(self.task.hands[0]))
         if self.two_hands:
             hands = (chosen[:, 0] > 0).astype(np.int64)
+        joints = chosen[:, int(self.two_hands) :]
         targets = self.centre(rows).copy()
-        targets[:, self.free] += self.scale * chosen[:, int(self.two_hands) :]
-        if not (np.abs(targets) <= LARGEST).all():
-            raise ValueError("an action is not finite, or far beyond the box")
+        targets[:, self.free] += self.scale * joints
+        without = np.isnan(joints).all(axis=1)
+        no_hand = self.two_hands and np.isnan(chosen[:, 0]).any()
+        if no_hand or not (np.abs(targets[~without]) <= LARGEST).all():
+            raise ValueError(
+                "an action is not finite, or far beyond the box; NaN is for all joints, not for "
+                "some, and not for the hand"
+            )
+        targets[without] = np.nan  # of joints that cannot move, too
         reached = reach_unchecked(
             self.task.robot,
             self.q[rows],
@@ -206,9 +216,15 @@ class TaskEnv(gymnasium.Env):
             self.render()
         return self.arms.observations()[0], float(rewards[0]), bool(ended[0]), False, self._info()
 
-    def action_for(self, hand: Hand, target: Array) -> Array:
-        """The action that moves this hand to a target ``(dof,)``, to replay a solution."""
-        away = (target - self.arms.centre(np.array([0]))[0])[self.arms.free] / self.arms.scale
+    def action_for(self, hand: Hand, target: Array | None) -> Array:
+        """The action that moves this hand to a target ``(dof,)``, to replay a solution.
+
+        Without a target, which is None or NaN, the corrective process acts alone: the entries of
+        the joints are NaN. A movement of kind ``"corrective"`` is replayed so.
+        """
+        centre = self.arms.centre(np.array([0]))[0]
+        given = np.full_like(centre, np.nan) if target is None else target
+        away = (given - centre)[self.arms.free] / self.arms.scale
         return np.array([-1.0 if hand == "left" else 1.0, *away][not self.arms.two_hands :])
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -33,6 +33,7 @@ from coartic.motion.trials import movements_of
 from coartic.robot import HANDS, Array
 from coartic.tasks.catalogue import load_task
 from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.text import counted
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 """What a method that minimises an :class:`Objective` is told."""
@@ -72,8 +73,15 @@ class Objective:
     A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
     by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
     ``FAILED`` where the trial fails. Goals that a movement misses are corrected, and paid for.
+
+    Where all entries of a goal are NaN, no movement is made to a target: the corrective process
+    acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
+    target is always made and takes a tick at least.
+
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence, of which the best is kept. Raises MethodError where it completes none.
+    hand sequence, of which the best is kept. No point has other hands than these, so that the
+    lowest cost is that of the best solution with these hands, which other hands may better.
+    Raises MethodError where the corrective process completes no sequence.
     """
 
     def __init__(
@@ -97,21 +105,36 @@ class Objective:
         """The hand sequence."""
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
-        self.postures: Array = alone.reached[best]
+        self.postures: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
-        self.x0: Array = self.postures[self.joints]
-        """A point to begin with: where the corrective process hits the goals, shape ``(dim,)``."""
-        self.dim = len(self.x0)
+        self.dim = int(self.joints.sum())
         """Number of parameters."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
         self.evaluations = 0
         """Points evaluated; the first trials are not among them."""
-        self.best_x = self.x0
-        """The best point so far."""
         self.best_cost = float(-alone.rewards[best])
-        """Its cost; that of the corrective process alone where no point was better."""
-        self._best_targets = alone.targets[best]
+        """Cost of the best trial so far; at the start that of the corrective process alone."""
+        self._best_x = np.full(self.dim, np.nan)
+        self._best_targets = alone.targets[best].copy()
+
+    def __repr__(self) -> str:
+        return (
+            f"Objective({self._session.task_name}, hands {self.hands}, {self.dim} parameters, "
+            f"{counted(self.evaluations, 'evaluation')}, best cost {self.best_cost:g})"
+        )
+
+    @property
+    def x0(self) -> Array:
+        """A point to begin with, shape ``(dim,)``: the postures in which the corrective process
+        alone hits the goals. Moving straight to them can cost more or less than it does."""
+        return self.postures[self.joints]
+
+    @property
+    def best_x(self) -> Array:
+        """The point of the best trial so far, shape ``(dim,)``, whose cost is ``best_cost``; all
+        NaN, the corrective process alone, until a point is better."""
+        return self._best_x.copy()
 
     @property
     def solution(self) -> tuple[Movement, ...]:
@@ -127,27 +150,43 @@ class Objective:
     def many(self, points: ArrayLike) -> Array:
         """Costs ``(N,)`` of points ``(N, dim)``, which are evaluated side by side.
 
-        Raises BudgetError where trials are not left for all of them, after those that are left
-        are made. Raises ValueError for a wrong shape and for figures that are not finite.
+        Entries are finite, or NaN for all joints of a goal (the corrective process alone). Raises
+        BudgetError where trials are not left for all of them, after those that are left are made.
+        Raises ValueError for another shape, for infinite entries and for goals that are NaN in
+        part.
         """
         array = np.asarray(points, dtype=np.float64)
-        if array.ndim != 2 or array.shape[1] != self.dim or not np.isfinite(array).all():
-            raise ValueError(
-                f"points of shape {array.shape}: needed is (N, {self.dim}), all of it finite"
-            )
+        if array.ndim != 2 or array.shape[1] != self.dim:
+            raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
+        targets = self._targets(array)
         left = self._trials_left(len(array))
-        targets = np.full((left, *self.joints.shape), np.nan)
-        targets[:, self.joints] = array[:left]
+        targets = targets[:left]
         trials = self._session.trials(self.hands, targets)
         costs = np.minimum(-trials.rewards, FAILED)
         self.evaluations += len(costs)
         if len(costs) and costs.min() < self.best_cost:
             best = int(costs.argmin())
-            self.best_cost, self.best_x = float(costs[best]), array[best].copy()
-            self._best_targets = trials.targets[best]
+            self.best_cost, self._best_x = float(costs[best]), array[best].copy()
+            self._best_targets = trials.targets[best].copy()
         if len(costs) < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
+
+    def _targets(self, points: Array) -> Array:
+        """Targets ``(N, G, dof)`` of points; NaN for joints that have none."""
+        targets = np.full((len(points), *self.joints.shape), np.nan)
+        targets[:, self.joints] = points
+        missing = (np.isnan(targets) & self.joints).sum(axis=2)
+        in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
+        if in_part.any():
+            point, goal = np.argwhere(in_part)[0]
+            raise ValueError(
+                f"point {point}: of goal {goal + 1} some entries are NaN; needed are all of them "
+                "(the corrective process alone) or none"
+            )
+        if np.isinf(targets).any():
+            raise ValueError("points have infinite entries; needed are finite ones")
+        return targets
 
     def _trials_left(self, wanted: int) -> int:
         """How many of so many trials are left."""
@@ -168,9 +207,13 @@ def objective(
 
     ``task`` is a task, the name of one or a file; ``hands`` a hand sequence (``"RRLR"``), by
     default the one with which the corrective process alone does best; ``half_width`` that of the
-    bounds around ``x0``, length unit (base) and rad (joints). Raises TaskError for a task that
-    cannot be used, ValueError for hands that do not fit, MethodError where the corrective process
-    completes no sequence, or where there are too many to try.
+    bounds around ``x0``, length unit (base) and rad (joints). The default hands need not be those
+    of the optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 %
+    of it.
+
+    Raises TaskError for a task that cannot be used, ValueError for hands that do not fit,
+    MethodError where the corrective process completes no sequence, or where there are too many to
+    try.
     """
     chosen = task if isinstance(task, Task) else load_task(task)
     if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):

@@ -1,15 +1,27 @@
 """Sessions' trials in one call, and the objective function, against trials made one by one."""
 
 import re
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import coartic
-from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic import (
+    MotionModel,
+    Movement,
+    builtin_tasks,
+    corrective_trial,
+    execute,
+    hand_sequences,
+    load_task,
+)
+from coartic.analysis.optima import entries
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
+from coartic.learner.rows import movements_from
 from coartic.method import BudgetError, Information, Meter, MethodError, Session, UndeclaredError
 from coartic.motion.trials import hand_codes, movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
@@ -133,6 +145,9 @@ def test_the_best_point_is_kept_with_its_solution():
     task = load_task("ascending")
     cost = coartic.objective("ascending")
     assert execute(task, cost.solution).reward == -319  # the corrective process alone
+    assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
+    state = "hands RRR, 18 parameters, 2 evaluations, best cost 319"
+    assert repr(cost) == f"Objective(ascending, {state})"
     rng, costs, points = np.random.default_rng(0), [], []
     for _ in range(30):
         points.append(cost.x0 + 0.05 * rng.standard_normal((50, cost.dim)))
@@ -140,6 +155,116 @@ def test_the_best_point_is_kept_with_its_solution():
     assert cost.best_cost == np.min(costs) < 319
     np.testing.assert_array_equal(cost.best_x, np.vstack(points)[np.argmin(costs)])
     assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x)
+
+
+@pytest.mark.parametrize("name", ["x0", "best_x"])
+def test_points_of_the_objective_can_be_changed_without_harm(name):
+    cost = coartic.objective("two-armed-1")
+    cost.many(cost.x0 + 0.02 * np.random.default_rng(0).standard_normal((300, cost.dim)))
+    kept = cost.x0, cost.best_x, cost.bounds.copy(), cost.postures.copy(), cost.solution
+    x = getattr(cost, name)
+    x += 1.0
+    now = cost.x0, cost.best_x, cost.bounds, cost.postures
+    for before, after in zip(kept, now, strict=False):
+        np.testing.assert_array_equal(before, after)
+    assert cost.best_cost == cost(cost.best_x) < 532  # the corrective process alone
+    assert execute(load_task("two-armed-1"), cost.solution).reward == -cost.best_cost
+
+
+def test_the_objective_keeps_no_batch():
+    cost = coartic.objective("ascending")
+    points = cost.x0 + 0.01 * np.random.default_rng(0).standard_normal((20_000, cost.dim))
+    cost.many(np.tile(cost.x0, (1000, 1)))  # after which nothing is compiled
+    before = cost.best_cost
+    tracemalloc.start()
+    cost.many(points)
+    held, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert cost.best_cost < before
+    assert peak > points.nbytes
+    assert held < points.nbytes / 2  # a reward of each trial
+
+
+def test_a_goal_without_a_target_is_left_to_the_corrective_process():
+    task = load_task("two-armed-2")
+    cost = coartic.objective(task, "RLRR")
+    goals = np.argwhere(cost.joints)[:, 0]  # of each entry of a point
+    rng = np.random.default_rng(0)
+    points = cost.x0 + 0.03 * rng.standard_normal((40, cost.dim))
+    none = rng.random((40, 4)) < 0.5
+    points[none[:, goals]] = np.nan
+    for point, without, value in zip(points, none, cost.many(points), strict=True):
+        targets = np.full(cost.joints.shape, np.nan)
+        targets[cost.joints] = point
+        q, movements = task.q0, []
+        for goal, target in enumerate(targets):
+            whole = None if without[goal] else np.where(np.isnan(target), q, target)
+            kind = "corrective" if without[goal] else "learned"
+            hand = "left" if "RLRR"[goal] == "L" else "right"
+            movements.append(Movement(goal + 1, hand, kind, whole))
+            q = execute(task, movements + rest("RLRR", goal + 1)).configurations[goal]
+        assert value == -execute(task, movements).reward
+    points[3, 0] = 0.0 if none[3, 0] else np.nan
+    with pytest.raises(ValueError, match="point 3: of goal 1 some entries are NaN"):
+        cost.many(points)
+    with pytest.raises(ValueError, match="infinite"):
+        cost(np.where(goals == 1, np.inf, cost.x0))
+
+
+def rest(hands, first):
+    """The corrective process alone at the goals from ``first`` on, counted from 0."""
+    return [*movements_of(hands, np.full((len(hands), 1), np.nan))[first:]]
+
+
+ENTRIES = {f"{e.task} {e.base} {e.other_arm}": e for e in entries()}
+WITHOUT_SOLUTION = {  # no search has one: the task as it is locked has none, or none is known
+    "ascending xy free", "ascending xy still", "descending xy free", "descending xy still",
+    "descending y free", "descending y still", "two-armed-1 xy free", "two-armed-1 xy still",
+    "two-armed-2 xy free", "two-armed-2 xy still",
+}  # fmt: skip
+
+
+def test_every_optimum_is_replayed_or_there_is_none():
+    assert {name for name, entry in ENTRIES.items() if not entry.solution} == WITHOUT_SOLUTION
+    assert ENTRIES.keys() - WITHOUT_SOLUTION >= {f"{task} task free" for task in builtin_tasks()}
+
+
+@pytest.mark.parametrize("name", sorted(ENTRIES.keys() - WITHOUT_SOLUTION))
+def test_an_optimum_gets_its_reward_through_every_door(name):
+    """Solutions hold one movement for each goal, and none follows a path."""
+    entry, task = ENTRIES[name], load_task(name.split()[0])
+    if entry.base != "task":
+        task = task.model_copy(update={"locked_base": tuple(entry.base)})
+    solution = movements_from(task, pd.DataFrame(entry.solution))
+    assert execute(task, solution).reward == entry.reward
+    assert [movement.goal for movement in solution] == [*range(1, len(task.goals) + 1)]
+    targets = np.array([np.full(task.robot.dof, np.nan) if m.kind == "corrective" else m.target
+                        for m in solution])  # fmt: skip
+    session = Session(task, 0, TOLD)
+    assert session.trials(entry.hands, targets[None]).rewards == [entry.reward]
+    cost = coartic.objective(task, entry.hands)
+    assert cost(targets[cost.joints]) == -entry.reward
+    assert execute(task, cost.solution).reward == entry.reward
+    gymnasium, door = pytest.importorskip("gymnasium"), pytest.importorskip("coartic.gym")
+    options = {"task": task, "around": entry.hands}
+    env = gymnasium.make("coartic/Task-v0", **options)
+    env.reset()
+    actions, rewards = [], []
+    for movement, target in zip(solution, targets, strict=True):
+        actions.append(env.unwrapped.action_for(movement.hand, target))
+        rewards.append(env.step(actions[-1])[1])
+    assert sum(rewards) == entry.reward
+    assert env.unwrapped.arms.is_success.all()
+    several = door.TaskVectorEnv(3, **options)
+    several.reset()
+    totals = sum(several.step(np.tile(action, (3, 1)))[1] for action in actions)
+    assert totals.tolist() == [entry.reward] * 3
+
+
+def test_the_optima_that_need_a_goal_of_no_ticks_hold_one():
+    """So that the tests above see that a door can express it."""
+    none = {n for n, e in ENTRIES.items() if any(m["ticks"] == 0 for m in e.solution)}
+    assert none >= {"two-armed-1 task free", "two-armed-2 task free"}
 
 
 def test_the_default_hands_are_those_that_do_best_alone():
@@ -158,7 +283,7 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
     assert costs[costs < FAILED].max() < 5000
     with pytest.raises(MethodError, match="completes no hand sequence"):
         coartic.objective("ascending", model=MotionModel(max_iterations=2))
-    for wrong in (cost.x0[None, 1:], [[np.nan] * cost.dim], cost.x0):
+    for wrong in (cost.x0[None, 1:], cost.x0):
         with pytest.raises(ValueError, match="needed is"):
             cost.many(wrong)
 
@@ -195,7 +320,11 @@ def test_the_examples_are_methods(path, in_this_process):
     session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
     solution = entry.with_parameters({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
-    assert execute(load_task("ascending"), solution).reward == max(session.rewards)
+    reward = execute(load_task("ascending"), solution).reward
+    if "coartic.agents" in text:  # what was learned, in the last trial
+        assert reward == session.rewards[-1]
+    else:
+        assert reward == max(session.rewards)
 
 
 def test_the_first_program_of_the_page(capsys):
@@ -203,3 +332,72 @@ def test_the_first_program_of_the_page(capsys):
     shown = capsys.readouterr().out
     cost, reward = re.search(r"([0-9.]+) ticks", shown)[1], re.search(r"\n(-\d+)\n", shown)[1]
     assert float(cost) == -int(reward)
+
+
+class Practised:
+    """Stands for an agent: wild while it learns, still when its policy is asked for."""
+
+    def __init__(self, envs, action, seed):
+        self.envs, self.action, self.rng = envs, action, np.random.default_rng(seed)
+        self.gains = []
+
+    def learn(self, steps):
+        self.envs.reset()
+        for _ in range(steps):
+            size = (self.envs.num_envs, *self.envs.action_space.shape)
+            gains, ended = self.envs.step(self.rng.uniform(-1, 1, size))[1:3]
+            self.gains += gains[ended].tolist()
+
+    def predict(self, observations, deterministic=False):
+        assert deterministic
+        size = len(observations), *self.envs.action_space.shape
+        return np.broadcast_to(self.action, size), None
+
+
+def agent_of(action, **parameters):
+    agents = pytest.importorskip("coartic.agents")
+
+    class Told(agents.Agent):
+        name, title, citation = "told", "Told what to do", "None."
+
+        def agent(self, envs, seed):
+            return Practised(envs, action, seed)
+
+    return Told(agents.AgentParameters(**parameters))
+
+
+@pytest.mark.parametrize(("budget", "trials"), [(100, 10_000), (None, 100)])
+def test_an_agent_is_judged_by_its_policy_without_noise(budget, trials):
+    task = load_task("two-armed-1")
+    pytest.importorskip("stable_baselines3")
+    session = Session(task, 0, TOLD, trial_budget=budget)
+    method = agent_of(0.02, trials=trials, scale=0.25, envs=8)
+    result = method.solve(session)
+    assert session.meter.trials == len(session.rewards) == 100
+    cost = coartic.objective(task, "LRLR")
+    learned = -cost(cost.x0 + 0.25 * np.float64(0.02))
+    assert execute(task, result.solution).reward == session.rewards[-1] == learned
+    assert result.details == {"best_trial_reward": max(session.rewards)}
+    assert max(session.rewards) == -532 > learned  # no guess was better than what was tried first
+
+
+def test_an_agent_whose_policy_fails_has_no_solution():
+    pytest.importorskip("stable_baselines3")
+    task, model = load_task("ascending"), MotionModel(max_iterations=100)
+    session = Session(task, 0, TOLD, model=model, trial_budget=50)
+    result = agent_of(-0.5, scale=2.0).solve(session)
+    assert session.rewards[-1] is None
+    assert not execute(task, result.solution, model=model).completed
+    assert result.details["best_trial_reward"] == max(r for r in session.rewards if r is not None)
+
+
+def test_an_agent_needs_a_trial_for_its_policy():
+    pytest.importorskip("stable_baselines3")
+    for budget in (1, 2, 17, 18):
+        session = Session(load_task("two-armed-1"), 0, TOLD, trial_budget=budget)
+        if budget == 1:
+            with pytest.raises(MethodError, match="no trial to make"):
+                agent_of(0.0).solve(session)
+        else:
+            assert len(agent_of(0.0).solve(session).solution) == 4
+        assert session.meter.trials == (budget if budget > 1 else 0)

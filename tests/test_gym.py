@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import CONDITIONS, MotionModel, execute, learn, load_task
+from coartic import CONDITIONS, MotionModel, Movement, execute, learn, load_task
 from coartic.baselines.cma_es import Bandit
 from coartic.method import Session
 from coartic.optimisers import FAILED
@@ -85,15 +85,58 @@ def test_what_the_learner_sees_and_what_can_be_seen():
     assert gymnasium.make("coartic/Ascending-v0").action_space.shape == (2 + 4,)
 
 
+@pytest.mark.parametrize("options", [{}, {"around": "LRLR"}])
+def test_joints_that_are_nan_leave_a_goal_to_the_corrective_process(options):
+    """Some robots of a vector move to targets, and some do not."""
+    task, rng = load_task("two-armed-1"), np.random.default_rng(0)
+    envs = gymnasium.make_vec(TWO, num_envs=20, **options)
+    single = gymnasium.make(TWO, **options)
+    actions = rng.uniform(-1, 1, (4, 20, 10))
+    without = rng.random((4, 20)) < 0.5
+    actions[..., 1:][without] = np.nan
+    envs.reset()
+    rewards = sum(envs.step(action)[1] for action in actions)
+    for robot in range(20):
+        hands = ["left" if hand <= 0 else "right" for hand in actions[:, robot, 0]]
+        single.reset()
+        movements = []
+        for goal, hand in enumerate(hands):
+            arms = single.unwrapped.arms
+            target = arms.centre(np.array([0]))[0].copy()
+            target[arms.free] += actions[goal, robot, 1:]
+            kind = "corrective" if without[goal, robot] else "learned"
+            movements.append(
+                Movement(goal + 1, hand, kind, None if kind == "corrective" else target)
+            )
+            single.step(actions[goal, robot])
+        assert execute(task, movements).reward == rewards[robot]
+
+
+def test_the_action_of_no_target():
+    env = gymnasium.make(TWO).unwrapped
+    env.reset()
+    for target in (None, np.full(10, np.nan)):
+        for hand, number in (("left", -1), ("right", 1)):
+            np.testing.assert_array_equal(env.action_for(hand, target), [number] + [np.nan] * 9)
+    for action in ([np.nan] * 10, [1.0, 0.0] + [np.nan] * 8, [np.nan] + [0.0] * 9):
+        with pytest.raises(ValueError, match="NaN is for all joints"):
+            env.step(np.array(action))
+    one_hand = gymnasium.make("coartic/Ascending-v0")
+    one_hand.reset()
+    action = one_hand.unwrapped.action_for("right", None)
+    assert np.isnan(action).all()
+    assert sum(one_hand.step(action)[1] for _ in range(3)) == -319  # the corrective process alone
+
+
 def test_trials_that_fail_and_actions_that_are_none():
     env = gymnasium.make("coartic/Ascending-v0", model=MotionModel(max_iterations=2))
     env.reset()
     _, reward, ended, _, info = env.step(np.zeros(6))
     assert (reward, ended, info["is_success"]) == (-FAILED, True, False)
-    for action in (np.nan, 1e9):
+    for first in (np.nan, np.inf, 1e9):
         env.reset()
         with pytest.raises(ValueError, match="not finite, or far beyond"):
-            env.step(np.full(6, action))
+            env.step(np.array([first, 0, 0, 0, 0, 0]))
     with pytest.raises(ValueError, match=r"shape \(1, 3\); it must be \(1, 6\)"):
         env.unwrapped.step(np.zeros(3))
     with pytest.raises(ValueError, match="'XYX'; it must have L or R"):

@@ -20,4 +20,5 @@ class DifferentialEvolution(Optimiser):
             updating="deferred",
             polish=False,
             maxiter=10**6,
+            tol=0,  # or it stops where a narrow box has like costs
         )

@@ -1,19 +1,25 @@
 """REINFORCE: a Gaussian policy over target configurations, improved along the likelihood ratio."""
 
 from coartic import Optimiser
+from coartic.optimisers import OptimiserParameters
 
-SPREAD, STEP, BATCH = 0.05, 1.0, 50  # length unit and rad; of the gradient; trials
+
+class Setting(OptimiserParameters):
+    spread: float = 0.05  # SD of the policy, length unit and rad
+    step: float = 1.0  # along the gradient
+    batch: int = 50  # trials
 
 
 class Reinforce(Optimiser):
     name = "reinforce"
     title = "REINFORCE with a Gaussian policy"
     citation = "R. J. Williams (1992). Machine Learning 8."
+    Parameters = Setting
 
     def optimise(self, objective, rng):
-        mean = objective.x0.copy()
+        p, mean = self.parameters, objective.x0
         while True:  # until the objective ends it
-            noise = rng.standard_normal((BATCH, objective.dim))
-            costs = objective.many(mean + SPREAD * noise)
+            noise = rng.standard_normal((p.batch, objective.dim))
+            costs = objective.many(mean + p.spread * noise)
             advantages = (costs.mean() - costs) / (costs.std() + 1e-9)
-            mean += STEP * SPREAD * advantages @ noise / BATCH
+            mean = mean + p.step * p.spread * advantages @ noise / p.batch
