@@ -60,6 +60,7 @@ class Finding(BaseModel):
     silent: dict[str, str] = {}
     built_in: dict[str, str] = {}
     not_asked: str = ""
+    power: str = ""
     note: str = ""
 
 
