@@ -1,5 +1,9 @@
 """How intervals and tests do where the truth is known: ``python -m coartic.analysis.calibrate``.
 
+With a folder of many runs of the placebo on ascending and descending, how often it passes as a sign
+of coarticulation: ``coartic run comparison --tasks ascending,descending --methods placebo/guesses
+--runs 400 --out results/placebo``, then ``python -m coartic.analysis.calibrate results/placebo``.
+
 Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
 hold the truth in 95 % of them; tests at 5 % should reject a true hypothesis in 5 % at most. The
 table is in docs/statistics.md.
@@ -7,12 +11,15 @@ table is in docs/statistics.md.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.signatures.context import permutation_p
+from coartic.analysis.claims.register import MARGINS
+from coartic.analysis.methods import PLACEBO
+from coartic.analysis.signatures.context import beyond_p, context_dependence, permutation_p
 from coartic.analysis.statistics import estimates
 from coartic.analysis.statistics.equivalence import difference
 from coartic.analysis.statistics.estimates import LEVEL, Inference, Interval
@@ -23,6 +30,8 @@ from coartic.analysis.statistics.hypotheses import (
     sign_flip_test,
 )
 from coartic.analysis.statistics.instances import other_tasks
+from coartic.analysis.study import Study, load
+from coartic.analysis.trajectories import postures
 from coartic.robot import Array
 
 SIMULATIONS, RESAMPLES = 500, 999
@@ -107,8 +116,52 @@ def rates() -> Iterator[tuple[str, str, int, float]]:
             yield from ((str(what), name, n, rate) for what, rate in seen.mean().items())
 
 
+STUDIES, PLACEBO_RUNS = 200, 20
+"""Simulated studies, and runs of the method and of the placebo in each."""
+
+
+def placebo_rates(study: Study) -> Iterator[tuple[str, float]]:
+    """In what share of simulated studies the placebo passes as a sign, by rule.
+
+    A study takes runs of the placebo without replacement, half of them as a method's. By the rules
+    of the claims *context* and *first-movement-sacrificed*, each with and without a placebo.
+    """
+    tasks = ("ascending", "descending")
+    cells = [study.trajectories(task, PLACEBO) for task in tasks]
+    shown = [postures(cell.runs, 1) for cell in cells]
+    slower = [cell.against_same_hands[:, 0].astype(np.float64) for cell in cells]
+    rng, passed = np.random.default_rng(0), []
+    for _ in range(STUDIES):
+        picks = [rng.permutation(len(runs))[: 2 * PLACEBO_RUNS] for runs in shown]
+        pairs = list(zip(shown, picks, strict=True))
+        method = pairs[0][0][pairs[0][1][:PLACEBO_RUNS]], pairs[1][0][pairs[1][1][:PLACEBO_RUNS]]
+        rest = pairs[0][0][pairs[0][1][PLACEBO_RUNS:]], pairs[1][0][pairs[1][1][PLACEBO_RUNS:]]
+        apart = context_dependence(*method) > MARGINS["spread"]
+        apart &= bool(permutation_p(*method, rng, resamples=RESAMPLES) < LEVEL)
+        beyond = beyond_p(method, rest, rng, resamples=RESAMPLES) < LEVEL
+        ticks = [
+            (t[p[:PLACEBO_RUNS]], t[p[PLACEBO_RUNS:]]) for t, p in zip(slower, picks, strict=True)
+        ]
+        first = [
+            bootstrap_test(a, MARGINS["ticks"], resamples=RESAMPLES).p < LEVEL for a, _ in ticks
+        ]
+        more = [bootstrap_test(a, b, resamples=RESAMPLES).p < LEVEL for a, b in ticks]
+        passed.append({
+            "context, without a placebo": apart,
+            "context": apart and beyond,
+            "first movement, without a placebo": all(first),
+            "first movement": all(first) and all(more),
+        })  # fmt: skip
+    for rule, share in pd.DataFrame(passed).mean().items():
+        yield str(rule), float(share)
+
+
 def main() -> None:
     """Print the rates in per cent, a row for each procedure and population."""
+    if len(sys.argv) > 1:
+        rates_by_rule = pd.DataFrame(placebo_rates(load(sys.argv[1])), columns=["rule", "passes"])
+        print(rates_by_rule.to_csv(index=False, float_format="%.3f"))
+        return
     frame = pd.DataFrame(rates(), columns=["procedure", "rewards", "n", "rate"])
     frame["rate"] = (100 * frame.rate).map("{:.1f}".format)
     table = frame.set_index(["procedure", "rewards", "n"]).rate.unstack()  # noqa: PD010

@@ -26,6 +26,10 @@ CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.CO
 two, more exploration later."""
 TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""
+PLACEBO = "placebo/guesses"
+"""The best of random guesses around the corrective process, which cannot coarticulate."""
+SUBTASK = {EC1: f"{EC1}-subtask", EC4: f"{EC4}-subtask"}
+"""The learner rewarded by subtask, the other placebo, by the condition that it is beside."""
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
 
@@ -79,8 +83,12 @@ def is_learner(label: str) -> bool:
 
 
 def is_variant(label: str) -> bool:
-    """Whether it was run with parameters of its own, or is an ablation of the learner."""
-    return bool(_VARIANT.search(label))
+    """Whether it is a built-in method with other parameters, or an ablation of the learner.
+
+    A method of somebody else stands by itself with whatever parameters it was run.
+    """
+    built_in = label.partition(" ")[0] in KNOWN_METHODS or label.startswith(TOGETHER)
+    return built_in and bool(_VARIANT.search(label))
 
 
 def is_search(label: str) -> bool:

@@ -24,7 +24,7 @@ from coartic.learner.rows import movements_from
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.store import FILE, open_store
+from coartic.runs.store import FILE, PARTS, open_store
 from coartic.text import counted
 
 CellKey = tuple[str, str]
@@ -63,7 +63,7 @@ def typical_run(cell: CellRuns) -> int:
 
 
 Computed = TypeVar("Computed")
-MOST_EXECUTED = 300
+MOST_EXECUTED = 500
 """Runs of a cell whose solutions are executed again for the signatures."""
 
 
@@ -176,26 +176,47 @@ class Study:
     def trajectories(self, task: str, label: str) -> Trajectories:
         """Solutions of a cell, executed again tick by tick, each cell once.
 
-        The first 300 runs that solved the task: signatures say no more with thousands, which
+        The first 500 runs that solved the task: signatures say no more with thousands, which
         would fill the memory.
         """
         key = task, label
         if key not in self._trajectories:
-            (movements, waypoints), cell = self.movements, self.cells[key]
-            run_on = self.tasks[task]
-            solutions = (
-                movements_from(run_on, movements[run_id], waypoints.get(run_id))
-                for run_id in _executed_of(cell)
-            )
-            runs = tuple(trajectory(run_on, solution, self.model) for solution in solutions)
-            self._trajectories[key] = Trajectories(
-                run_on, cell.method, cell.variant, runs, self.model
-            )
+            self._trajectories[key] = self._executed(key, *self.movements)
         return self._trajectories[key]
+
+    def replays(self, task: str, label: str) -> Trajectories:
+        """The same for the noiseless trials after learning, of the runs that have one.
+
+        For a learner whose solution is its best trial, they say what is learned without selection.
+        """
+        key = task, label
+        if key not in self._replays:
+            self._replays[key] = self._executed(key, self._replayed, {})
+        return self._replays[key]
+
+    def _executed(
+        self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
+    ) -> Trajectories:
+        cell, task = self.cells[key], self.tasks[key[0]]
+        solutions = (
+            movements_from(task, movements[run_id], waypoints.get(run_id))
+            for run_id in _executed_of(cell)
+            if run_id in movements
+        )
+        runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
+        return Trajectories(task, cell.method, cell.variant, runs, self.model)
 
     @cached_property
     def _trajectories(self) -> dict[CellKey, Trajectories]:
         return {}
+
+    @cached_property
+    def _replays(self) -> dict[CellKey, Trajectories]:
+        return {}
+
+    @cached_property
+    def _replayed(self) -> dict[str, pd.DataFrame]:
+        return _by_run(self._frame("replay"))
 
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:
@@ -223,7 +244,7 @@ def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]
 def _frame(folder: Path, view: str, _: int) -> pd.DataFrame:
     """A view of a folder as it was at a time: studies of parts of a folder share it."""
     with open_store(folder) as store:
-        return store.frame(view)
+        return store.movements(view) if view in PARTS else store.frame(view)
 
 
 def _executed_of(cell: CellRuns) -> list[str]:

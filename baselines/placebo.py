@@ -1,13 +1,13 @@
 """The placebo: the best of many random guesses around the corrective process.
 
-It cannot coarticulate by learning: no guess depends on any reward. What its best trial shows is what
-selecting one of many noisy trials by the reward of the whole task shows by itself. A sign of
+It cannot coarticulate by learning: no guess depends on any reward. What its best trial shows is
+what selecting one of many noisy trials by the reward of the whole task shows by itself. A sign of
 coarticulation of a method that selects its solution from trials counts where it exceeds this one.
 
-The half width was tuned for reward at 10 000 trials on 24 development instances (twelve for one arm,
-four of each of two-armed, aligned and redundancy), two runs each. Mean gain over the corrective
-process with the best hands, per cent: 0.06 2.53, 0.08 2.67, 0.10 2.80, 0.12 2.83, 0.15 2.80,
-0.20 2.75, 0.25 2.68.
+The half width was tuned for reward at 10 000 trials on 24 development instances (twelve for one
+arm, four of each of two-armed, aligned and redundancy), two runs each. Mean gain over the
+corrective process with the best hands, per cent: 0.06 2.53, 0.08 2.67, 0.10 2.80, 0.12 2.83,
+0.15 2.80, 0.20 2.75, 0.25 2.68.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ class Guesses(Optimiser):
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Guess until no trial is left."""
+        low, high = objective.bounds.T
         while True:
-            objective.many(rng.uniform(*objective.bounds.T, size=(_TOGETHER, objective.dim)))
+            objective.many(rng.uniform(low, high, (_TOGETHER, objective.dim)))
 
 
 METHODS: tuple[type[Method], ...] = (Guesses,)

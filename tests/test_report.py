@@ -172,7 +172,7 @@ def test_few_runs_say_so(tmp_path):
     one = select_cells(load_suite("paper"), KNOWN, tasks=["ascending", "descending"])
     few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
     texts = {answer["word"]: answer["text"] for answer in answers(few)}
-    assert texts["Coarticulation"].startswith("Too few runs to say")
+    assert texts["Coarticulation"].startswith("Too few runs to tell")
     assert texts["Paper"].startswith("These runs do not decide")
     alone = select_cells(
         load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]

@@ -10,11 +10,13 @@ from scipy import stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.signatures.context import (
+    beyond_p,
     context_dependence,
     context_pairs,
     distance,
     lead_time,
     permutation_p,
+    smallest_p,
 )
 from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
@@ -73,6 +75,51 @@ def test_permutation_p_finds_a_planted_context_and_no_other():
     inside, outside = np.eye(6)[:, [2]], np.eye(6)[:, [0, 1, 3, 4, 5]]
     assert permutation_p(first, second + shift, rng(), basis=inside) < 0.001
     assert permutation_p(first, second + shift, rng(), basis=outside) > 0.05
+
+
+def test_the_smallest_p_is_that_of_the_clearest_case():
+    """Runs of each context in one place, far from the other: as many divisions as there are."""
+    for n, m in ((2, 2), (3, 3), (3, 5), (4, 4)):
+        first = rng(n).standard_normal((n, 3))
+        second = rng(m).standard_normal((m, 3)) + 1000.0
+        p = float(permutation_p(first, second, rng()))
+        # Of groups of one size the exchange of both is as far apart.
+        assert p == pytest.approx(smallest_p(n, m) * (2 if n == m else 1))
+    assert smallest_p(2, 2) > 0.05 > smallest_p(4, 4)
+    assert smallest_p(50, 50, resamples=99) == 0.01
+
+
+def test_more_than_a_placebo_by_brute_force():
+    """Every division of five runs and of four in two contexts, counted one by one."""
+    draw = rng(6)
+    method = draw.standard_normal((3, 2)), draw.standard_normal((2, 2)) + 2.0
+    placebo = draw.standard_normal((2, 2)), draw.standard_normal((2, 2)) + 0.5
+    pools = [np.concatenate(runs) for runs in zip(method, placebo, strict=True)]
+
+    def excess(ours, theirs):
+        groups = zip(pools, ours, theirs, strict=True)
+        parts = [(pool[list(a)], pool[list(b)]) for pool, a, b in groups]
+        return distance(parts[0][0], parts[1][0]) - distance(parts[0][1], parts[1][1])
+
+    observed, count, total = distance(*method) - distance(*placebo), 0, 0
+    for one in itertools.combinations(range(5), 3):
+        for two in itertools.combinations(range(4), 2):
+            rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
+            count += excess((one, two), rest) >= observed - 1e-12
+            total += 1
+    p = beyond_p(method, placebo, rng(), resamples=20_000)
+    assert p == pytest.approx(2 * count / total, abs=0.03)
+
+
+def test_a_context_counts_where_it_exceeds_the_placebos():
+    """Selected noise: both move apart by the same; a learner that moves by more is told apart."""
+    shift = np.array([0.5, 0.0, 0.0])
+    noise = rng(7).standard_normal((4, 20, 3)) * 0.2
+    placebo = noise[0], noise[1] + shift
+    assert permutation_p(*placebo, rng()) < 0.001  # which alone would count as a sign
+    assert beyond_p((noise[2], noise[3] + shift), placebo, rng()) > 0.05
+    assert beyond_p((noise[2], noise[3] + 2 * shift), placebo, rng()) < 0.001
+    assert math.isnan(beyond_p((noise[2][:1], noise[3]), placebo, rng()))
 
 
 def test_pairs_of_contexts():

@@ -12,7 +12,7 @@ from coartic.analysis.comparisons.methods import BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.comparisons.reached import WAY, Targets, price, targets
 from coartic.analysis.comparisons.standings import (
     ALL_TASKS,
-    apart_p,
+    apart,
     gaps,
     initial_and_optimum,
     leaders,
@@ -82,7 +82,7 @@ def test_a_rank_counts_algorithms():
     assert math.isnan(rows.p[0])
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
     assert rows.p[1] == pytest.approx(2 / 2**8, abs=0.003)
-    assert apart_p(seen, "cma-es/bandit", "cma-es/every") == 1.0
+    assert apart(seen, "cma-es/bandit", "cma-es/every").p == 1.0
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():

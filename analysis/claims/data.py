@@ -11,7 +11,7 @@ import pandas as pd
 from coartic import Execution, Task
 from coartic.analysis.claims.register import Side, is_method
 from coartic.analysis.generality.sample import signs
-from coartic.analysis.methods import LEARNER, most_exploring
+from coartic.analysis.methods import LEARNER, PLACEBO, most_exploring
 from coartic.analysis.published import TRIALS
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST
@@ -58,7 +58,7 @@ class Data:
                 "the mean of the others would mislead"
             )
         runs = cell.good[cell.good.hands == hands] if hands else cell.good
-        if method.startswith(LEARNER):
+        if method.startswith((LEARNER, PLACEBO)):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
                 raise MissingError(
@@ -109,6 +109,9 @@ class Data:
 
     def sign(self, task: str, label: str, name: str) -> Array:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
+        if name.startswith("replayed "):
+            replays = self.study.replays(task, label)
+            return SIGNS[name.removeprefix("replayed ")].of(replays)
         if self.task(task).family is not None:
             return signs(self.study)[task, label].get(name, np.empty(0))
         return SIGNS[name].of(self.study.trajectories(task, label))

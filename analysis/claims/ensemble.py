@@ -39,6 +39,6 @@ def held_in_words(claim: str) -> str:
     return "; ".join(parts) or "not counted"
 
 
-def mostly_refuted(claim: str) -> bool:
-    """Whether a claim is refuted with more than half of the admissible goals of some task."""
-    return any(2 * held.refuted > held.members for held in held_by(claim))
+def rarely_supported(claim: str) -> bool:
+    """Whether at most half of the admissible goals of some task support a claim."""
+    return any(2 * held.supported <= held.members for held in held_by(claim))

@@ -3,11 +3,13 @@
 - *Supported*: what the claim says is seen, and the largest p-value of its tests, which must all
   hold (intersection-union test), is below 5 % after Holm's correction.
 - *Not supported*: it is not seen, and the opposite of one of its tests is significant (smallest
-  p-value of the opposites times their number, below 5 % after Holm's correction); or the goals that
-  the paper's text admits refute it in most cases.
-- *Used to choose the goals*: it would be supported, but our goals were chosen by it or it follows
-  from what they were chosen by.
+  p-value of the opposites times their number, below 5 % after Holm's correction).
+- *Depends on the goals*: it would be supported at our goals, but at most half of the sets of goals
+  that the paper's text admits support it.
 - *Undecided*: none of these, or the folder lacks the runs.
+
+A claim that is not about the model, or that follows from what chose our goals or constants, has a
+verdict as well, but does not count (``uncounted``).
 
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
 groups of claims: those on the paper's own seven cells, those that take other runs beside them,
@@ -18,13 +20,14 @@ test counts in its group all the same, so that what is decided stays decided wha
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
 from coartic.analysis.claims import rules, single, studies
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.ensemble import mostly_refuted
+from coartic.analysis.claims.ensemble import rarely_supported
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
@@ -35,6 +38,7 @@ RULES: dict[str, Callable[[Data, Claim], Finding]] = {
     for rule in (
         *(rules.higher, rules.some_higher, rules.in_every_family, rules.counted, rules.ordered),
         *(single.context, single.sequences_change, single.initial_base_reverses),
+        *(single.slower_hands_are_chosen,),
         *(single.corrective_ensures, single.corrective_near_shortest, single.printed_p_values),
         *(studies.first_goal_ahead_gains_most, studies.further_goals_gain_little),
         *(studies.most_of_the_loss_is_posture, studies.dear_joints_keep_the_horizon),
@@ -58,12 +62,11 @@ class Judged:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict by corrected p-values, the chosen goals and the admissible goals."""
-        if self.claim.fitted and mostly_refuted(self.claim.id) and self.finding.holds is not None:
-            return "not supported"
+        """The verdict by corrected p-values and by the admissible goals."""
         verdict = by_tests(self.finding, self.adjusted_p, self.adjusted_opposite_p)
-        chosen = self.claim.chosen and verdict == "supported"
-        return "used to choose the goals" if chosen else verdict
+        if verdict == "supported" and self.claim.fitted and rarely_supported(self.claim.id):
+            return "depends on the goals"
+        return verdict
 
 
 def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
@@ -144,10 +147,6 @@ def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
 
 
 def counts(entries: Iterable[Judged]) -> Mapping[Verdict, int]:
-    """How many claims have each verdict; 0 for those that none has."""
-    number_of: dict[Verdict, int] = {
-        "supported": 0, "used to choose the goals": 0, "not supported": 0, "undecided": 0
-    }  # fmt: skip
-    for entry in entries:
-        number_of[entry.verdict] += 1
-    return number_of
+    """How many of the claims that count have each verdict; 0 for those that none has."""
+    found = Counter(entry.verdict for entry in entries if not entry.claim.uncounted)
+    return {verdict: found[verdict] for verdict in get_args(Verdict)}

@@ -18,7 +18,7 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 """Every margin with its value, the reason for it, and its history where it was changed."""
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
-Verdict = Literal["supported", "not supported", "undecided", "used to choose the goals"]
+Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Group = Literal["paper", "beside", "families", "ours"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
 families of random tasks; and claims of our own, those on one suite."""
@@ -31,7 +31,10 @@ QUANTITIES = {
     "last": "share of movements that are corrected, in the learned solution",
     "resemblance": "share of the distance of the initial solution to the plan for least squared "
     "changes that learning has covered (postures at the goals)",
-} | {name.replace(" ", "-"): sign.words for name, sign in SIGNS.items()}
+}
+for _name, _sign in SIGNS.items():
+    QUANTITIES[_name.replace(" ", "-")] = _sign.words
+    QUANTITIES[f"replayed-{_name.replace(' ', '-')}"] = f"in noiseless replays, {_sign.words}"
 """What is measured of runs beside their reward, by its name in comparisons."""
 _WHAT = "|".join(QUANTITIES)
 _METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
@@ -98,7 +101,8 @@ class Claim(FileData):
     test: str = ""
     exact: bool = False
     fitted: bool = False
-    chosen: bool = False
+    short: str = ""
+    """In a few words, for the three claims that carry the paper's point."""
     beside: bool = False
     pairs: Mapping[str, Sequence[str]] = {}
     shown: Mapping[str, Sequence[str]] = {}

@@ -178,14 +178,12 @@ def runs_that(data: Data, task: str, condition: str, what: str) -> NDArray[np.bo
     """Which runs do something, shape ``(runs,)``: ``LRLR``, ``not best``, ``RRLR rightward``.
 
     ``commonest``: have the commonest hand sequence; ``best``, ``initial``: one that is best by the
-    corrective process alone, or the initial one; ``slower-hand``: hit some goal with a hand that is
-    slower for it alone; ``rightward``: of the runs with these hands, the base only moves right.
+    corrective process alone, or the initial one; ``rightward``: of the runs with these hands, the
+    base only moves right.
     """
     inverse, what = what.startswith("not "), what.removeprefix("not ")
     learned = data.runs(task, condition).hands.astype(str).to_numpy()
-    if what == "slower-hand":
-        does = data.values(task, Side("hand", condition)) > 0
-    elif what.endswith(" rightward"):
+    if what.endswith(" rightward"):
         q0, hands = data.task(task).q0, what.partition(" ")[0]
         runs = [r.execution for r in data.cell(task, condition).runs if r.execution.hands == hands]
         if not runs:
@@ -298,8 +296,12 @@ def all_hold(tests: list[Inference], parts: Parts) -> Finding:
 
 def in_words(what: str, values: Array) -> str:
     """The mean with its BCa interval; ticks and rewards with one decimal."""
-    ticks = what in REWARDS or QUANTITIES[what].startswith("ticks")
-    return estimate(mean(values), 1 if ticks else 3)
+    return estimate(mean(values), 1 if in_ticks(what) else 3)
+
+
+def in_ticks(what: str) -> bool:
+    """Whether a quantity is counted in ticks."""
+    return what in REWARDS or "ticks by which" in QUANTITIES[what]
 
 
 def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
@@ -312,10 +314,9 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
     elif first.what != second.what:
         return f"{seen}, {second.what} {in_words(second.what, b)}"
     else:
-        difference = estimate(difference_of_means(a, b), 1)
-        seen += (
-            f" against {in_words(second.what, b)} ({second}), a difference of {difference} ticks"
-        )
+        ticks = in_ticks(first.what)
+        difference = estimate(difference_of_means(a, b), 1 if ticks else 3) + " ticks" * ticks
+        seen += f" against {in_words(second.what, b)} ({second}), a difference of {difference}"
     printed = [as_printed(task, each) for each in (first, second)]
     return f"{seen}; published {printed[0]} and {printed[1]}" if None not in printed else seen
 

@@ -229,6 +229,23 @@ def spent_at(runs: Sequence[BestSoFar], spend: str, start: float, best: float) -
     return np.array(rows)
 
 
+def halfway(study: Study, method: str) -> dict[str, float]:
+    """Trials to the target halfway from the initial solution to the optimum, by task.
+
+    Medians over runs, infinite where most runs never reach it. ``method``: a label, or the
+    learner's conditions together.
+    """
+    scale = initial_and_optimum(study)
+    rows = gaps(study).drop_duplicates(["method", "task"])
+    medians = {}
+    for row in rows[rows.method == method].itertuples():
+        ids = study.cells[str(row.task), str(row.label)].runs.run_id
+        runs = [best_so_far(study)[str(run_id)] for run_id in ids]
+        spent = spent_at(runs, "trials", *scale[str(row.task)])[:, list(WAY).index(0.5)]
+        medians[str(row.task)] = float(np.quantile(spent, 0.5, method="inverted_cdf"))
+    return medians
+
+
 @cached
 def price(study: Study) -> pd.DataFrame:
     """What it costs each method to reach a quarter and half of the targets, over all tasks.

@@ -25,8 +25,8 @@ from coartic.analysis.methods import (
     is_search,
     is_variant,
 )
-from coartic.analysis.statistics.estimates import mean
-from coartic.analysis.statistics.hypotheses import holm, sign_flip_test
+from coartic.analysis.statistics.estimates import Inference, mean
+from coartic.analysis.statistics.hypotheses import sign_flip_test
 from coartic.analysis.statistics.instances import gap_share, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.trajectories import initial_reward
@@ -136,8 +136,9 @@ def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, 
 def leaders(study: Study, group: str) -> pd.DataFrame:
     """The best form of each algorithm of a group over all tasks (or on the one), nearest first.
 
-    The learner is there by the form that explores most. Column ``p``: of the difference to the
-    first row (:func:`apart_p`) after Holm's correction over the rows, NaN for the first row itself.
+    The learner is there by the form that explores most. Columns ``p``, of the difference to the
+    first row (:func:`apart`), NaN for that row itself, and ``least_p``, the smallest that so many
+    runs can give. Each row is one test, so that a further method changes no other's p.
     """
     rows: pd.DataFrame = standings(study)
     rows = rows[(rows.task == rows.task.iloc[0]) & (rows.knows == group)] if len(rows) else rows
@@ -145,12 +146,14 @@ def leaders(study: Study, group: str) -> pd.DataFrame:
     most = learners & rows.method.str.contains("EC4")
     shown = rows[~learners | (most if most.any() else learners)]
     shown = shown.drop_duplicates("algorithm").reset_index(drop=True)
-    p = [apart_p(study, shown.method[0], other) for other in shown.method[1:]]
-    return shown.assign(p=[math.nan, *holm(p)][: len(shown)])
+    tests = [apart(study, shown.method[0], other) for other in shown.method[1:]]
+    p, least = [test.p for test in tests], [test.least_p for test in tests]
+    first = [math.nan] * min(len(shown), 1)
+    return shown.assign(p=first + p, least_p=first + least)
 
 
-def apart_p(study: Study, first: str, second: str) -> float:
-    """Two-tailed p of the difference of mean gaps of two methods over the tasks of both.
+def apart(study: Study, first: str, second: str) -> Inference:
+    """Two-tailed test of the difference of mean gaps of two methods over the tasks of both.
 
     A sign-flip test of runs paired by seed within their task; a method that is run once is compared
     with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
@@ -165,5 +168,5 @@ def apart_p(study: Study, first: str, second: str) -> float:
         both = a.merge(b, on="seed" if min(len(a), len(b)) > 1 else "task")
         differences.append((both.gap_x - both.gap_y).to_numpy(np.float64))
     if not differences or not all(map(len, differences)):
-        return math.nan
-    return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences])).p
+        return Inference(math.nan, (), "no pairs")
+    return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))

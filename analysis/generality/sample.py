@@ -9,7 +9,7 @@ from functools import cached_property
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.methods import CONDITIONS, most_exploring
+from coartic.analysis.methods import CONDITIONS, PLACEBO, most_exploring
 from coartic.analysis.optima import KnownOptimum, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
@@ -166,15 +166,15 @@ tenth of the goals, or of the way; more than a tick, which rounding can make."""
 
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signs (n,) on every instance under every condition of the learner.
+    """Values of signs (n,) on every instance, of the learner by condition and of the placebo.
 
-    By the instance's name and the condition's label, then by the sign's name in :data:`THERE`; a
+    By the instance's name and the method's label, then by the sign's name in :data:`THERE`; a
     value for each run that has one. A sign without any is left out.
     """
     by_cell = {}
     instances = sample(study)
     for name in instances.references if instances else ():
-        for label in CONDITIONS:
+        for label in (*CONDITIONS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.trajectories(name, label)

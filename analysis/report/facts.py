@@ -16,6 +16,7 @@ from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.claims.register import MARGINS
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
 from coartic.analysis.comparisons.paper import beside_paper
+from coartic.analysis.comparisons.reached import halfway
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import leaders
 from coartic.analysis.generality.sample import one_by_one, sample
@@ -31,7 +32,9 @@ from coartic.analysis.methods import (
     name_of,
 )
 from coartic.analysis.published import RUNS, TRIALS
-from coartic.analysis.signatures.register import shared_goal
+from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.context import smallest_p
+from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables.paper import best_condition
@@ -49,6 +52,12 @@ def coarticulation(study: Study) -> Facts | None:
         return None
     # A method whose runs differ by chance takes a test.
     tested = study.plan.methods[study.cells[shared.tasks[0].name, shared.method].method].stochastic
+    differ = shared.p < LEVEL if tested else shared.apart > 0
+    chosen = selects(study, shared.method)
+    placebo = placebo_of(study, shared) if chosen else None
+    beyond = math.nan if placebo is None else shared.p_beyond(placebo)
+    replays = [study.replays(task.name, shared.method) for task in shared.tasks]
+    replayed = TwoContexts(replays[0], replays[1], shared.goal, shared.hand)
     return {
         "goal": shared.goal,
         "method": name_of(shared.method),
@@ -58,8 +67,13 @@ def coarticulation(study: Study) -> Facts | None:
         "spreads": shared.spreads,
         "p": shared.p,
         "tested": tested,
-        "seen": shared.p < LEVEL if tested else shared.apart > 0,
-        "too_few": tested and math.isnan(shared.p),
+        "differ": differ,
+        "seen": differ and (not chosen or beyond < LEVEL),
+        "too_few": tested and not smallest_p(*map(len, shared.runs)) < LEVEL,
+        "no_placebo": chosen and placebo is None,
+        "placebo": math.nan if placebo is None else placebo.apart,
+        "beyond": beyond,
+        "replayed": replayed.apart if all(replayed.runs) else math.nan,
         "row": f"{shared.tasks[0].name} {shared.method} goal {shared.goal} {shared.hand}",
     }
 
@@ -108,8 +122,20 @@ def paper(study: Study) -> Facts | None:
     entries = [entry for entry in judged(study) if entry.claim.place]
     if not entries or not (beside_paper(study) or any(entry.run_ids for entry in entries)):
         return None
-    rewards = Counter(row["verdict"] for row in beside_paper(study) if not row["hands"])
+    rows = [row for row in beside_paper(study) if not row["hands"]]
+    rewards = Counter(row["verdict"] for row in rows)
     return {
+        # Undecided, though sampling alone does not explain the difference.
+        "off": [
+            {
+                **{f"by{key}": row[f"difference{key}"] for key in ("", "_low", "_high")},
+                "condition": row["cell"].label.removeprefix(LEARNER),
+                "task": study.tasks[row["cell"].task].label,
+            }
+            for row in rows
+            if row["verdict"] == "undecided"
+            and (row["difference_low"] > 0 or row["difference_high"] < 0)
+        ],
         "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
         **verdicts_of(entries),
     }
@@ -123,16 +149,25 @@ def claims(study: Study) -> Facts | None:
 
 
 def verdicts_of(entries: list[Judged]) -> Facts:
-    """How many claims have each verdict, and whether most are decided."""
+    """How many claims have each verdict, and whether most are decided.
+
+    ``central``: by verdict, the claims that carry the paper's point; ``others``: counts of the
+    others that count.
+    """
+    counted = [entry for entry in entries if not entry.claim.uncounted]
+    central: dict[str, list[str]] = {}
+    for entry in counted:
+        if entry.claim.short:
+            central.setdefault(entry.verdict, []).append(entry.claim.short)
     by_verdict = counts(entries)
-    total = len(entries) - by_verdict["used to choose the goals"]
     return {
         "claims": by_verdict,
-        "independent": counts(entry for entry in entries if not entry.claim.fitted),
-        "general": all(entry.claim.families for entry in entries),
-        "judged": total,
+        "central": central,
+        "others": counts(entry for entry in counted if not entry.claim.short),
+        "judged": len(counted),
+        "uncounted": len(entries) - len(counted),
         # With few runs or trials most claims cannot be judged.
-        "decided": 2 * by_verdict["undecided"] < total,
+        "decided": 2 * by_verdict["undecided"] < len(counted),
     }
 
 
@@ -165,13 +200,14 @@ def nearest(study: Study) -> Facts | None:
 
 
 def from_files(study: Study) -> list[Any]:
-    """Rows of the ranking of methods that are not built in and stand beside the learner."""
+    """Rows of the ranking of methods that are not built in; ``beside``: whether the learner ran."""
     labels = {label for _, label in study.cells if label.partition(" ")[0] not in KNOWN_METHODS}
     if not labels:
         return []
     rows = tables.ranking(study)
-    rows = rows[rows.method.isin(labels) & rows.better.notna()]
-    return rows.assign(gap=100 * rows.gap).to_dict("records")
+    rows = rows[rows.method.isin(labels) & rows.gap.notna()]
+    beside = any(is_learner(label) for _, label in study.cells)
+    return rows.assign(gap=100 * rows.gap, beside=beside).to_dict("records")
 
 
 @cached
@@ -202,6 +238,14 @@ def price(study: Study) -> Facts | None:
             times = learner[name] / rival[name]
             levels.append({"level": level, "ours": ours, "theirs": theirs, "times": times})
     plans = others[(others.knows != BY_TRIAL) & (others.reached >= 0.5)].kinematics_to_half
+    plan = str(plans.idxmin()) if len(plans) else ""
+    ours = halfway(study, learners[0])
+    theirs = {} if rival is None else halfway(study, str(rival.name))
+    by_task = [
+        {"task": study.tasks[name].label, "ours": trials, "theirs": theirs[name]}
+        for name, trials in ours.items()
+        if name in theirs and name in one_by_one(study)
+    ]
     return {
         "learner": learners[0],
         "rival": "" if rival is None else name_of(str(rival.name)),
@@ -209,9 +253,13 @@ def price(study: Study) -> Facts | None:
         "levels": levels,
         "ceiling": learner.reached,
         "rival_ceiling": math.nan if rival is None else rival.reached,
-        "plan": name_of(str(plans.idxmin())) if len(plans) else "",
+        "by_task": by_task,
+        "never": math.inf in (*ours.values(), *theirs.values()),
+        "plan": name_of(plan) if plan else "",
         "plan_kinematics": plans.min(),
+        "plan_seconds": rows.seconds_to_half.get(plan, math.nan),
         "learner_kinematics": learner.kinematics_to_half,
+        "learner_seconds": learner.seconds_to_half,
     }
 
 

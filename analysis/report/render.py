@@ -24,7 +24,7 @@ TONES = {
     "not supported": "bad",
     "different": "bad",
     "undecided": "open",
-    "used to choose the goals": "plain",
+    "depends on the goals": "open",
 }
 """Class of a verdict on the page, by its words."""
 PACKAGES = "% needs \\usepackage{booktabs} and \\usepackage[T1]{fontenc}"

@@ -13,6 +13,7 @@ import numpy as np
 
 from coartic import Hand, Task, Trajectory
 from coartic.analysis.signatures.context import (
+    beyond_p,
     context_dependence,
     distance,
     lead_time,
@@ -113,6 +114,12 @@ class TwoContexts:
     def p(self) -> float:
         """P-value of the permutation test over runs; NaN where a context has one run."""
         return self.p_within("context dependence")
+
+    def p_beyond(self, placebo: TwoContexts) -> float:
+        """P-value of the test that these runs lie further apart than a placebo's; NaN where a
+        context has one run."""
+        rng = rng_of(f"beyond {placebo.method}", self.place)
+        return beyond_p(self.postures, placebo.postures, rng)
 
     def p_within(self, signature: str, basis: Array | None = None) -> float:
         """P-value of that test within the span of an orthonormal ``basis`` (dof, d).

@@ -162,6 +162,42 @@ def p_values(null: Array, observed: Array, *, exact: bool) -> Array:
     return share
 
 
+def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
+    """Smallest p that :func:`permutation_p` can give for so many runs in each context."""
+    return 1 / min(math.comb(first + second, first), 1 + resamples)
+
+
+def beyond_p(
+    method: tuple[Array, Array],
+    placebo: tuple[Array, Array],
+    rng: np.random.Generator,
+    resamples: int = RESAMPLES,
+) -> float:
+    """P of the test that a method's contexts lie further apart than a placebo's.
+
+    ``method`` and ``placebo`` each have configurations ``(runs, dof)`` in two contexts. Permutation
+    test: within each context the runs of both are divided anew at random, and the statistic is the
+    :func:`distance` of the method less that of the placebo. Twice the upper tail, as wherever two
+    methods are compared. 0 < p ≤ 1. NaN where a method has one run in a context.
+    """
+    if min(map(len, (*method, *placebo))) < 2:
+        return math.nan
+    pools = [np.concatenate(runs) for runs in zip(method, placebo, strict=True)]
+    sizes = [(len(a), len(b)) for a, b in zip(method, placebo, strict=True)]
+    null = np.empty(resamples)
+    for start in range(0, resamples, AT_ONCE):
+        count = min(AT_ONCE, resamples - start)
+        means = []
+        for pool, (ours, theirs) in zip(pools, sizes, strict=True):
+            rows = rng.random((count, len(pool))).argpartition(ours - 1, axis=1)
+            total, chosen = pool.sum(axis=0), pool[rows[:, :ours]].sum(axis=1)
+            means.append((chosen / ours, (total - chosen) / theirs))
+        apart = [np.linalg.norm(a - b, axis=1) for a, b in zip(*means, strict=True)]
+        null[start : start + count] = apart[0] - apart[1]
+    observed = distance(*method) - distance(*placebo)
+    return min(1.0, 2 * float(1 + (null >= observed - 1e-12).sum()) / (1 + resamples))
+
+
 def lead_time(
     first: Array,
     second: Array,

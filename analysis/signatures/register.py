@@ -11,8 +11,9 @@ from itertools import chain
 
 import pandas as pd
 
+from coartic.analysis.comparisons.methods import BY_TRIAL, group_of
 from coartic.analysis.generality.sample import one_by_one
-from coartic.analysis.methods import CONDITIONS, main_methods
+from coartic.analysis.methods import CONDITIONS, PLACEBO, main_methods
 from coartic.analysis.signatures.between import TwoContexts, between_contexts, slopes
 from coartic.analysis.signatures.context import context_pairs
 from coartic.analysis.signatures.locus import LEAST, families, variants
@@ -100,6 +101,29 @@ def pairs_of_contexts(study: Study) -> list[tuple[str, str, int]]:
     moved = variants(families(study.tasks))
     pairs = context_pairs(study.tasks)
     return [pair for pair in pairs if not any({*pair[:2]} <= names for names in moved)]
+
+
+def selects(study: Study, label: str) -> bool:
+    """Whether a method's solution may be one of many trials, selected by its reward.
+
+    Then it shows signs that selection alone shows, and has to exceed the placebo's.
+    """
+    method = label.partition(" ")[0]
+    return method != PLACEBO and group_of(study, label) == BY_TRIAL
+
+
+def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
+    """The placebo in the same two contexts; None without one that made as many trials."""
+    keys = [(task.name, PLACEBO) for task in contexts.tasks]
+    if not all(key in study.cells and len(study.cells[key].good) for key in keys):
+        return None
+    for name, label in keys:
+        method = study.cells[name, contexts.method].runs.trials.max()
+        if study.cells[name, label].runs.trials.max() < method:
+            return None
+    first, second = (study.trajectories(*key) for key in keys)
+    placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
+    return placebo if all(placebo.runs) else None
 
 
 @cached

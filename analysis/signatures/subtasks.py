@@ -62,20 +62,28 @@ def postures_before(execution: Execution, task: Task) -> list[Array]:
     return [np.array(task.q0), *execution.configurations[:-1]]
 
 
+def ticks_slower(path: Trajectory) -> Array:
+    """Ticks by which each goal's hand is slower for that goal alone, shape ``(G,)``.
+
+    Slower than the hand with which the corrective process alone reaches the goal in the fewest
+    ticks from the posture before; 0 for that hand and one as quick. Infinite where the corrective
+    process does not reach the goal with the hand.
+    """
+    slower = np.empty(len(path.hands))
+    befores = postures_before(path.execution, path.task)
+    for k, (hand, q) in enumerate(zip(path.hands, befores, strict=True)):
+        reaches = {each: isolated_reach(path.task, q, k + 1, each) for each in path.task.hands}
+        ticks = {each: reach[0] for each, reach in reaches.items() if reach is not None}
+        slower[k] = ticks[hand] - min(ticks.values()) if hand in ticks else np.inf
+    return slower
+
+
 def isolated_agreement(path: Trajectory) -> list[bool]:
     """Whether each goal is hit with the hand that would be chosen for it by itself.
 
-    That is the hand with which the corrective process alone reaches it in the fewest ticks
-    from the posture before; equally quick ones both agree. False for a goal that it reaches
-    with neither. Where False, the choice of hand serves other goals than its own.
+    Where :func:`ticks_slower` is above 0, the choice of hand serves other goals than its own.
     """
-    agrees = []
-    befores = postures_before(path.execution, path.task)
-    for goal, (hand, q) in enumerate(zip(path.hands, befores, strict=True), 1):
-        reaches = {each: isolated_reach(path.task, q, goal, each) for each in path.task.hands}
-        ticks = {each: reach[0] for each, reach in reaches.items() if reach is not None}
-        agrees.append(hand in ticks and ticks[hand] == min(ticks.values()))
-    return agrees
+    return [bool(ticks == 0) for ticks in ticks_slower(path)]
 
 
 def turning_angles(postures: Array) -> Array:

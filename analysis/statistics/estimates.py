@@ -59,6 +59,8 @@ class Inference:
     p: float = math.nan
     resamples: int = 0
     """Resamples that p was counted in; 0 for an exact test."""
+    least_p: float = 0.0
+    """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
     note: str = ""
     """Why there is no interval or p-value, or why it is a special one."""
 

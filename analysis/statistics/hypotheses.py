@@ -96,7 +96,10 @@ def bootstrap_test(
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
     p = float(1 + extreme.sum()) / (1 + resamples)
-    return replace(inference, p=p, resamples=resamples)
+    # The most extreme resample has no spread: one value of each sample, drawn every time.
+    tails = 2 if alternative == "two-sided" else 1
+    alike = tails * math.prod(float(len(values)) ** -len(values) for values in shifted)
+    return replace(inference, p=p, resamples=resamples, least_p=max(alike, 1 / (1 + resamples)))
 
 
 def sign_flip_test(differences: ArrayLike) -> Inference:
@@ -125,7 +128,8 @@ def sign_flip_test(differences: ArrayLike) -> Inference:
         batch=max(1, min(1_000, AT_ONCE // len(values))),
         rng=np.random.default_rng(SEED),
     )
-    return replace(inference, p=float(result.pvalue))
+    least = 2 / min(2 ** len(values), 1 + RESAMPLES)
+    return replace(inference, p=float(result.pvalue), least_p=least)
 
 
 def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:

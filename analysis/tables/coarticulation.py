@@ -10,7 +10,9 @@ import pandas as pd
 
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import in_order, is_search, main_methods
+from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import families, variants
+from coartic.analysis.signatures.register import placebo_of, selects
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
@@ -28,7 +30,7 @@ _MEANS = {
 """Columns of :func:`signatures` and the signatures whose means over goals they have."""
 
 
-@table("method, place, runs, distance, dependence, p_holm, equivalent, other, lead")
+@table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other, lead")
 def contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors."""
     frame = signature_values(study)
@@ -46,6 +48,7 @@ def contexts(study: Study) -> Rows:
             "distance": value.get("context distance"),
             "dependence": value.get("context dependence"),
             "p_holm": by_signature.p.get("context dependence", math.nan),
+            "p_placebo": placebo_p(study, label, (task, against), int(goal), hand),
             "equivalent": value.get("motor-equivalent part"),
             "other": value.get("non-motor-equivalent part"),
             "lead": value.get("lead time"),
@@ -55,11 +58,27 @@ def contexts(study: Study) -> Rows:
     yield from corrected(rows)
 
 
+def placebo_p(study: Study, label: str, tasks: tuple[str, str], goal: int, hand: str) -> float:
+    """P of the test that a method's postures lie further apart than the placebo's; NaN for one
+    that selects nothing, and without a placebo that made as many trials."""
+    if not selects(study, label):
+        return math.nan
+    first, second = (study.trajectories(task, label) for task in tasks)
+    contexts = TwoContexts(first, second, goal, "left" if hand == "left" else "right")
+    placebo = placebo_of(study, contexts)
+    return math.nan if placebo is None else contexts.p_beyond(placebo)
+
+
 def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
-    """Rows with their p-values adjusted over all of them (Holm)."""
-    adjusted = holm([row["p_holm"] for _, row in rows]) if rows else []
-    for (name, row), p in zip(rows, adjusted, strict=True):
-        yield name, row | {"p_holm": p}
+    """Rows with their p-values adjusted over those of the same method (Holm)."""
+    of_method: dict[str, list[int]] = {}
+    for place, (_, row) in enumerate(rows):
+        of_method.setdefault(row["method"], []).append(place)
+    adjusted: dict[int, float] = {}
+    for places in of_method.values():
+        adjusted |= zip(places, holm([rows[k][1]["p_holm"] for k in places]), strict=True)
+    for place, (name, row) in enumerate(rows):
+        yield name, row | {"p_holm": adjusted[place]}
 
 
 @table("method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving")

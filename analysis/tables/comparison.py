@@ -46,13 +46,13 @@ _POINTS = 120  # trials of a learning curve
 _STEPS = 150  # of a price curve, at most
 
 
-@table("task, method, runs, reward, learner, p_holm")
+@table("task, method, runs, reward, learner, p_holm, least_p")
 def against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
     Of methods that solved every run. A method that draws nothing has one reward, which is exact.
     The test takes samples as independent, though runs have the same seeds
-    (:func:`~coartic.analysis.comparisons.standings.apart_p` pairs them): where the learner has 100
+    (:func:`~coartic.analysis.comparisons.standings.apart` pairs them): where the learner has 100
     runs and the other method 20, pairs would leave out 80.
     """
     rows: list[tuple[str, Row]] = []
@@ -71,7 +71,8 @@ def against_learner(study: Study) -> Rows:
             "runs": len(cell.runs),
             "reward": cell.rewards.mean(),
             "learner": learner.rewards.mean(),
-            "p_holm": bootstrap_test(learner.rewards, rewards, "two-sided").p,
+            "p_holm": (test := bootstrap_test(learner.rewards, rewards, "two-sided")).p,
+            "least_p": test.least_p,
         }
         rows.append((f"{task} {label}", row | runs_of(cell, learner)))
     yield from corrected(rows)
@@ -98,7 +99,9 @@ def ranking(study: Study) -> Rows:
             if task in single
         }
         of_labels = tested.index.isin([f"{task} {label}" for task, label in labels.items()])
-        if of_labels.any():
+        of_method = tested[of_labels]
+        # With Holm's correction over its tasks: could any of its tests have told them apart?
+        if len(of_method) and len(of_method) * of_method.least_p.min() < LEVEL:
             sure = tested[of_labels & (tested.p_holm < LEVEL)]
             row |= {"better": sum(sure.reward > sure.learner)}
             row |= {"worse": sum(sure.reward < sure.learner)}

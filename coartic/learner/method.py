@@ -59,7 +59,7 @@ class SubtaskParameters(DualProcessParameters):
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
     """γ of the return from a goal on; 0 is the reward of its own subtask alone."""
-    learned: Literal["replay"] = "replay"  # type: ignore[assignment]
+    learned: Literal["replay"] = "replay"
     """The best trial of the whole task is picked by a reward that it is not told."""
 
 

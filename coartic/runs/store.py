@@ -391,6 +391,13 @@ class Store:
         inner = ["result_id", "part"]
         return self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
 
+    def movements(self, part: str) -> pd.DataFrame:
+        """Movements of one part (:data:`PARTS`) of each run asked for, as view ``solutions``."""
+        query = f"""SELECT results.run_id, movements.* {_ASKED_FOR}
+            JOIN movements ON movements.result_id = results.id AND part = ?
+            ORDER BY cells.position, results.run, "order" """
+        return self._table(query, part).drop(columns=["result_id", "part"])
+
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""

@@ -24,7 +24,7 @@ class MadeUp(Study):
     def __init__(self, study, **parts):
         super().__init__(study.folder, study.plan, study.made_with, study.runs)
         for name in parts:
-            assert isinstance(getattr(Study, name), cached_property)
+            assert isinstance(getattr(Study, name, None), cached_property) or hasattr(study, name)
         vars(self).update(parts)
 
 
