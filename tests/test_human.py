@@ -247,7 +247,8 @@ grid = { horizon = [0, 1, 7] }
 def test_a_small_study(small, monkeypatch):
     assert (small.runs.status == "ok").all()
     monkeypatch.setattr("coartic.analysis.human.judge.FEWEST_TASKS", 2)
-    monkeypatch.setitem(MODELS["learner"].parameters, "trials", 150)
+    for model in ("learner", "learner, replayed"):
+        monkeypatch.setitem(MODELS[model].parameters, "trials", 150)
     rows = judged(small).set_index(["finding", "model", "measure"])
     near = rows.xs("slope norm at distance 1", level="measure").loc["both-directions"]
     far = rows.xs("slope norm at distance 2", level="measure").loc["two-ahead"]
@@ -255,6 +256,9 @@ def test_a_small_study(small, monkeypatch):
     for model in ("corrective process", "no goal ahead", "null-space control, this goal"):
         assert near.value[model] == pytest.approx(0, abs=1e-9)
     assert near.value["one goal ahead"] > 0.01
+    # Runs of the best trial and of the replay are not the same.
+    assert near.tasks["learner"] == near.tasks["learner, replayed"] == 2
+    assert near.value["learner"] != near.value["learner, replayed"]
     assert far.value["one goal ahead"] == pytest.approx(0, abs=1e-9)
     assert far.built_in["one goal ahead"]
     assert far.verdict["one goal ahead"] == DISAGREES

@@ -44,6 +44,8 @@ class Model(NamedTuple):
 
     method: str
     parameters: Mapping[str, Any] = {}
+    replayed: bool = False
+    """What was learned is replayed without noise, in the place of the best trial."""
 
 
 PLANNER = "receding-horizon"
@@ -97,8 +99,11 @@ def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
 
 def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
     """A model's runs by task."""
-    cells = cells_of(study, model, **others)
-    return {cell.task: study.trajectories(cell.task, cell.label) for cell in cells}
+    executed = study.replays if model.replayed else study.trajectories
+    by_task = {
+        cell.task: executed(cell.task, cell.label) for cell in cells_of(study, model, **others)
+    }
+    return {task: runs for task, runs in by_task.items() if runs.runs}
 
 
 def unmoved_tasks(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
