@@ -87,7 +87,7 @@ class Dask:
 
 
 def _remote(job: Job) -> Answer:
-    """Perform a job on a worker's machine, in a process that ends with its time limit."""
+    """Perform a job on a worker's machine, in a process that ends with its limit."""
     here = current_code(job.where, job.method)
     if here != job.code:
         words = f"method {job.method!r} has code {here} on a Dask worker and {job.code} where the "

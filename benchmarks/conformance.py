@@ -1,7 +1,7 @@
 """The conformance kit: what a contributor runs on a new method or task.
 
-A method is checked on runs with a time limit, in a process that performs them all, and in another
-one.
+A method is checked on runs with a limit of CPU time, in a process that performs them all, and in
+another one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Worker processes on this machine, with a time limit for each run.
+"""Worker processes on this machine, with a limit of CPU time for each job.
+
+The system counts a worker's CPU time, in all its threads, and ends it where a job has used up its
+limit, whatever it is doing: other work on the machine changes no result. That of processes that a
+method starts is not counted. What waits for ever is ended by wall time, much later.
 
 Methods of this project share workers; any other method has workers of its own, which begin in a
 temporary folder: that keeps a careless method out of the results of others.
@@ -34,6 +38,9 @@ _LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it
 _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
+_COUNTS_CPU = hasattr(signal, "setitimer")
+WALL_TIMES = 20.0 if _COUNTS_CPU else 1.0
+"""Limits of a job in wall time: more than a busy machine takes for one in CPU time."""
 
 
 class Executor(Protocol):
@@ -50,10 +57,14 @@ class Executor(Protocol):
 
 
 class Local:
-    """Worker processes on this machine; ``jobs`` of them, or one a core."""
+    """Worker processes on this machine; ``jobs`` of them, or one a core.
 
-    def __init__(self, jobs: int = -1) -> None:
+    A job is ended after its limit of CPU time, or ``wall_times`` as much wall time.
+    """
+
+    def __init__(self, jobs: int = -1, *, wall_times: float = WALL_TIMES) -> None:
         self.workers = threads_for(jobs)
+        self.wall_times = wall_times
 
     def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
         """The number of each job with its answer, as they come."""
@@ -78,7 +89,9 @@ class Local:
             try:
                 while True:
                     for number, job in waiting:
-                        future: Any = pool.schedule(perform, args=(job,), timeout=job.time_limit_s)
+                        future: Any = pool.schedule(
+                            perform_within_limit, args=(job,), timeout=self.wall_limit(job)
+                        )
                         running[future] = number, job
                         if len(running) == (1 + _AHEAD) * workers:
                             break
@@ -93,7 +106,7 @@ class Local:
                         raise BrokenProcessPool  # which leaves what waits as it is
                     for future in done:
                         number, job = running.pop(future)
-                        yield number, answer_of(future, job, Path(folder))
+                        yield number, self.answer_of(future, job, Path(folder))
             except RuntimeError:  # the pool's own
                 messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
@@ -103,30 +116,48 @@ class Local:
                 pool.stop()  # type: ignore[no-untyped-call]
                 pool.join()
 
+    def wall_limit(self, job: Job) -> float | None:
+        """Seconds of wall time after which a job is ended, if it has a limit."""
+        return None if job.time_limit_s is None else self.wall_times * job.time_limit_s
+
+    def answer_of(self, future: Future[Answer], job: Job, folder: Path) -> Answer:
+        """The answer to a job, or that it failed."""
+        try:
+            return future.result()
+        except TimeoutError:
+            limit = self.wall_limit(job) or math.inf  # there is one
+            return failed(job, "timeout", f"wall time limit of {limit:g} s exceeded", wall_s=limit)
+        except ProcessExpired as error:
+            if _COUNTS_CPU and error.exitcode == -signal.SIGPROF and job.time_limit_s is not None:
+                reason = f"CPU time limit of {job.time_limit_s:g} s exceeded"
+                return failed(job, "timeout", reason, cpu_s=job.time_limit_s)
+            how = f"exit code {error.exitcode}"
+            if error.exitcode is not None and error.exitcode < 0:
+                with contextlib.suppress(ValueError):
+                    how = f"killed by {signal.Signals(-error.exitcode).name}"
+            reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
+            return failed(job, "crashed", reason)
+        except BrokenProcessPool:
+            raise
+        except Exception as error:  # its answer cannot be read
+            return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"))
+
 
 def owner_of(job: Job) -> str:
     """Whose workers perform a job: this project's methods share theirs."""
     return "" if job.is_ours else f"{job.method} {job.code}"
 
 
-def answer_of(future: Future[Answer], job: Job, folder: Path) -> Answer:
-    """The answer to a job, or that it failed."""
+def perform_within_limit(job: Job) -> Answer:
+    """Perform a job in a worker, which is killed by SIGPROF after as much CPU time as the limit."""
+    if not _COUNTS_CPU or job.time_limit_s is None:
+        return perform(job)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # whatever a method before has set
+    signal.setitimer(signal.ITIMER_PROF, job.time_limit_s)
     try:
-        return future.result()
-    except TimeoutError:
-        limit = job.time_limit_s or math.inf  # there is one
-        return failed(job, "timeout", f"time limit of {limit:g} s exceeded", limit)
-    except ProcessExpired as error:
-        how = f"exit code {error.exitcode}"
-        if error.exitcode is not None and error.exitcode < 0:
-            with contextlib.suppress(ValueError):
-                how = f"killed by {signal.Signals(-error.exitcode).name}"
-        reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
-        return failed(job, "crashed", reason)
-    except BrokenProcessPool:
-        raise
-    except Exception as error:  # its answer cannot be read
-        return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"))
+        return perform(job)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def last_words(file: Path) -> str:

@@ -292,7 +292,7 @@ def plan_suite(
 
     ``cells`` made by hand stand in place of the suite's and of what is selected of them.
 
-    ``runs`` per cell, ``trials`` per run and the time limit are the suite's own by default.
+    ``runs`` per cell, ``trials`` per run and the limit of CPU time are the suite's own by default.
     ``readings`` of the paper, as ``"ties=right"``, hold in all cells, beside the suite's. Raises
     CoarticError for anything unknown, out of bounds, or that does not go together.
     """

@@ -51,7 +51,7 @@ class Job:
     model: MotionModel = PAPER
     trial_budget: int | None = None
     time_limit_s: float | None = None
-    """For each run."""
+    """CPU time of all its runs together."""
     within_reach: bool = True
     """Whether goals out of reach are refused; how methods cope is checked with such."""
 
@@ -98,9 +98,15 @@ class Answer:
     """Where this is not that of the parent process."""
 
 
-def failed(job: Job, status: str, reason: str, wall_s: float | None = None) -> Answer:
+def failed(
+    job: Job,
+    status: str,
+    reason: str,
+    wall_s: float | None = None,
+    cpu_s: float | None = None,
+) -> Answer:
     """The answer of a job whose worker gave none: ``timeout`` or ``crashed``."""
-    return Answer([Outcome(status, reason)] * len(job.seeds), wall_s)
+    return Answer([Outcome(status, reason)] * len(job.seeds), wall_s, cpu_s)
 
 
 def perform(job: Job) -> Answer:

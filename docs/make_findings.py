@@ -12,11 +12,12 @@ import re
 import shutil
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import jinja2
 import pandas as pd
 
+from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import next_goal
 from coartic.analysis.study import load
@@ -36,7 +37,7 @@ KEPT = {
     "agents": ("variants contexts signatures", ""),
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),
-    "horizon": ("horizon horizon-beside horizon-signs claims", "horizon"),
+    "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
@@ -86,13 +87,15 @@ def claim(name: str, suite: str = "") -> Row:
     return Row(claims(suite).loc[name])
 
 
-def verdicts(suite: str = "", printed: bool | None = None) -> dict[str, int]:
-    """How many claims have each verdict: all, or those on printed (or on reconstructed) goals."""
+def verdicts(suite: str = "", *, others: bool = False) -> dict[str, int]:
+    """How many of the claims that count have each verdict; ``others``: without the three that carry
+    the paper's point."""
     judged = claims(suite)
-    if printed is not None:
-        judged = judged[judged.statement.str.endswith("†") != printed]
+    judged = judged[judged.uncounted.isna()]
+    if others:
+        judged = judged[[not CLAIMS[name].short for name in judged.index]]
     counts = judged.verdict.value_counts()
-    return {str(verdict): int(count) for verdict, count in counts.items()}
+    return {verdict: int(counts.get(verdict, 0)) for verdict in get_args(Verdict)}
 
 
 def seen(evidence: str, words: str, which: int = 0) -> str:
@@ -100,7 +103,7 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
 
     Raises IndexError if there is none.
     """
-    estimate = r"\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
+    estimate = r":?\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
     return str(re.findall(re.escape(words) + estimate, evidence)[which])
 
 

@@ -205,8 +205,6 @@ def claims() -> Iterator[str]:
     def goals(claim: Any) -> str:
         if claim.families:
             return "random tasks"
-        if claim.chosen:
-            return "used to choose the goals"
         return "reconstructed †" if claim.fitted else "printed"
 
     def source(claim: Any) -> str:
@@ -218,10 +216,13 @@ def claims() -> Iterator[str]:
         for by_task in (claim.pairs, claim.runs, claim.cells):
             for task, names in by_task.items():
                 what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
-        power = f" Power, stated before suite `{claim.suite}` was run: {claim.power}."
+        before = f"Power, stated before suite `{claim.suite}` was run: "
+        before = "" if claim.power.startswith("Written after") else before
+        power = f" {before}{claim.power}."
         return (
             f"{text[0].upper()}{text[1:]}."
             + (f" *{'; '.join(what)}.*" if what else "")
+            + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
             + (power if claim.power else "")
         )
 

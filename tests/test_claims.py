@@ -758,7 +758,7 @@ def test_the_register_on_runs(study):
     for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
         assert entries[name].verdict != "not supported"
     sacrificed = entries["first-movement-sacrificed"]
-    assert "(random guesses (placebo))" in sacrificed.finding.evidence
+    assert "(random guesses)" in sacrificed.finding.evidence
     assert "one goal" not in sacrificed.finding.evidence  # not in this folder
     assert len(sacrificed.run_ids) == 24
     assert set(sacrificed.run_ids) <= set(study.runs.run_id)

@@ -11,7 +11,7 @@ from coartic.analysis import tables
 from coartic.analysis.claims import data, judge
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.generality.sample import one_by_one, sample, signs
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
 from coartic.tasks.families import names_in
 from tests.support.made_up import MadeUp, row, study_of
@@ -48,7 +48,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
-                if (label == EC1) == (family in ONE) or label == INITIAL:
+                if (label == EC1) == (family in ONE) or label in (INITIAL, PLACEBO):
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
@@ -113,10 +113,11 @@ def test_what_hands_make_of_a_contrast():
     assert arm.by_hands == pytest.approx((-536 + 556) / 500)  # the best run of either
 
 
-def made_up_signs(study, hand=1.0, waiting=0.3):
+def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
+    """Signs of the learner, and of the placebo: that share of them, more by a little."""
     by_cell = {}
     for name in study.tasks:
-        for label in (EC1, EC2, EC3, EC4):
+        for label in (EC1, EC2, EC3, EC4, PLACEBO):
             if (name, label) in study.cells:
                 number = int(name[-3:])
                 values = {
@@ -124,9 +125,12 @@ def made_up_signs(study, hand=1.0, waiting=0.3):
                     "first": np.array([5.0, 6.0 + 0.1 * number]),
                     "whole": np.array([9.0, 8.0 + 0.1 * number]),
                 }
-                if label != EC1:
+                if len(study.tasks[name].hands) > 1:
                     values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
                     values["other arm"] = np.array([waiting + 0.01 * number])
+                if label == PLACEBO:
+                    off = 0.001 * (number - 2)
+                    values = {sign: placebo * of + off for sign, of in values.items()}
                 by_cell[name, label] = values
     return by_cell
 
@@ -150,7 +154,8 @@ def test_presence():
 def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
     monkeypatch.setattr(data, "initial_solution", lambda task, model: alone)
-    study = with_signs(rewarded({**RISING, EC4: lambda n: -540 - n}, families=ONE + TWO))
+    centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
+    study = with_signs(rewarded(centres, families=ONE + TWO))
     entries = {entry.claim.id: entry for entry in judge.judged(study)}
     assert set(entries) == {
         name for name, claim in CLAIMS.items() if claim.families and not claim.suite
@@ -164,6 +169,10 @@ def test_claims_of_generality(monkeypatch):
         entry = entries[f"{name}-in-general"]
         assert entry.verdict == "supported", entry.finding.evidence
         assert entry.adjusted_p < 0.05
+    guessed = with_signs(rewarded(centres, families=ONE + TWO), placebo=1.0)
+    entries_of_guesses = {entry.claim.id: entry for entry in judge.judged(guessed)}
+    for name in ("other-arm-coarticulation-in-general", "arm-coarticulation-in-general"):
+        assert entries_of_guesses[name].verdict == "undecided"  # no more than guessing shows
     ensured = entries["corrective-ensures-in-general"]
     assert ensured.verdict == "supported"
     jerk = entries["beats-inaccurate-in-general"]
@@ -173,7 +182,7 @@ def test_claims_of_generality(monkeypatch):
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    study = with_signs(rewarded(RISING, families=ONE + TWO))
+    study = with_signs(rewarded(RISING | {PLACEBO: -580}, families=ONE + TWO), placebo=0.1)
 
     def verdict(more):
         for (task, label), values in signs(study).items():

@@ -19,7 +19,7 @@ from coartic.model import PAPER
 from tests.support.suites import KNOWN, run_and_write
 
 METHODS = """
-import os, signal, sys, tempfile, time
+import itertools, os, signal, sys, tempfile, time
 import numpy as np
 import coartic.benchmarks.outcome, coartic.benchmarks.worker, coartic.motion.solution
 from coartic.method import Information, Method, MethodError, Parameters, Result
@@ -45,7 +45,13 @@ class Again(Does):
 """
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs": ("time.sleep(99)", "timeout", "time limit of 2 s exceeded"),
+    "hangs": ("time.sleep(999)", "timeout", "wall time limit of 6 s exceeded"),
+    "burns": ("while True: pass", "timeout", "CPU time limit of 2 s exceeded"),
+    "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 2 s exceeded"),
+    "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
+                       "        return Result(corrected(session))", "ok", ""),
+    "sleeps": ("time.sleep(2.5)  # more than its limit\n"
+               "        return Result(corrected(session))", "ok", ""),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
     "is_killed": ("os.kill(os.getpid(), signal.SIGKILL)", "crashed", "killed by SIGKILL"),
@@ -99,8 +105,9 @@ def runs(tmp_path_factory):
     cells = [Cell(task, does, (("what", name),)) for name in HANDLED]
     cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
     study = run_and_write(
-        folder / "out", cells, executor=Local(2), runs=1, time_limit_s=2.0, trial_budget=3
-    )
+        folder / "out", cells, executor=Local(2, wall_times=10), runs=1, time_limit_s=2.0,
+        trial_budget=3,
+    )  # fmt: skip
     return study.runs.set_index("label")
 
 
@@ -112,8 +119,26 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert words in run.reason
     assert run.reason.isprintable()
     died = name in ("exits", "is_killed")  # after it had waited for others, maybe
-    assert run.isna().wall_s == died
+    assert run.isna().wall_s == (died or "CPU" in words)
+    assert run.isna().cpu_s == (died or "wall" in words)
     assert run.isna().reward if status != "ok" else run.reward == HONEST
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")
+def test_other_work_on_the_core_changes_no_outcome(tmp_path):
+    """A run that has three beside it takes less CPU time than its limit, and more wall time."""
+    burn = """os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        end = time.process_time() + self.seconds
+        while time.process_time() < end: pass
+        return Result(corrected(session))"""
+    names = ["short", "long", "longer", "longest"]
+    seconds = {name: "0.7" if name == "short" else "99" for name in names}
+    bodies = [(name, burn.replace("self.seconds", seconds[name])) for name in names]
+    task, (does, _) = load_task("ascending"), entries(tmp_path, bodies)
+    cells = [Cell(task, does, (("what", name),)) for name in names]
+    study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=1.5)
+    assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
+    assert set(study.runs.reason[1:]) == {"CPU time limit of 1.5 s exceeded"}
 
 
 def test_no_run_is_ok_without_a_solution():

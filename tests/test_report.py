@@ -10,11 +10,15 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
+from coartic.analysis.claims.judge import judge
+from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.figures import FIGURES
+from coartic.analysis.methods import name_of
 from coartic.analysis.report import facts, numbers, render
 from coartic.analysis.report.build import SECTIONS, report_files
 from coartic.analysis.report.text import answers, environment
 from coartic.analysis.report.trace import runs_of, tables_of
+from coartic.analysis.study import Study
 from coartic.analysis.tables import TABLES
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
@@ -165,6 +169,36 @@ def test_summary_is_the_first_screen(traced, report):
     for answer in answers(traced):
         assert answer["text"] in text
     assert len(text.split()) <= 250
+
+
+def test_answers_name_failed_runs_behind_them(traced):
+    assert not any("failed" in answer["text"] for answer in answers(traced))
+    planner, learner = "trajectory-optimisation/path-length", "dual-process/EC4"
+    runs = traced.runs.reset_index(drop=True)
+    late = runs.index[(runs.method == learner) & (runs.variant == "")][-1:]
+    late = late.append(runs.index[runs.method == planner])
+    runs.loc[late, "status"], runs.loc[late, "reward"] = "timeout", pd.NA
+    runs.loc[late, "reason"] = "CPU time limit of 600 s exceeded"
+    spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
+    told = {answer["word"]: answer["text"].partition(" failed") for answer in answers(spoiled)}
+    of = len(spoiled.cells["two-armed-1", learner].runs)
+    assert not told["Coarticulation"][1]  # the learner's on one-armed tasks
+    assert told["Nearest"][0].endswith(f" 2 of {of + 1} runs of {name_of(planner)} and learner EC4")
+    assert told["Nearest"][2] == ", which bars a method from the ranking."
+    assert told["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")  # a planner makes no trials
+    assert told["Cost"][2] == " and count as reaching nothing."
+
+
+def test_claims_without_their_runs_are_named(traced):
+    entries = judge(traced, [CLAIMS["context"]])
+    assert not entries[0].finding.failed
+    runs = traced.runs.assign(status="crashed")
+    spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
+    (entry,) = judge(spoiled, [CLAIMS["context"]])
+    assert ("ascending", "dual-process/EC1") in entry.finding.failed
+    failed = facts.failed_behind(spoiled, entry.finding.failed)
+    assert failed["failed"] == failed["runs"] > 0
+    assert failed["who"] == "learner EC1"
 
 
 def test_few_runs_say_so(tmp_path):

@@ -122,6 +122,24 @@ def test_a_context_counts_where_it_exceeds_the_placebos():
     assert math.isnan(beyond_p((noise[2][:1], noise[3]), placebo, rng()))
 
 
+def test_slopes_count_where_they_exceed_the_placebos():
+    """Three places of a goal: the contrast of their means is the slope, and what is tested."""
+    x = np.array([-1.0, 0.0, 1.0])
+    contrast = x / (x**2).sum()
+    noise = rng(8).standard_normal((6, 12, 2)) * 0.1
+
+    def follows(slope, samples):
+        return [q + slope * place for q, place in zip(samples, x, strict=True)]
+
+    steep, flat = follows(0.5, noise[:3]), follows(0.2, noise[3:])
+    assert beyond_p(steep, flat, rng(), contrast=contrast) < 0.001
+    assert beyond_p(flat, steep, rng(), contrast=contrast) == 1.0
+    assert beyond_p(follows(0.2, noise[:3]), flat, rng(), contrast=contrast) > 0.05
+    # What is common to all places is no slope.
+    moved = [q + 3.0 for q in flat]
+    assert beyond_p(moved, flat, rng(), contrast=contrast) > 0.05
+
+
 def test_pairs_of_contexts():
     tasks = {name: load_task(name) for name in ("ascending", "descending", "two-armed-1")}
     assert context_pairs(tasks) == [("ascending", "descending", 1)]

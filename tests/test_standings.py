@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
+from coartic.analysis import tables
 from coartic.analysis.comparisons.methods import BY_TRIAL, UNTOLD, group_of
-from coartic.analysis.comparisons.reached import WAY, Targets, price, targets
+from coartic.analysis.comparisons.reached import WAY, Targets, halfway, price, targets
 from coartic.analysis.comparisons.standings import (
     ALL_TASKS,
     apart,
@@ -19,6 +20,7 @@ from coartic.analysis.comparisons.standings import (
     standings,
 )
 from coartic.analysis.optima import KnownOptimum
+from coartic.analysis.report import facts
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import initial_reward
 from coartic.tasks.task import Penalty
@@ -157,3 +159,83 @@ def test_the_initial_reward_loses_the_penalty():
     without, initial = (initial_reward(task, seen.model) for task in (plain, dear))
     assert initial < -340 < without
     assert initial_and_optimum(seen) == {"ascending": (initial, -340)}
+
+
+SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])
+TEN = {("ascending", "dual-process/EC1"): list(SPREAD - 303),
+       ("two-armed-1", "dual-process/EC4"): list(SPREAD - 485)}  # fmt: skip
+
+
+def strangers(*methods, runs):
+    """Rows of methods from files, each so many ticks better than the learner on both tasks."""
+    return {
+        (task, name): [mean + better + (-1) ** k for k in range(runs)]
+        for name, better in methods
+        for task, mean in (("ascending", -303), ("two-armed-1", -485))
+    }
+
+
+def test_a_method_from_a_file_changes_nobody_elses_p():
+    """Holm's correction is over one method's tasks, and a difference to the best is one test."""
+    alone = study(TEN | strangers(("mine", 2), runs=10))
+    beside = study(TEN | strangers(("mine", 2), ("yours", 3), ("theirs", 0), runs=10))
+    mine = tables.TABLES["against-learner"](alone).loc[["ascending mine", "two-armed-1 mine"]]
+    again = tables.TABLES["against-learner"](beside).loc[mine.index]
+    assert mine.p_holm.tolist() == again.p_holm.tolist()
+    assert (mine.p_holm < 0.05).all()
+    learner = leaders(beside, BY_TRIAL).set_index("method").p["dual-process (EC1, EC4)"]
+    without = study(TEN | strangers(("mine", 2), ("yours", 3), runs=10))
+    assert leaders(without, BY_TRIAL).set_index("method").p["dual-process (EC1, EC4)"] == learner
+
+
+def test_a_test_that_cannot_reject_counts_nothing():
+    """Three runs of learner and plan have p of 2/27 and 2/729 at least; ten tell them apart."""
+    few = {key: rewards[:3] for key, rewards in TEN.items()}
+    plan = {(task, "my-plan"): [reward] for task, reward in
+            (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
+    for rewards, runs in ((few, 3), (TEN, 10)):
+        seen = study(rewards | plan)
+        declared = replace(seen.plan.methods["my-plan"], stochastic=False)
+        seen.plan.methods["my-plan"] = declared
+        rows = tables.TABLES["against-learner"](seen)
+        least = rows.least_p["ascending my-plan"]
+        assert least == pytest.approx(2 / 27 if runs == 3 else 1e-4)
+        row_of = tables.ranking(seen).loc["my-plan"]
+        if runs == 3:
+            assert math.isnan(row_of.better)
+            assert math.isnan(row_of.worse)
+        else:
+            assert (row_of.better, row_of.worse) == (2, 0)
+
+
+def test_a_method_from_a_file_stands_with_its_parameters():
+    """In ranking, tests and headline; a setting of a built-in method is a variant."""
+    rewards = TEN | strangers(("mine", 2), ("random-search/climbing", 5), runs=10)
+    seen = study(rewards)
+    learns = seen.runs.method.str.contains("/EC")
+    runs = seen.runs.assign(variant=np.where(learns, "", "width=0.2"))
+    again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
+    ranked = tables.ranking(again)
+    assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
+    assert not any("climbing" in name for name in ranked.index)
+    assert ranked.better["mine width=0.2"] == 2
+    assert [each["method"] for each in facts.nearest(again)["from_files"]] == ["mine width=0.2"]
+
+
+def test_trials_to_the_middle_of_the_way():
+    """The median of three runs by task: 4, 6 and never; never, never and 2."""
+    half = {"ascending": -305, "two-armed-1": -570}  # of -319 to -292, and of -675 to -465
+    start = {"ascending": -319, "two-armed-1": -675}
+    at = {"ascending": (4, 6, None), "two-armed-1": (None, None, 2)}
+    seen = study({("ascending", "dual-process/EC1"): [-300] * 3,
+                  ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
+    rewards = {}
+    for (task, _), cell in seen.cells.items():
+        for run_id, trial in zip(cell.runs.run_id, at[task], strict=True):
+            trials = np.full(10, float(start[task]))
+            if trial is not None:
+                trials[trial - 1] = half[task]
+            rewards[run_id] = trials
+    vars(seen)["rewards"] = lambda: iter(rewards.items())
+    middle = halfway(seen, "dual-process (EC1, EC4)")
+    assert middle == {"ascending": 6.0, "two-armed-1": math.inf}

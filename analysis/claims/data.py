@@ -15,7 +15,7 @@ from coartic.analysis.methods import LEARNER, PLACEBO, most_exploring
 from coartic.analysis.published import TRIALS
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST
-from coartic.analysis.study import Study
+from coartic.analysis.study import CellKey, Study
 from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
 from coartic.learner.kernel import TENTHS
 from coartic.robot import Array
@@ -35,6 +35,8 @@ class Data:
     study: Study
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
+    failed: list[CellKey] = field(default_factory=list)
+    """Cells that were asked for so far and not read, as some of their runs failed."""
 
     def label(self, task: str, who: str) -> str:
         """Label of a method: ``EC4`` is the learner's, ``EC`` its that explores most on a task."""
@@ -52,6 +54,7 @@ class Data:
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {method} on {task}")
         if len(cell.good) < len(cell.runs):
+            self.failed.append((task, method))
             failed = len(cell.runs) - len(cell.good)
             raise MissingError(
                 f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, so "

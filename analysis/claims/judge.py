@@ -8,12 +8,13 @@
   that the paper's text admits support it.
 - *Undecided*: none of these, or the folder lacks the runs.
 
-A claim that is not about the model, or that follows from what chose our goals or constants, has a
-verdict as well, but does not count (``uncounted``).
+A claim that is not about the model, that follows from what chose our goals or constants, or whose
+rule is flawed has a verdict as well, but does not count (``uncounted``).
 
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
 groups of claims: those on the paper's own seven cells, those that take other runs beside them,
-those on families of random tasks, and our own on one suite. A claim that a folder cannot
+those on families of random tasks, our own on one suite, and flawed ones of our own on one. A claim
+that a folder cannot
 test counts in its group all the same, so that what is decided stays decided whatever else is run.
 """
 
@@ -140,7 +141,9 @@ def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     try:
         finding = RULES[claim.rule](data, claim)
     except MissingError as missing:
-        return Finding(None, f"Not judged: {missing}."), ()
+        words = f"Not judged: {missing}."
+        return Finding(None, words, failed=tuple(dict.fromkeys(data.failed))), ()
+    finding = replace(finding, failed=tuple(dict.fromkeys(data.failed)))
     if claim.exact:
         finding = replace(finding, tests=(), against=None)
     return finding, tuple(dict.fromkeys(data.run_ids))

@@ -19,9 +19,9 @@ HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
-Group = Literal["paper", "beside", "families", "ours"]
+Group = Literal["paper", "beside", "families", "ours", "flawed"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; and claims of our own, those on one suite."""
+families of random tasks; claims of our own, those on one suite, and those that are flawed apart."""
 
 _HANDS = "[LR]+"
 QUANTITIES = {
@@ -89,6 +89,8 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Inference, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
+    failed: tuple[tuple[str, str], ...] = ()
+    """Cells that it lacks, as some of their runs failed: task, and label of the method."""
 
 
 class Claim(FileData):
@@ -124,7 +126,7 @@ class Claim(FileData):
         if self.exact:
             return None
         if not self.place:
-            return "ours"
+            return "flawed" if self.uncounted else "ours"
         if self.families:
             return "families"
         return "beside" if self.beside else "paper"

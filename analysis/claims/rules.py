@@ -68,12 +68,19 @@ def higher(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap test of the mean reward for each comparison"""
     tests, parts = [], []
     for task, pairs in claim.pairs.items():
+        before = None
         for first, second, margin in map(read_comparison, pairs):
             a, b = data.values(task, first), data.values(task, second)
             same_runs = b.ndim and (first.who, first.hands) == (second.who, second.hands)
             compare = (a - b, margin) if same_runs else (a - margin, b)
             tests.append(bootstrap_test(*compare))
-            parts.append((first.what, f"{task}, {first}: {compared(task, first, second, a, b)}"))
+            seen = compared(task, first, second, a, b)
+            if first == before:  # its value was said
+                words = f"{task}, {first} {seen[seen.index('against') :]}"
+            else:
+                words = f"{task}, {first}: {seen}"
+            parts.append((first.what, words))
+            before = first
     return all_hold(tests, [*parts, *shown_beside(data, claim)])
 
 
@@ -311,7 +318,7 @@ def compared(task: str, first: Side, second: Side, a: Array, b: Array) -> str:
         return seen if b == 0 else f"{seen} against {second.who}"
     if not b.ndim:
         seen += f" against {number(float(b))} ({second})"
-    elif first.what != second.what:
+    elif first.what.removeprefix("replayed-") != second.what.removeprefix("replayed-"):
         return f"{seen}, {second.what} {in_words(second.what, b)}"
     else:
         ticks = in_ticks(first.what)

@@ -26,6 +26,7 @@ from coartic.analysis.studies.objectives import TERMS, WHO, advantage
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import estimate
 from coartic.motion.costs import joint_costs, segment_lengths
+from coartic.tasks.task import MOST_GOALS
 
 RESAMPLES_OF_STUDIES = 99_999
 """Resamples of a test, as many as on families of tasks: p-values are corrected over many claims."""
@@ -48,9 +49,9 @@ def gaps_by_horizon(study: Study) -> pd.DataFrame:
     """Gaps of the planner on every random task, a row for each: per cent of the shortest.
 
     Indexed by task, ``hands`` and ``costs``; columns :data:`HORIZONS`, missing where nothing was
-    run. A horizon that sees all goals of a task is that with all. Of ticks, over the best known of
-    the task; with costly joints of the weighted path length that was executed, over the shortest
-    of all runs with the same costs.
+    run and where the task has not so many goals ahead: a task with five has four at its first
+    movement. Of ticks, over the best known of the task; with costly joints of the weighted path
+    length that was executed, over the shortest of all runs with the same costs.
     """
     references = instances.references if (instances := sample(study)) else {}
     lengths: dict[tuple[str, str, str], dict[int, float]] = {}
@@ -73,8 +74,8 @@ def gaps_by_horizon(study: Study) -> pd.DataFrame:
         shortest = -float(references[name].reward)
         if costly != "none":
             shortest = min(by_horizon.values())
-        seen = [last if h == ALL_GOALS else min(int(h), last) for h in HORIZONS]
-        there = [by_horizon.get(h, math.nan) for h in seen]
+        seen = [last if h == ALL_GOALS else int(h) for h in HORIZONS]
+        there = [by_horizon.get(h, math.nan) if h <= last else math.nan for h in seen]
         rows[name, hands, costly] = 100 * (np.array(there) / shortest - 1)
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(HORIZONS))
     frame.index = pd.MultiIndex.from_tuples(list(rows), names=["task", "hands", "costs"])
@@ -93,7 +94,7 @@ def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataF
     gaps = gaps_by_horizon(data.study)
     places = gaps.index.to_frame()
     judged = places.task.map(lambda name: reported(data, name)).astype(bool)
-    chosen = gaps[(places.hands == hands) & (places.costs == costs) & judged]
+    chosen = gaps[(places.hands == hands) & (places.costs == costs) & judged].copy()
     chosen = chosen.droplevel(["hands", "costs"])
     runs = data.study.runs
     data.run_ids.extend(runs[(runs.method == PLANNER) & runs.task.isin(chosen.index)].run_id)
@@ -131,17 +132,38 @@ def one_sentence(parts: list[str]) -> str:
     return f"{words[0].upper()}{words[1:]}."
 
 
-def first_goal_ahead_gains_most(data: Data, _: Claim) -> Finding:
+def goals_ahead(study: Study, gaps: pd.DataFrame) -> pd.Series:
+    """How many goals are ahead at the first movement, of each row of :func:`gaps_by_horizon`."""
+    names = gaps.index.get_level_values("task")
+    return pd.Series([len(study.tasks[name].goals) - 1 for name in names], gaps.index, dtype=int)
+
+
+def judged_gaps(data: Data, claim: Claim, costs: str = "none") -> tuple[pd.DataFrame, pd.Series]:
+    """Gaps by horizon as a claim takes them, and how many goals each task has ahead.
+
+    A claim that is not counted takes goals that a task does not have for goals that gain nothing:
+    beyond its last goal its gap is that with all goals in view.
+    """
+    gaps = gaps_of(data, costs=costs)
+    ahead = goals_ahead(data.study, gaps)
+    if not claim.uncounted:
+        return gaps, ahead
+    for h in HORIZONS[:-1]:
+        gaps[h] = gaps[h].where(ahead >= h, gaps[ALL_GOALS])
+    return gaps, pd.Series(MOST_GOALS, gaps.index)
+
+
+def first_goal_ahead_gains_most(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap test over random tasks of the difference of both gains"""
-    gaps = gaps_of(data)
+    gaps, ahead = judged_gaps(data, claim)
     gained, left = gaps[0] - gaps[1], gaps[1] - gaps[ALL_GOALS]
     sentence = "The first goal ahead gains {} points more than all others together"
-    return finding({sentence: (gained - left, 0.0, 1)})
+    return finding({sentence: ((gained - left).where(ahead > 1), 0.0, 1)})
 
 
-def further_goals_gain_little(data: Data, _: Claim) -> Finding:
+def further_goals_gain_little(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap tests over random tasks of the gains against {gain:g} %"""
-    gaps, least = gaps_of(data), MARGINS["gain"]
+    (gaps, _), least = judged_gaps(data, claim), MARGINS["gain"]
     return finding(
         {
             "The second goal ahead gains {} points": (gaps[1] - gaps[2], least, 1),
@@ -162,14 +184,14 @@ the loss"""
     return finding({sentence: (given - share * planned, 0.0, 1)})
 
 
-def dear_joints_keep_the_horizon(data: Data, _: Claim) -> Finding:
+def dear_joints_keep_the_horizon(data: Data, claim: Claim) -> Finding:
     """one-tailed bootstrap tests over random tasks of the gains against {gain:g} %, by costs"""
     parts, least = {}, MARGINS["gain"]
     for costs in DEAR:
-        gaps = gaps_of(data, costs=costs)
+        gaps, ahead = judged_gaps(data, claim, costs)
         dear = f"with a dear {costs.replace('-', ' ')}"
         parts[f"{dear} the second goal ahead gains {{}} points"] = gaps[1] - gaps[2], least, 1
-        beyond = gaps[4] - gaps[ALL_GOALS]
+        beyond = (gaps[4] - gaps[ALL_GOALS]).where(ahead > 4)
         parts[f"{dear} those beyond the fourth gain {{}} points together"] = beyond, least, -1
     return finding(parts)
 

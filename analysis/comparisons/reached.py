@@ -243,7 +243,7 @@ def halfway(study: Study, method: str) -> dict[str, float]:
         runs = [best_so_far(study)[str(run_id)] for run_id in ids]
         spent = spent_at(runs, "trials", *scale[str(row.task)])[:, list(WAY).index(0.5)]
         medians[str(row.task)] = float(np.quantile(spent, 0.5, method="inverted_cdf"))
-    return medians
+    return {name: medians[name] for name in scale if name in medians}
 
 
 @cached

@@ -3,22 +3,20 @@ and models beside people."""
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic.analysis.claims.studies import HORIZONS
+from coartic.analysis.claims.studies import ALL_GOALS, HORIZONS
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.human import judge
 from coartic.analysis.human.measures import MODELS
-from coartic.analysis.methods import name_of
 from coartic.analysis.studies.objectives import TERMS, WHO
 from coartic.analysis.study import Study
-from coartic.analysis.tables.studies import SMOOTH, horizon_beside
+from coartic.analysis.tables.studies import BEYOND, SMOOTH
 from coartic.analysis.tables.studies import crossings as crossings_table
 from coartic.analysis.tables.studies import horizon as horizon_table
 from coartic.analysis.tables.studies import human as human_table
@@ -33,46 +31,40 @@ COLORS = (style.INK, style.BLUE, style.VERMILLION, style.GREEN)
 @figure(
     "horizon",
     "Gap of a planner by how far it looks ahead",
-    "Gap to the best known solution, mean over random tasks with its "
-    f"{style.CONFIDENCE} interval (bootstrap over tasks), linear below 1 %. All tasks: also by "
-    "family (thin), and other methods where the planner has the same gap on their tasks. Given "
-    "hands: hands chosen by each plan, or those of the plan with all goals. Dear joints cost "
-    "three times as much, by weighted path length.",
+    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    "(bootstrap over tasks), linear below 1 %, at horizons that all of a line's tasks have. By "
+    "goals of the task: a line ends where all goals are in view. Given hands: hands chosen by each "
+    "plan, or those of the plan with all goals. Dear joints cost three times as much, by weighted "
+    "path length.",
 )
 def horizon(study: Study) -> Parts:
-    """The curve over all tasks, with given hands, and with dear joints."""
+    """The curves by number of goals, with given hands, and with dear joints."""
     data = horizon_table(study)
     if not len(data):
         raise missing(study, "no runs of the planner on instances of a family of tasks")
-    titles = {"all": "all tasks", "hands": "given hands", "costs": "dear joints"}
+    titles = {"goals": "goals of the task", "hands": "given hands", "costs": "dear joints"}
     groups = [group for group in titles if (data.group == group).any()]
     drawing, panels = style.figure_of((1, len(groups)), (style.TWO, 2.6), sharey=True)
-    everywhere = panels[0]
-    families = data[data.group == "family"]
-    for color, (name, rows) in zip(style.PALETTE, families.groupby("value"), strict=False):
-        line: Any = {"color": color, "linewidth": 0.7}
-        everywhere.plot(rows.h.map(PLACES.index), 100 * rows.gap, **line, label=name)
     for axes, group in zip(panels, groups, strict=True):
         parts = data[data.group == group].groupby("value", sort=False)
-        for number, (color, (name, rows)) in enumerate(zip(COLORS, parts, strict=False)):
+        for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
+            if group == "goals" and BEYOND not in set(rows.h):
+                rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
+            rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
             curve(axes, rows, color, 0.08 * number, str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])
-        if axes is not everywhere:
-            axes.legend(loc="upper right")
-    beside(everywhere, horizon_beside(study))
-    everywhere.set_yscale("symlog", linthresh=1, linscale=0.6)
-    everywhere.set_yticks(
-        [0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"]
-    )
-    everywhere.set_ylim(bottom=-0.1)
-    everywhere.set_ylabel("gap (%)")
+        axes.legend(loc="upper right")
+    first = panels[0]
+    first.set_yscale("symlog", linthresh=1, linscale=0.6)
+    first.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
+    first.set_ylim(bottom=-0.1)
+    first.set_ylabel("gap (%)")
     style.letters(panels)
-    style.legend(drawing, everywhere.get_legend_handles_labels()[0], 5)
-    of_all = data[data.group == "all"]
-    each = (f"{h} ahead: {gap:.1%}" for h, gap in zip(of_all.h, of_all.gap, strict=True))
-    return drawing, data, f"Gap by goals in view. {'; '.join(each)}.", ()
+    gained = data[(data.group == "all") & data.gain.notna()]
+    each = (f"{h} ahead: {gain:.1%}" for h, gain in zip(gained.h, gained.gain, strict=True))
+    return drawing, data, f"Gain of each goal ahead where it exists. {'; '.join(each)}.", ()
 
 
 def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -> None:
@@ -81,20 +73,6 @@ def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -
     line: Any = {"color": color, "marker": "o", "markersize": 3, "linewidth": 1.2}
     axes.vlines(places, 100 * rows.gap_low, 100 * rows.gap_high, color=color, linewidth=0.9)
     axes.plot(places, 100 * rows.gap, **line, label=name)
-
-
-def beside(axes: Axes, rows: pd.DataFrame) -> None:
-    """Other methods at the horizons that they are equivalent to."""
-    over_all = rows[rows.arms == "all"].to_dict("records")
-    looks = style.looks([row["method"] for row in over_all])
-    for row, marker in zip(over_all, itertools.cycle("sD^v"), strict=False):
-        look = looks[row["method"]]
-        at, gap = row["horizon"], 100 * row["gap"]
-        thin: Any = {"color": look["color"], "linewidth": 0.8, "zorder": 4}
-        axes.hlines(gap, row["horizon_low"], row["horizon_high"], **thin)
-        axes.vlines(at, 100 * row["gap_low"], 100 * row["gap_high"], **thin)
-        mark: Any = {"color": look["color"], "marker": marker, "markersize": 5, "zorder": 5}
-        axes.plot(at, gap, linestyle="", **mark, label=name_of(row["method"]))
 
 
 STOP_LOOKS = {
@@ -112,7 +90,7 @@ TIMES = {"free": ("free times", style.SOLID), "fixed": ("equal times", style.DAS
     "What a stop at the goals leaves of coarticulation",
     "Smooth plans from passing through the goals (0) to a full stop at each (1), means over tasks, "
     f"of random ones with their {style.CONFIDENCE} interval. a: ticks by which postures leave the "
-    "next goal nearer, against the corrective process's; they come of redundancy. b: the angle by "
+    "next goal nearer, against the corrective process's. b: the angle by "
     "which the path turns at goals, which passing makes 0. Movements have a constant speed here, "
     "so that the direction is all that is left of a plan's velocity.",
 )

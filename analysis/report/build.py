@@ -189,7 +189,7 @@ def title(study: Study) -> str:
 
 
 def claims_for_page(study: Study) -> list[dict[str, str]]:
-    """Claims as the template wants them, supported ones first, those used for choosing last."""
+    """Claims as the template wants them: by verdict, and first those that count."""
     order = get_args(Verdict)
     rows = tables.claims(study).reset_index(names="id")
     of = facts.claims(study)
@@ -199,12 +199,15 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
         {
             **{
                 key: str(row[key])
-                for key in ("id", "statement", "verdict", "evidence", "test", "quote")
+                for key in ("id", "statement", "verdict", "uncounted", "evidence", "test", "quote")
             },
             "tone": TONES[row["verdict"]],
             "place": ", ".join(filter(None, (row["place"], CLAIMS[row["id"]].figure))),
             "ensemble": row["ensemble"] or NONE,
             "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }
-        for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["verdict"]))
+        for row in sorted(
+            rows.to_dict("records"),
+            key=lambda row: (bool(row["uncounted"]), order.index(row["verdict"])),
+        )
     ]

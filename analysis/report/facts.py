@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
+import numpy as np
+
 from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
-from coartic.analysis.claims.register import MARGINS
-from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD
+from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.comparisons.paper import beside_paper
 from coartic.analysis.comparisons.reached import halfway
 from coartic.analysis.comparisons.reached import price as price_by_method
-from coartic.analysis.comparisons.standings import leaders
+from coartic.analysis.comparisons.standings import initial_and_optimum, leaders
 from coartic.analysis.generality.sample import one_by_one, sample
 from coartic.analysis.human import judge
 from coartic.analysis.methods import (
@@ -26,6 +28,7 @@ from coartic.analysis.methods import (
     KNOWN_METHODS,
     LEARNER,
     is_learner,
+    is_search,
     is_variant,
     main_methods,
     most_exploring,
@@ -36,12 +39,50 @@ from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import smallest_p
 from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellKey, Study, cached
 from coartic.analysis.tables.paper import best_condition
 
 Facts = dict[str, Any]
 PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
 """Terms of a penalty in words."""
+FURTHER = {"2": "the second", "3": "the third", "4": "the fourth", "5+": "the others together"}
+"""Goals ahead beyond the first in words."""
+
+
+def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
+    """How many runs of the cells behind an answer failed, and whose; None where none did.
+
+    ``runs`` are all of the methods of which some failed.
+    """
+    runs, failed = Counter[str](), Counter[str]()
+    for task, label in dict.fromkeys(cells):
+        cell = study.cells[task, label]
+        runs[label] += len(cell.runs)
+        failed[label] += len(cell.runs) - len(cell.good)
+    who = [label for label in failed if failed[label]]
+    if not who:
+        return None
+    names = " and ".join(map(name_of, who)) if len(who) < 3 else f"{len(who)} methods"
+    return {"failed": failed.total(), "runs": sum(runs[label] for label in who), "who": names}
+
+
+def failed_of(study: Study, label: str) -> Facts | None:
+    """:func:`failed_behind` an answer about one method."""
+    return failed_behind(study, (cell for cell in study.cells if cell[1] == label))
+
+
+def failed_compared(study: Study, *groups: str) -> Facts | None:
+    """:func:`failed_behind` an answer that compares methods on tasks with a known optimum."""
+    tasks = initial_and_optimum(study)
+    return failed_behind(
+        study,
+        (
+            (task, label)
+            for task, label in study.cells
+            if task in tasks and not is_variant(label) and not is_search(label)
+            if not groups or group_of(study, label) in groups
+        ),
+    )
 
 
 @cached
@@ -75,6 +116,7 @@ def coarticulation(study: Study) -> Facts | None:
         "beyond": beyond,
         "replayed": replayed.apart if all(replayed.runs) else math.nan,
         "row": f"{shared.tasks[0].name} {shared.method} goal {shared.goal} {shared.hand}",
+        "failed": failed_behind(study, [(task.name, shared.method) for task in shared.tasks]),
     }
 
 
@@ -86,12 +128,16 @@ def slopes(study: Study) -> Facts | None:
     """
     rows = tables.slopes(study)
     rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
-    rows = rows.assign(seen=rows.p_holm < LEVEL, size=rows.slope.abs())
+    # A method that selects its solution from trials has to exceed the placebo as well.
+    chosen = [selects(study, str(label)) for label in rows.method]
+    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
+    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
     for label in (*CONDITIONS, *main_methods(rows.method)):
         of_method = rows[rows.method == label].sort_values(["seen", "size"])
         for row in of_method.tail(1).to_dict("records"):
             words = {"method": name_of(label), "joint": str(row["joint"]).replace("_", " ")}
-            return {str(key): value for key, value in row.items()} | words
+            failed = {"failed": failed_of(study, label)}
+            return {str(key): value for key, value in row.items()} | words | failed
     return None
 
 
@@ -113,6 +159,7 @@ def gain(study: Study) -> Facts | None:
         # Ticks by which the first movement is slower than the corrective process's.
         changes = study.trajectories(best["task"], best["label"]).against_same_hands
         best["first"] = float(changes[:, 0].mean()) if len(changes) else math.nan
+        best["failed"] = failed_behind(study, [(best["task"], best["label"])])
     return best
 
 
@@ -138,6 +185,7 @@ def paper(study: Study) -> Facts | None:
         ],
         "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
         **verdicts_of(entries),
+        "failed": failed_behind(study, (cell for e in entries for cell in e.finding.failed)),
     }
 
 
@@ -196,6 +244,7 @@ def nearest(study: Study) -> Facts | None:
         "tasks": len(optima),
         "settings": sum(map(is_variant, tables.variants(study).method)),
         "from_files": from_files(study),
+        "failed": failed_compared(study),
     }
 
 
@@ -260,6 +309,7 @@ def price(study: Study) -> Facts | None:
         "plan_seconds": rows.seconds_to_half.get(plan, math.nan),
         "learner_kinematics": learner.kinematics_to_half,
         "learner_seconds": learner.seconds_to_half,
+        "failed": failed_compared(study, BY_TRIAL),
     }
 
 
@@ -331,23 +381,22 @@ def exploration(study: Study) -> list[Facts]:
 
 @cached
 def horizon(study: Study) -> Facts | None:
-    """Gaps of the planner by goals ahead over all random tasks, and the horizon of the learner.
-
-    ``enough``: the first horizon after which a further goal gains less than the margin.
-    """
+    """Gaps of the planner by goals ahead over random tasks, and what goals gain on tasks that have
+    them."""
     rows = tables.TABLES["horizon"](study)
     rows = rows[rows.group == "all"]
     if not len(rows):
         return None
-    percent = {name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high", "gain")}
-    each = rows.assign(**percent).to_dict("records")
-    little = [row["gain"] < MARGINS["gain"] for row in each]
-    beside = tables.TABLES["horizon-beside"](study)
+    columns = [f"{name}{end}" for name in ("gap", "gain") for end in ("", "_low", "_high")]
+    each = rows.assign(**100 * rows[columns]).to_dict("records")
     return {
         "tasks": each[0]["tasks"],
         "by_h": {row["h"]: row for row in each},
-        "enough": next((each[k - 1]["h"] for k in range(1, len(each)) if all(little[k:])), ""),
-        "learner": next(iter(beside[beside.index == "learner all"].lies), ""),
+        "further": [
+            row | {"words": words}
+            for row in each
+            if (words := FURTHER.get(row["h"])) and not math.isnan(row["gain"])
+        ],
     }
 
 

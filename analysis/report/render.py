@@ -45,6 +45,8 @@ def column_of(name: str) -> Column:
     kind, _, what = name.partition(" ")
     if kind == "of":
         return Column(what)
+    if name.startswith("half on "):
+        return Column(page=False)
     if kind in ("on", "in"):
         return Column(f"{what.partition('/')[0]} (%)", 1, percent=True)
     return COLUMNS.get(name, Column())

@@ -10,7 +10,7 @@ distribution; they take runs as exchangeable if the context did nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, takewhile
 
 import numpy as np
@@ -168,34 +168,44 @@ def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
 
 
 def beyond_p(
-    method: tuple[Array, Array],
-    placebo: tuple[Array, Array],
+    method: Sequence[Array],
+    placebo: Sequence[Array],
     rng: np.random.Generator,
+    *,
+    contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
     """P of the test that a method's contexts lie further apart than a placebo's.
 
-    ``method`` and ``placebo`` each have configurations ``(runs, dof)`` in two contexts. Permutation
+    ``method`` and ``placebo`` each have configurations ``(runs, dof)`` for every context. How far
+    contexts lie apart is the length of the sum of their mean configurations, each times its number
+    in ``contrast``: their :func:`distance` for two, the slope for several positions. Permutation
     test: within each context the runs of both are divided anew at random, and the statistic is the
-    :func:`distance` of the method less that of the placebo. Twice the upper tail, as wherever two
-    methods are compared. 0 < p ≤ 1. NaN where a method has one run in a context.
+    method's length less the placebo's. Twice the upper tail, as wherever two methods are compared.
+    0 < p ≤ 1. NaN where a method has one run in a context.
     """
     if min(map(len, (*method, *placebo))) < 2:
         return math.nan
+    weights = np.asarray(contrast, dtype=np.float64)
     pools = [np.concatenate(runs) for runs in zip(method, placebo, strict=True)]
-    sizes = [(len(a), len(b)) for a, b in zip(method, placebo, strict=True)]
+
+    def length(means: Sequence[Array]) -> Array:
+        total = sum(weight * mean for weight, mean in zip(weights, means, strict=True))
+        return np.asarray(np.linalg.norm(total, axis=-1))
+
     null = np.empty(resamples)
     for start in range(0, resamples, AT_ONCE):
         count = min(AT_ONCE, resamples - start)
-        means = []
-        for pool, (ours, theirs) in zip(pools, sizes, strict=True):
-            rows = rng.random((count, len(pool))).argpartition(ours - 1, axis=1)
-            total, chosen = pool.sum(axis=0), pool[rows[:, :ours]].sum(axis=1)
-            means.append((chosen / ours, (total - chosen) / theirs))
-        apart = [np.linalg.norm(a - b, axis=1) for a, b in zip(*means, strict=True)]
-        null[start : start + count] = apart[0] - apart[1]
-    observed = distance(*method) - distance(*placebo)
-    return min(1.0, 2 * float(1 + (null >= observed - 1e-12).sum()) / (1 + resamples))
+        of_method, of_placebo = [], []
+        for pool, runs in zip(pools, method, strict=True):
+            ours = len(runs)
+            rows = rng.random((count, len(pool))).argpartition(ours - 1, axis=1)[:, :ours]
+            chosen = pool[rows].sum(axis=1)
+            of_method.append(chosen / ours)
+            of_placebo.append((pool.sum(axis=0) - chosen) / (len(pool) - ours))
+        null[start : start + count] = length(of_method) - length(of_placebo)
+    observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, placebo))
+    return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))
 
 
 def lead_time(

@@ -7,15 +7,17 @@ file of its concept; and in :mod:`~.within` (one method's runs on one task) or :
 
 from __future__ import annotations
 
-from itertools import chain
+import math
+from itertools import chain, product
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.comparisons.methods import BY_TRIAL, group_of
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, PLACEBO, main_methods
 from coartic.analysis.signatures.between import TwoContexts, between_contexts, slopes
-from coartic.analysis.signatures.context import context_pairs
+from coartic.analysis.signatures.context import beyond_p, context_pairs
 from coartic.analysis.signatures.locus import LEAST, families, variants
 from coartic.analysis.signatures.rows import (
     COLUMNS,
@@ -28,9 +30,10 @@ from coartic.analysis.signatures.rows import (
     without,
 )
 from coartic.analysis.signatures.within import measured_within
+from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import Study, cached
-from coartic.analysis.trajectories import Trajectories
-from coartic.robot import HANDS
+from coartic.analysis.trajectories import Trajectories, postures
+from coartic.robot import HANDS, Array, Hand
 
 __all__ = ["CONTEXTS", "FAMILIES", "REGISTER", "WITHIN", "signatures"]
 NO_CONTEXT = "the method did no other task that shares the start and the first goals"
@@ -124,6 +127,37 @@ def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
     first, second = (study.trajectories(*key) for key in keys)
     placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
     return placebo if all(placebo.runs) else None
+
+
+def slope_beyond_p(
+    study: Study, label: str, task: str, goal: int, moving: int, hand: Hand
+) -> float:
+    """P of the test that postures at a goal follow a moving one more than the placebo's do.
+
+    ``task``: one of those that differ in goal ``moving``. NaN for a method that selects nothing,
+    and without runs of the placebo at all places.
+    """
+    if not selects(study, label):
+        return math.nan
+    (positions,) = (
+        tasks for number, tasks in families(study.tasks) if number == moving and task in tasks
+    )
+    runs: dict[str, list[Array]] = {label: [], PLACEBO: []}
+    places = np.unique(list(positions.values()))
+    for place, method in product(places, runs):
+        at = [name for name, where in positions.items() if where == place]
+        cells = [study.cells[name, method] for name in at if (name, method) in study.cells]
+        with_hand = [
+            run
+            for cell in cells
+            for run in study.trajectories(cell.task, method).with_hand(hand, goal)
+        ]
+        if len(with_hand) < 2:
+            return math.nan
+        runs[method].append(postures(tuple(with_hand), goal))
+    x = places - places.mean()
+    rng = np.random.default_rng([SEED, goal, moving])
+    return beyond_p(runs[label], runs[PLACEBO], rng, contrast=x / (x**2).sum())
 
 
 @cached

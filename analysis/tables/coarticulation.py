@@ -9,12 +9,13 @@ from typing import Any
 import pandas as pd
 
 from coartic.analysis.generality.sample import one_by_one
-from coartic.analysis.methods import in_order, is_search, main_methods
+from coartic.analysis.methods import PLACEBO, in_order, is_search, main_methods
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import families, variants
-from coartic.analysis.signatures.register import placebo_of, selects
+from coartic.analysis.signatures.register import placebo_of, selects, slope_beyond_p
 from coartic.analysis.signatures.register import signatures as signature_values
-from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.tables.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
@@ -81,7 +82,7 @@ def corrected(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
         yield name, row | {"p_holm": adjusted[place]}
 
 
-@table("method, place, kind, hand, runs, norm, p_holm, joint, slope[], goal, moving")
+@table("method, place, kind, hand, runs, norm, p_holm, p_placebo, joint, slope[], goal, moving")
 def slopes(study: Study) -> Rows:
     """How the posture at a goal follows a neighbouring goal that moves."""
     frame = signature_values(study)
@@ -102,6 +103,7 @@ def slopes(study: Study) -> Rows:
             "runs": int(group.n.max()),
             "norm": math.nan,
             "p_holm": math.nan,
+            "p_placebo": slope_beyond_p(study, label, task, goal, moving, hand),
             "joint": "",
             **runs_of(
                 *(
@@ -121,9 +123,15 @@ def slopes(study: Study) -> Rows:
     yield from corrected(rows)
 
 
-@table("task, method, runs, first, total, as_in_isolation, preshaping, turning, travel")
+@table(
+    "task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p, "
+    "turning, travel",
+)
 def signatures(study: Study) -> Rows:
-    """The main signatures of every main method on every task, means over runs and goals."""
+    """The main signatures of every main method on every task, means over runs and goals.
+
+    ``first_p`` and ``preshaping_p`` are of the tests against the placebo (:func:`sign_beyond_p`).
+    """
     frame = signature_values(study)
     frame = frame[frame.value.notna()]
     for task in (name for name in study.tasks if name in one_by_one(study)):
@@ -138,8 +146,23 @@ def signatures(study: Study) -> Rows:
                     "method": label,
                     "runs": len(cell.good),
                     **{name: means.get(signature, math.nan) for name, signature in _MEANS.items()},
+                    "first_p": sign_beyond_p(study, task, label, "first"),
+                    "preshaping_p": sign_beyond_p(study, task, label, "other arm"),
                 }
                 yield f"{task} {label}", row | runs_of(cell)
+
+
+def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
+    """Two-tailed p of the bootstrap test of a sign of coarticulation against the placebo's.
+
+    NaN for a method that selects nothing, and where one of both has fewer than two values.
+    """
+    if not selects(study, label) or (task, PLACEBO) not in study.cells:
+        return math.nan
+    of = SIGNS[sign].of
+    ours, guesses = (of(study.trajectories(task, each)) for each in (label, PLACEBO))
+    several = min(len(ours), len(guesses)) > 1
+    return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan
 
 
 @table("task, label, signature, where, value[], p, n, unit, why_not")

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.comparisons.methods import method_rows
-from coartic.analysis.comparisons.reached import best_so_far, targets
+from coartic.analysis.comparisons.methods import BY_TRIAL, method_rows
+from coartic.analysis.comparisons.reached import best_so_far, halfway, targets
 from coartic.analysis.comparisons.reached import price as price_by_method
 from coartic.analysis.comparisons.standings import ALL_TASKS, gaps, initial_and_optimum, standings
 from coartic.analysis.generality.sample import one_by_one, sample
@@ -159,15 +159,18 @@ def labels_of(study: Study, method: str) -> dict[str, str]:
 
 @table(
     "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
-    "seconds_to_half[]",
+    "seconds_to_half[], half on *",
 )
 def price(study: Study) -> Rows:
-    """What it costs to reach a quarter and half of the targets."""
+    """What it costs to reach a quarter and half of the targets; ``half on``: median trials to the
+    target halfway, by task."""
     for name, row in price_by_method(study).iterrows():
         label = str(name)
         tasks = labels_of(study, label).items()
         cells = [study.cells[key] for key in tasks if row.task in (ALL_TASKS, key[0])]
-        yield label, {"method": label, **row} | runs_of(*cells)
+        medians = halfway(study, label) if row.knows == BY_TRIAL else {}
+        half = {f"half on {task}": trials for task, trials in medians.items()}
+        yield label, {"method": label, **row} | half | runs_of(*cells)
 
 
 @cached

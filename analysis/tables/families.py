@@ -18,6 +18,7 @@ from coartic.analysis.methods import (
     EC3,
     EC4,
     INITIAL,
+    PLACEBO,
     is_variant,
     name_of,
 )
@@ -167,9 +168,9 @@ def exploration(study: Study) -> Rows:
 
 @table("sign, method, family, instances, there, mean[]")
 def family_signs(study: Study) -> Rows:
-    """Signs of coarticulation over instances, by condition and family."""
+    """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
     instances = sample(study)
-    for label, sign in itertools.product(CONDITIONS, THERE if instances else ()):
+    for label, sign in itertools.product((*CONDITIONS, PLACEBO), THERE if instances else ()):
         assert instances is not None
         for family, scores in each_and_all(scores_of(instances, label, sign)):
             means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]

@@ -86,7 +86,8 @@ def named(study: Study, cell: CellRuns) -> Row:
 
 
 @table(
-    "statement, verdict, evidence, test, p_holm, opposite_p_holm, ensemble, place, quote, section",
+    "statement, verdict, uncounted, evidence, test, p_holm, opposite_p_holm, ensemble, place, "
+    "quote, section",
 )
 def claims(study: Study) -> Rows:
     """Claims with their verdicts: the paper's, and others, which say so."""
@@ -95,6 +96,7 @@ def claims(study: Study) -> Rows:
         row: Row = {
             "statement": claim.statement + " †" * claim.fitted,
             "verdict": entry.verdict,
+            "uncounted": claim.uncounted,
             "evidence": entry.finding.evidence,
             "test": test_in_words(claim),
             "p_holm": entry.adjusted_p,

@@ -15,14 +15,14 @@ from coartic.analysis.claims.studies import (
     HORIZONS,
     PLANNER,
     gaps_by_horizon,
+    goals_ahead,
     solved_cells,
 )
-from coartic.analysis.generality.sample import sample
 from coartic.analysis.human.judge import FINDINGS, judged
 from coartic.analysis.human.measures import MODELS, run_ids
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import turning_angles
-from coartic.analysis.statistics.estimates import RESAMPLES, SEED, TAILS, interval, mean
+from coartic.analysis.statistics.estimates import interval, mean
 from coartic.analysis.studies import objectives as regrets
 from coartic.analysis.studies.objectives import TERMS, WHO, advantage, on_random_tasks
 from coartic.analysis.study import CellRuns, Study, cached
@@ -35,16 +35,24 @@ BASES = ("free", "on a rail", "fixed")
 """How the base can move, by the number of directions in which it is locked."""
 KINDS: dict[str, Callable[[Task], str]] = {
     "family": lambda task: str(task.family).partition("/")[0],
-    "goals": lambda task: str(len(task.goals)),
+    "goals": lambda task: str(len(task.goals)) if len(task.goals) <= 5 else "6 or more",
     "arms": lambda task: ("one", "two")[len(task.hands) - 1],
     "links": lambda task: str(len(task.robot.right_links)),
     "base": lambda task: BASES[len(task.locked_base)],
 }
 """What tasks are told apart by."""
+BEYOND = "5+"
+"""All goals beyond the fourth goal ahead."""
+STEPS: tuple[tuple[str, int | str, int | None, int], ...] = (
+    ("0", 0, None, 0),
+    *((str(h), h, h - 1, h) for h in (1, 2, 3, 4)),
+    (BEYOND, ALL_GOALS, 4, 5),
+    (ALL_GOALS, ALL_GOALS, None, 0),
+)
+"""Rows of the table of horizons: name, horizon, the one before it that its gain is over, and goals
+that a task must have ahead."""
 ENOUGH = 0.9
-"""Share of the tasks of a group on which a horizon must have been run to be shown."""
-BESIDE = ("learner", "cma-es/bandit", "nullspace-qp/next-goal")
-"""What stands beside the planner: the learner is the one that explores most."""
+"""Share of the tasks that have a horizon on which it must have been run to be shown."""
 SMOOTH = "trajectory-optimisation/"
 NEAR = 3
 """Ticks before and after a hit between which the path's turn at the goal is measured."""
@@ -99,93 +107,63 @@ def groups(study: Study) -> Iterator[tuple[str, str, pd.DataFrame]]:
 
 @table("group, value, h, tasks, gap[], gain[], seconds")
 def horizon(study: Study) -> Rows:
-    """Gap of the planner by goals ahead, and what the last of these goals gains, as shares."""
-    for group, value, every in groups(study):
-        columns = [h for h in HORIZONS if len(every) and every[h].notna().mean() > ENOUGH]
-        gaps = every[columns].dropna()
-        for place, h in enumerate(columns if len(gaps) else ()):
-            cells = cells_at(study, gaps, h)
-            row: Row = {"group": group, "value": value, "h": str(h), "tasks": len(gaps)}
-            row |= mean_of("gap", gaps[h] / 100)
-            before = columns[place - 1]
-            if place and HORIZONS.index(h) == HORIZONS.index(before) + 1:
-                row |= mean_of("gain", (gaps[before] - gaps[h]) / 100)
-            row["seconds"] = float(np.mean([cell.good.cpu_s.mean() for cell in cells]))
-            yield f"{group} {value} h={h}", row | runs_of(*cells)
+    """Gap of the planner by goals ahead, and what the last of these goals gains, as shares.
 
-
-@table("method, arms, tasks, gap[], horizon[], lies")
-def horizon_beside(study: Study) -> Rows:
-    """Gaps of other methods, as shares, and the horizon at which the planner has the same.
-
-    Between whole horizons by linear interpolation; 0 and 4 are the ends. Intervals are percentiles
-    of bootstrap samples of the tasks, which are not widened as means over tasks are: beyond the
-    ends there is no horizon.
+    Over the tasks of a group that have so many goals ahead. ``h`` of 5+ are those beyond the fourth
+    together; all is over all tasks, whatever they have.
     """
-    gaps, instances = gaps_by_horizon(study), sample(study)
-    if instances is None or not len(gaps):
-        return
-    curves = gaps.query("hands == 'planned' and costs == 'none'")
-    curves = curves.droplevel(["hands", "costs"])[list(HORIZONS[:-1])].dropna() / 100
-    for method in BESIDE:
-        shares = {name: instances.gap(name, method) for name in curves.index}
-        gap_of = {name: float(gap.mean()) for name, gap in shares.items() if gap is not None}
-        for arms in ("one", "two", "all"):
-            names = [n for n in gap_of if arms in ("all", KINDS["arms"](study.tasks[n]))]
-            if not names:
+    for group, value, every in groups(study):
+        ahead = goals_ahead(study, every)
+        for name, h, before, fewest in STEPS:
+            rows = every[ahead >= fewest]
+            if before is not None and enough(rows[before]):
+                rows = rows[rows[before].notna()]
+            elif name == BEYOND:
                 continue
-            gap, curve = np.array([gap_of[n] for n in names]), curves.loc[names].to_numpy(float)
-            labels = [instances.label_on(name, method) for name in names]
-            same = same_horizon(curve.mean(axis=0), gap.mean())
-            row: Row = {"method": method, "arms": arms, "tasks": len(names)}
-            row |= interval("gap", mean(gap))
-            drawn = np.random.default_rng(SEED).integers(len(gap), size=(RESAMPLES, len(gap)))
-            ways = [same_horizon(curve[k].mean(axis=0), gap[k].mean()) for k in drawn]
-            row |= {"horizon": same, "lies": between(curve.mean(axis=0), gap.mean())}
-            if len(gap) > 2:
-                row["horizon_low"], row["horizon_high"] = np.quantile(ways, TAILS)
-            cells = [study.cells[key] for key in zip(names, labels, strict=True)]
-            yield f"{method} {arms}", row | runs_of(*cells)
+            if not enough(rows[h]):
+                continue
+            rows = rows[rows[h].notna()]
+            cells = cells_at(study, rows, h)
+            row: Row = {"group": group, "value": value, "h": name, "tasks": len(rows)}
+            row |= mean_of("gap", rows[h] / 100)
+            if before is not None:
+                row |= mean_of("gain", (rows[before] - rows[h]) / 100)
+            row["seconds"] = float(np.mean([cell.good.cpu_s.mean() for cell in cells]))
+            yield f"{group} {value} h={name}", row | runs_of(*cells)
 
 
-def same_horizon(curve: Array, gap: float) -> float:
-    """Where a curve of gaps by horizon, ``(k,)``, comes down to a gap; its ends beyond."""
-    falling = np.minimum.accumulate(curve)
-    return float(np.interp(-gap, -falling, np.arange(len(curve))))
-
-
-def between(curve: Array, gap: float) -> str:
-    """Between which horizons a gap lies, in words."""
-    if gap > curve[0]:
-        return "less than 0"
-    worse = int((np.minimum.accumulate(curve) >= gap).sum()) - 1
-    return f"{worse} to {worse + 1}" if worse < len(curve) - 1 else f"{worse} or more"
+def enough(gaps: pd.Series) -> bool:
+    """Whether a horizon was run on enough of the tasks that have it to be shown."""
+    return bool(gaps.notna().mean() > ENOUGH)  # without tasks it is NaN
 
 
 @table("sign, words, h, tasks, mean[], to_come[]")
 def horizon_signs(study: Study) -> Rows:
-    """Signs of coarticulation of the planner by goals ahead, means over tasks."""
-    gaps = gaps_by_horizon(study)
-    if not len(gaps):
-        return
-    gaps = gaps.query("hands == 'planned' and costs == 'none'").dropna()
+    """Signs of coarticulation of the planner by goals ahead, means over tasks that have more, and
+    what they gain by all goals."""
+    gaps = gaps_by_horizon(study).query("hands == 'planned' and costs == 'none'")
+    ahead = goals_ahead(study, gaps)
     cells = {h: cells_at(study, gaps, h) for h in HORIZONS}
     for name, sign in SIGNS.items():
-        values = pd.DataFrame(
-            {
-                str(h): {
-                    cell.task: mean_or_nan(sign.of(study.trajectories(cell.task, cell.label)))
-                    for cell in at_horizon
-                }
-                for h, at_horizon in cells.items()
+        of_task = {
+            h: {
+                cell.task: mean_or_nan(sign.of(study.trajectories(cell.task, cell.label)))
+                for cell in at_horizon
             }
-        ).dropna()
-        for h in cells if len(values) else ():
-            row: Row = {"sign": name, "words": sign.words, "h": str(h), "tasks": len(values)}
-            row |= mean_of("mean", values[str(h)])
-            row |= mean_of("to_come", values[ALL_GOALS] - values[str(h)])
-            of_tasks = [cell for cell in cells[h] if cell.task in values.index]
-            yield f"{name} h={h}", row | runs_of(*of_tasks)
+            for h, at_horizon in cells.items()
+        }
+        for h in HORIZONS:
+            more = gaps.index[(ahead > h) if h != ALL_GOALS else (ahead > 0)]
+            names = more.get_level_values("task")
+            values = pd.DataFrame({"here": of_task[h], "all": of_task[ALL_GOALS]})
+            values = values[values.index.isin(names)].dropna()
+            if len(values):
+                row: Row = {"sign": name, "words": sign.words, "h": str(h), "tasks": len(values)}
+                row |= mean_of("mean", values.here)
+                if h != ALL_GOALS:
+                    row |= mean_of("to_come", values["all"] - values.here)
+                of_tasks = [cell for cell in cells[h] if cell.task in values.index]
+                yield f"{name} h={h}", row | runs_of(*of_tasks)
 
 
 def mean_or_nan(values: Sequence[float] | Array) -> float:

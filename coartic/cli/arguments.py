@@ -68,7 +68,7 @@ MethodFiles = Annotated[
 Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the suite.")]
 TimeLimit = Annotated[
     float | None,
-    typer.Option(min=1e-3, max=MOST_SECONDS, metavar="SECONDS", help="Longest run."),
+    typer.Option(min=1e-3, max=MOST_SECONDS, metavar="SECONDS", help="Most CPU time of a run."),
 ]
 TrialBudget = Annotated[
     int | None,

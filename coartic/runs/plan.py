@@ -72,7 +72,7 @@ class Plan:
     readings: tuple[str, ...]
     """Readings of the paper that are not the default, as ``ties=right``."""
     time_limit_s: float | None
-    """Wall time of one run."""
+    """CPU time of one run."""
     trial_budget: int | None
     """Physical trials of one run."""
     tasks: dict[str, dict[str, Any]]
