@@ -6,7 +6,9 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
+from pydantic import ValidationError
 from scipy import stats
 
 from coartic.analysis import tables
@@ -16,10 +18,13 @@ from coartic.analysis.human.judge import (
     DISAGREES,
     FINDINGS,
     NO_CASES,
+    NOT_BEYOND,
     SILENT,
     UNDECIDED,
+    Finding,
     bootstrapped,
     judged,
+    separating,
     verdict_of,
     verdict_of_test,
 )
@@ -27,18 +32,18 @@ from coartic.analysis.human.measures import MODELS, Values
 from tests.support.suites import run_and_write, suite_of
 
 ABOVE, BETWEEN, RATIO = (
-    FINDINGS[name] for name in ("other-hand-early", "few-are-enough", "stop-separates")
+    FINDINGS[name] for name in ("first-slower", "few-are-enough", "stop-separates")
 )
 
 
 @pytest.mark.parametrize(
     ("finding", "ends", "tasks", "verdict"),
     [
-        (ABOVE, [(0.06, 0.2)], 10, AGREES),
-        (ABOVE, [(0.04, 0.2)], 10, UNDECIDED),
-        (ABOVE, [(-0.02, 0.04)], 10, DISAGREES),
-        (ABOVE, [(0.05, 0.2)], 10, UNDECIDED),  # may be at the bound, which is not above it
-        (ABOVE, [(0.06, 0.2)], 9, UNDECIDED),
+        (ABOVE, [(1.5, 9)], 10, AGREES),
+        (ABOVE, [(0.5, 9)], 10, UNDECIDED),
+        (ABOVE, [(-2, 0.5)], 10, DISAGREES),
+        (ABOVE, [(1, 9)], 10, UNDECIDED),  # may be at the bound, which is not above it
+        (ABOVE, [(1.5, 9)], 9, UNDECIDED),
         (ABOVE, [(math.nan, math.nan)], 0, NO_CASES),
         (BETWEEN, [(1.2, 2.5)] * 2, 10, AGREES),
         (BETWEEN, [(1.2, 3.5)] * 2, 10, UNDECIDED),  # above 3, and not yet above 4
@@ -63,16 +68,98 @@ def test_a_test_without_cases_does_not_hide_one_on_the_wrong_side():
     assert verdict_of([NO_CASES, AGREES]) == NO_CASES
 
 
+def values_of(numbers):
+    """One number a task, and their mean."""
+    by_task = {f"t{k}": np.array([[float(number)]]) for k, number in enumerate(numbers)}
+    return Values(by_task, lambda rows: float(rows.mean()))
+
+
 def test_an_interval_covers_as_often_as_it_says(monkeypatch):
     """Means of 15 tasks: about 95 of 100 intervals hold the truth, 0; a few less with so few."""
     monkeypatch.setattr(judge, "RESAMPLES", 499)
     rng = np.random.default_rng(5)
     held = 0
     for _ in range(300):
-        tasks = [np.array([[value]]) for value in rng.standard_normal(15)]
-        _, low, high = bootstrapped(Values(tasks, lambda rows: float(rows.mean())), 0.05)
+        _, low, high = bootstrapped(values_of(rng.standard_normal(15)), 0.05)
         held += low <= 0 <= high
     assert 0.88 <= held / 300 <= 0.985
+
+
+def test_a_difference_is_paired_by_task():
+    """Tasks differ by tens, the sides by 1: only pairs can see it. A task of one side is out."""
+    rng = np.random.default_rng(6)
+    tasks = 20 * rng.standard_normal(21)
+    tasks[20] = 1e6
+    ours = values_of(tasks + 1 + 0.1 * rng.standard_normal(21))
+    theirs = values_of(tasks[:20])
+    value, low, high = bootstrapped(ours, 0.05, beside=theirs)
+    assert 0.9 < low < value < high < 1.1
+
+
+def planted(monkeypatch, **by_model):
+    """A study in which every measure finds of each model what is planted, and else nothing."""
+    models = {id(MODELS[name.replace("_", " ")]): numbers for name, numbers in by_model.items()}
+    monkeypatch.setattr(
+        judge,
+        "MEASURES",
+        dict.fromkeys(measures.MEASURES, lambda _, model: values_of(models.get(id(model), []))),
+    )
+    monkeypatch.setattr(judge, "RESAMPLES", 499)
+    return SimpleNamespace(suite="human", _computed={})
+
+
+def verdict_on_two_ahead(study, model):
+    rows = judged(study).set_index(["finding", "model"])
+    return tuple(rows.loc[("two-ahead", model), ["verdict", "because"]])
+
+
+def test_what_is_picked_from_trials_agrees_only_beyond_random_guesses(monkeypatch):
+    noise = 0.02 * np.random.default_rng(7).standard_normal((3, 12))
+    shows = 0.5 + noise[0]
+    study = planted(monkeypatch, learner=shows, two_goals_ahead=shows, random_guesses=noise[1])
+    assert verdict_on_two_ahead(study, "learner") == (AGREES, "")
+    study = planted(
+        monkeypatch, learner=shows, two_goals_ahead=shows, random_guesses=0.5 + noise[2]
+    )
+    assert verdict_on_two_ahead(study, "learner") == (UNDECIDED, NOT_BEYOND)
+    assert verdict_on_two_ahead(study, "two goals ahead") == (AGREES, "")  # no trials to pick from
+    study = planted(monkeypatch, learner=shows, random_guesses=noise[1][:9])
+    assert verdict_on_two_ahead(study, "learner") == (UNDECIDED, NOT_BEYOND)  # nine tasks of both
+    study = planted(monkeypatch, learner=noise[0] - 0.5, random_guesses=noise[1])
+    assert verdict_on_two_ahead(study, "learner") == (DISAGREES, "")
+
+
+def test_where_the_learner_could_differ_from_planners(monkeypatch):
+    verdicts = {
+        "differs": {"learner": DISAGREES, "one goal ahead": AGREES, "least jerk": AGREES},
+        "alike": {"learner": AGREES, "one goal ahead": AGREES, "no goal ahead": DISAGREES},
+        "split": {"learner": AGREES, "one goal ahead": AGREES, "least jerk": DISAGREES},
+        "undecided": {"learner": UNDECIDED, "one goal ahead": AGREES},
+        "alone": {"learner": DISAGREES, "one goal ahead": SILENT, "least jerk": UNDECIDED},
+    }
+    rows = [
+        (finding, model, of_model.get(model, NO_CASES))
+        for finding, of_model in verdicts.items()
+        for model in MODELS
+    ]
+    frame = pd.DataFrame(rows, columns=["finding", "model", "verdict"])
+    monkeypatch.setattr(judge, "judged", lambda study: frame)
+    found = separating(None)
+    assert found["possible"] == ["differs", "alike", "split"]
+    assert found["apart"] == ["differs"]
+    assert found["look_ahead"] == ["alike"]
+
+
+def test_a_finding_can_be_cited():
+    fields = FINDINGS["two-ahead"].model_dump()
+    for wrong in ({"doi": ""}, {"doi": "from memory"}, {"authors": ""}, {"year": None}):
+        with pytest.raises(ValidationError):
+            Finding.model_validate(fields | wrong)
+
+
+def test_every_measure_serves_a_finding():
+    used = {test.measure for finding in FINDINGS.values() for test in finding.tests}
+    assert used == set(measures.MEASURES)
 
 
 def test_rank_correlation_is_kendalls():
@@ -123,15 +210,13 @@ def walk(*points):
     )
 
 
-def test_bow_and_excess_of_paths_with_one_corner():
+def test_bow_of_paths_with_one_corner():
     """Ways of 2 with a corner 0.5 to the side: the mean distance from the chord is half of it."""
     run = walk((-2, 0), (-1, 0), (0, 0), (1, 0.5), (2, 0), (2, 1), (2, 2))
     ((bow, to_next, from_last),) = measures.bows(run)
     assert bow == pytest.approx(0.25, abs=0.01)  # left of the way is positive
     assert to_next == pytest.approx(math.pi / 2)
     assert from_last == pytest.approx(0)
-    lengths = 2 + 2 * math.hypot(1, 0.5) + 2
-    assert measures.path_excess(run) == pytest.approx(lengths / 6 - 1)
 
 
 def test_the_hand_turns_at_goals():
@@ -162,7 +247,8 @@ grid = { horizon = [0, 1, 7] }
 def test_a_small_study(small, monkeypatch):
     assert (small.runs.status == "ok").all()
     monkeypatch.setattr("coartic.analysis.human.judge.FEWEST_TASKS", 2)
-    monkeypatch.setitem(MODELS["learner"].parameters, "trials", 150)
+    for model in ("learner", "learner, replayed"):
+        monkeypatch.setitem(MODELS[model].parameters, "trials", 150)
     rows = judged(small).set_index(["finding", "model", "measure"])
     near = rows.xs("slope norm at distance 1", level="measure").loc["both-directions"]
     far = rows.xs("slope norm at distance 2", level="measure").loc["two-ahead"]
@@ -170,6 +256,9 @@ def test_a_small_study(small, monkeypatch):
     for model in ("corrective process", "no goal ahead", "null-space control, this goal"):
         assert near.value[model] == pytest.approx(0, abs=1e-9)
     assert near.value["one goal ahead"] > 0.01
+    # Runs of the best trial and of the replay are not the same.
+    assert near.tasks["learner"] == near.tasks["learner, replayed"] == 2
+    assert near.value["learner"] != near.value["learner, replayed"]
     assert far.value["one goal ahead"] == pytest.approx(0, abs=1e-9)
     assert far.built_in["one goal ahead"]
     assert far.verdict["one goal ahead"] == DISAGREES

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
 from coartic.analysis.human.measures import GROUPS, MEASURES, MODELS, Values, mean_of
 from coartic.analysis.statistics.estimates import LEVEL, SEED
@@ -20,6 +20,8 @@ FEWEST_TASKS = 10
 RESAMPLES = 9_999
 AGREES, DISAGREES, UNDECIDED, SILENT = "agrees", "disagrees", "undecided", "silent"
 NO_CASES = "no cases"
+PLACEBO, PICKED = "random guesses", "picked from trials"
+NOT_BEYOND = "it is not shown to exceed random guesses"
 
 
 class Test(BaseModel):
@@ -40,9 +42,14 @@ class Test(BaseModel):
             raise ValueError("should have a measure of measures.py, and either above or below")
         return self
 
+    def exceeds(self, difference: tuple[float, float, float]) -> bool:
+        """Whether the interval of a difference lies on the predicted side of 0."""
+        _, low, high = difference
+        return low > 0 if self.above is not None else high < 0
+
 
 class Finding(BaseModel):
-    """A published finding; ``human.toml`` says what the fields are."""
+    """A published finding that can be cited; ``human.toml`` says what the fields are."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -51,15 +58,20 @@ class Finding(BaseModel):
     statistic: str
     quote: str
     place: str
-    source: str
-    doi: str
+    authors: str = Field(min_length=1)
+    year: int
+    title: str = Field(min_length=1)
+    source: str = Field(min_length=1)
+    doi: str = Field(pattern=r"^10\.\d{4,}/\S+$")
     read: str
     predicts: str
     tests: Sequence[Test]
     where: str
     silent: dict[str, str] = {}
     built_in: dict[str, str] = {}
+    also: str = ""
     not_asked: str = ""
+    power: str = ""
     note: str = ""
 
 
@@ -90,59 +102,84 @@ def judged(study: Study) -> pd.DataFrame:
     """A row for each finding, test and model, in their order; none for folders of other suites.
 
     Columns ``finding``, ``model``, ``measure``, ``bound``, ``value`` with the ``low`` and ``high``
-    end of its interval, ``tasks``, ``of_test``: the verdict of the test alone, ``verdict`` of the
-    finding (the same for all tests of one), ``built_in``: whether it follows from how the model is
-    built, ``because``: why a model is silent.
+    end of its interval, ``tasks``; ``over_guesses`` with both ends: by how much it
+    exceeds that of random guesses on the same tasks, where solutions are picked from trials;
+    ``of_test``: the verdict of the test alone, ``verdict`` of the finding (the same for all tests
+    of one), ``built_in``: whether it follows from how the model is built, ``because``: why a model
+    is silent, or does not agree though its interval lies beyond the bound.
     Intervals are of the bootstrap over tasks, 95 % for one test and wider for several
     (Bonferroni).
     """
     rows = []
     for name, finding in FINDINGS.items() if study.suite == SUITE else ():
+        level = LEVEL / len(finding.tests)
         for model in MODELS:
             silent = finding.silent.get(model, "")
-            values = [
-                mean_of([]) if silent else MEASURES[test.measure](study, MODELS[model])
-                for test in finding.tests
-            ]
-            level = LEVEL / len(finding.tests)
-            estimates = [bootstrapped(measured, level) for measured in values]
-            counts = [len(measured.by_task) for measured in values]
-            of_tests = [
-                SILENT if silent else verdict_of_test(test, estimate, count)
-                for test, estimate, count in zip(finding.tests, estimates, counts, strict=True)
-            ]
-            verdict = verdict_of(of_tests)
-            built_in = finding.built_in.get(model) == verdict
-            rows_of_tests = zip(finding.tests, estimates, counts, of_tests, strict=True)
-            for test, estimate, count, alone in rows_of_tests:
+            of_tests = []
+            for test in finding.tests:
+                values = mean_of({}) if silent else measured(study, test.measure, model)
+                estimate, tasks = bootstrapped(values, level), len(values.by_task)
+                alone = SILENT if silent else verdict_of_test(test, estimate, tasks)
+                over, because = (math.nan,) * 3, silent
+                if model in GROUPS[PICKED] and tasks:
+                    guesses = measured(study, test.measure, PLACEBO)
+                    over = bootstrapped(values, level, beside=guesses)
+                    both = len(values.by_task.keys() & guesses.by_task.keys())
+                    if alone == AGREES and not (test.exceeds(over) and both >= FEWEST_TASKS):
+                        alone, because = UNDECIDED, NOT_BEYOND
                 bound = (
                     f"above {test.above:g}" if test.above is not None else f"below {test.below:g}"
                 )
-                measured = (name, model, test.measure, bound, *estimate, count)
-                rows.append((*measured, alone, verdict, built_in, silent))
-    columns = "finding model measure bound value low high tasks of_test verdict built_in because"
+                of_tests.append((test.measure, bound, *estimate, tasks, *over, alone, because))
+            verdict = verdict_of([alone for *_, alone, _ in of_tests])
+            built_in = finding.built_in.get(model) == verdict
+            rows += [
+                (name, model, *numbers, verdict, built_in, because)
+                for *numbers, because in of_tests
+            ]
+    columns = (
+        "finding model measure bound value low high tasks over_guesses over_guesses_low "
+        "over_guesses_high of_test verdict built_in because"
+    )
     return pd.DataFrame(rows, columns=columns.split())
 
 
-def bootstrapped(values: Values, level: float) -> tuple[float, float, float]:
+def measured(study: Study, measure: str, model: str) -> Values:
+    """What a measure finds of a model, by their names."""
+    return MEASURES[measure](study, MODELS[model])
+
+
+def bootstrapped(
+    values: Values, level: float, beside: Values | None = None
+) -> tuple[float, float, float]:
     """A statistic of all tasks, and its interval over tasks drawn with replacement.
 
-    Wider by √(k / (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without
-    tasks, and without an interval of one. Unlike in :mod:`~coartic.analysis.statistics.instances`
-    the statistic can be another than a mean over families, and runs are not drawn.
+    With ``beside``: by how much it exceeds theirs, on the tasks that both have. Wider by
+    √(k / (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without tasks, and
+    without an interval of one. Unlike in :mod:`~coartic.analysis.statistics.instances` the
+    statistic can be another than a mean over families, and runs are not drawn.
     """
-    count = len(values.by_task)
-    if not count:
+    sides = [values] if beside is None else [values, beside]
+    tasks = [task for task in values.by_task if all(task in side.by_task for side in sides)]
+    if not tasks:
         return math.nan, math.nan, math.nan
-    estimate = values.statistic(np.concatenate(values.by_task))
+    rows = [[side.by_task[task] for task in tasks] for side in sides]
+
+    def difference(drawn: Iterable[int]) -> float:
+        drawn = list(drawn)
+        first, *second = (
+            side.statistic(np.concatenate([of_side[k] for k in drawn]))
+            for side, of_side in zip(sides, rows, strict=True)
+        )
+        return first - sum(second)
+
+    count = len(tasks)
+    estimate = difference(range(count))
     if count < 2:
         return estimate, math.nan, math.nan
     rng = np.random.default_rng(SEED)
     drawn = rng.integers(count, size=(RESAMPLES, count))
-    resampled = np.array(
-        [values.statistic(np.concatenate([values.by_task[k] for k in tasks])) for tasks in drawn]
-    )
-    away: Array = (resampled - estimate) * math.sqrt(count / (count - 1))
+    away: Array = (np.array([*map(difference, drawn)]) - estimate) * math.sqrt(count / (count - 1))
     low, high = estimate + np.quantile(away, [level / 2, 1 - level / 2])
     return estimate, float(low), float(high)
 
@@ -173,26 +210,30 @@ def verdict_of(tests: Sequence[str]) -> str:
 
 
 def separating(study: Study) -> dict[str, list[str]]:
-    """The findings that tell models apart: on which one kind agrees and the other disagrees.
+    """Where the learner, and planners that look ahead, could differ and do.
 
-    Undecided ones are left out.
-
-    ``learner_from_planners``: the paper's learner from every planner that is judged;
-    ``look_ahead``: planners with one goal in view from all with more.
+    ``possible``: the findings on which the paper's learner and at least one planner that looks
+    ahead agree or disagree; ``apart``: those of them where all such planners have the opposite
+    verdict; ``look_ahead``: where planners with one goal in view have one verdict and all with more
+    the opposite one, undecided ones left out.
     """
     verdicts = judged(study).drop_duplicates(["finding", "model"])
-    blind, ahead = GROUPS["planners with one goal in view"], GROUPS["planners with more"]
-    kinds = {
-        "learner_from_planners": (["learner"], blind + ahead),
-        "look_ahead": (blind, ahead),
-    }
-    apart: dict[str, list[str]] = {kind: [] for kind in kinds}
+    found: dict[str, list[str]] = {"possible": [], "apart": [], "look_ahead": []}
     for finding, rows in verdicts.groupby("finding", sort=False):
         by_model = rows.set_index("model").verdict
-        for kind, groups in kinds.items():
-            first, second = (
-                set(by_model[group]) - {SILENT, NO_CASES, UNDECIDED} for group in groups
+        learner, blind, ahead = (
+            set(by_model[models]) & {AGREES, DISAGREES}
+            for models in (
+                ["learner"],
+                GROUPS["planners with one goal in view"],
+                GROUPS["planners with more"],
             )
-            if (first, second) in (({AGREES}, {DISAGREES}), ({DISAGREES}, {AGREES})):
-                apart[kind].append(str(finding))
-    return apart
+        )
+        holds = {
+            "possible": bool(learner and ahead),
+            "apart": len(learner) == len(ahead) == 1 and learner != ahead,
+            "look_ahead": len(blind) == len(ahead) == 1 and blind != ahead,
+        }
+        for kind in found:
+            found[kind] += [str(finding)] if holds[kind] else []
+    return found

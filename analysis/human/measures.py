@@ -1,6 +1,6 @@
 """What the findings of ``human.toml`` are put to: one function for each measure.
 
-A measure takes a study of suite ``human`` and a model, and returns its values on each task with the
+A measure takes a study of suite ``human`` and a model, and returns its values by task with the
 statistic that is made of them. There are none where nothing follows for the model.
 """
 
@@ -16,17 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic import Trajectory
-from coartic.analysis.methods import EC2, EC3, most_exploring
-from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.signatures.subtasks import (
-    isolated_agreement,
-    isolated_reach,
-    postures_before,
-)
+from coartic.analysis.methods import most_exploring
+from coartic.analysis.signatures.subtasks import isolated_reach, postures_before
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.analysis.words import read_beside
-from coartic.robot import BASE_DOF, Array
+from coartic.robot import Array
 
 STATIONS = 100
 """Points at equal distances along a hand's path."""
@@ -37,8 +32,6 @@ LONG = 6
 """Goals of a task on which it is asked how far ahead is enough."""
 ENOUGH = 1.01
 """Ticks of a horizon that is enough, as a multiple of those with all goals in view."""
-SERIAL = 0.95
-"""Share of goals hit with the quicker hand for them alone that asks for no look-ahead."""
 TICKS_OF_A_TURN = 5
 """Ticks before a hit, and after it, over which the direction of a hand is measured."""
 PRACTISED, BEGUN = 10_000, 100
@@ -51,6 +44,8 @@ class Model(NamedTuple):
 
     method: str
     parameters: Mapping[str, Any] = {}
+    replayed: bool = False
+    """What was learned is replayed without noise, in the place of the best trial."""
 
 
 PLANNER = "receding-horizon"
@@ -62,18 +57,18 @@ GROUPS: dict[str, list[str]] = _FILE["groups"]
 
 
 class Values(NamedTuple):
-    """What is measured on each task, ``(n, k)`` with any n, and the statistic of all rows."""
+    """What is measured, ``(n, k)`` with any n, by task, and the statistic of all rows."""
 
-    by_task: list[Array]
+    by_task: Mapping[str, Array]
     statistic: Callable[[Array], float]
 
 
 Measure = Callable[[Study, Model], Values]
 
 
-def mean_of(by_task: list[Array]) -> Values:
+def mean_of(by_task: Mapping[str, float]) -> Values:
     """The mean over tasks of one value each, of those that there are."""
-    there = [np.reshape(v, (1, -1)) for v in by_task if np.isfinite(v).all()]
+    there = {task: np.array([[value]]) for task, value in by_task.items() if np.isfinite(value)}
     return Values(there, lambda rows: float(rows.mean()))
 
 
@@ -104,8 +99,11 @@ def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
 
 def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
     """A model's runs by task."""
-    cells = cells_of(study, model, **others)
-    return {cell.task: study.trajectories(cell.task, cell.label) for cell in cells}
+    executed = study.replays if model.replayed else study.trajectories
+    by_task = {
+        cell.task: executed(cell.task, cell.label) for cell in cells_of(study, model, **others)
+    }
+    return {task: runs for task, runs in by_task.items() if runs.runs}
 
 
 def unmoved_tasks(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
@@ -163,9 +161,7 @@ def squared_slopes(group: list[Trajectories], moving: int, at: int) -> Array:
     return np.asarray(total / (count * (count - 1)))
 
 
-def slope_norms(
-    study: Study, model: Model, distance: int, joints: slice = slice(None), **others: Any
-) -> dict[str, float]:
+def slope_norms(study: Study, model: Model, distance: int, **others: Any) -> dict[str, float]:
     """Length of the vector of slopes by task; with the sign of its square, which chance can turn.
 
     Distance 1 and 2: the posture at goal 1 follows goal 2 or 3; -1: that at goal 2 follows goal 1.
@@ -173,33 +169,28 @@ def slope_norms(
     at = 1 if distance > 0 else 2
     norms = {}
     for task, group in moved(study, model, at + distance, **others).items():
-        square = float(squared_slopes(group, at + distance, at)[joints].sum())
+        square = float(squared_slopes(group, at + distance, at).sum())
         norms[task] = round(float(np.sign(square) * np.sqrt(abs(square))), 6)  # else 0 is 1e-12
     return norms
 
 
-def slope_norm(study: Study, model: Model, distance: int, joints: slice = slice(None)) -> Values:
+def slope_norm(study: Study, model: Model, distance: int) -> Values:
     """Mean slope norm over tasks."""
-    return mean_of([*map(np.array, slope_norms(study, model, distance, joints).values())])
-
-
-def nearer_goal_more(study: Study, model: Model) -> Values:
-    """Slope norm at distance 1 less that at distance 2."""
-    near, far = (slope_norms(study, model, distance) for distance in (1, 2))
-    return mean_of([np.array(near[task] - far[task]) for task in near if task in far])
+    return mean_of(slope_norms(study, model, distance))
 
 
 def practice(study: Study, model: Model, statistic: Callable[[Array], float]) -> Values:
     """Slope norms at distances 1 and 2 after all trials and after a hundredth, by task, (1, 4)."""
     if model.method:
-        return Values([], statistic)
+        return Values({}, statistic)
     norms = [
         slope_norms(study, model, distance, trials=trials)
         for trials in (PRACTISED, BEGUN)
         for distance in (1, 2)
     ]
     tasks = [task for task in norms[0] if all(task in by_task for by_task in norms)]
-    return Values([np.array([[by_task[task] for by_task in norms]]) for task in tasks], statistic)
+    rows = {task: np.array([[by_task[task] for by_task in norms]]) for task in tasks}
+    return Values(rows, statistic)
 
 
 def horizon_rise(rows: Array) -> float:
@@ -221,11 +212,11 @@ def benefit_correlation(study: Study, model: Model) -> Values:
     norms = slope_norms(study, model, 1)
     alone = unmoved_tasks(study, MODELS["no goal ahead"], 1)
     highest = study.runs[study.runs.status == "ok"].groupby("task").reward.max()
-    rows = [
-        np.array([[norm, alone[task].runs[0].ticks + float(highest[task])]])
+    rows = {
+        task: np.array([[norm, alone[task].runs[0].ticks + float(highest[task])]])
         for task, norm in norms.items()
         if task in alone
-    ]
+    }
     return Values(rows, rank_correlation)
 
 
@@ -274,10 +265,10 @@ def bows(run: Trajectory) -> Iterator[tuple[float, float, float]]:
 
 def bow_slope(study: Study, model: Model) -> Values:
     """Slope of the bow on the next turn, given the last one, over the reaches of all tasks."""
-    by_task = [
-        np.array([row for run in runs.runs for row in bows(run)])
-        for runs in unmoved_tasks(study, model, 1).values()
-    ]
+    by_task = {
+        task: np.array([row for run in runs.runs for row in bows(run)])
+        for task, runs in unmoved_tasks(study, model, 1).items()
+    }
 
     def statistic(rows: Array) -> float:
         bow, to_next, from_last = rows.T
@@ -301,17 +292,17 @@ def turn_at_goals(run: Trajectory) -> float:
 def turn_saved(study: Study, model: Model) -> Values:
     """Turn at goals under the corrective process alone less that of the model, on one arm."""
     alone = unmoved_tasks(study, MODELS["corrective process"], 1)
-    return mean_of([
-        np.array(turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)]))
+    return mean_of({
+        task: float(turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)]))
         for task, runs in unmoved_tasks(study, model, 1).items()
         if task in alone
-    ])  # fmt: skip
+    })  # fmt: skip
 
 
 def stop_ratio(study: Study, model: Model) -> Values:
     """How far apart hand paths to goal 1 lie before two places of goal 2: stopping by passing."""
     if "stop" not in model.parameters:
-        return mean_of([])
+        return mean_of({})
     apart = []
     for stop in (1, 0):
         apart.append({
@@ -319,83 +310,40 @@ def stop_ratio(study: Study, model: Model) -> Values:
             for task, group in moved(study, model, 2, stop=stop).items()
             if (ends := [stations(hand_path(group[k].runs[0], 1)) for k in (0, -1)])
         })  # fmt: skip
-    rows = [np.array([[apart[0][task], apart[1][task]]]) for task in apart[0] if task in apart[1]]
+    both = [task for task in apart[0] if task in apart[1]]
+    rows = {task: np.array([[apart[0][task], apart[1][task]]]) for task in both}
     return Values(rows, lambda pairs: float(pairs[:, 0].mean() / pairs[:, 1].mean()))
 
 
-def path_excess(run: Trajectory) -> float:
-    """Length of the hand's paths beyond their chords, as a share of these."""
-    paths = [hand_path(run, goal) for goal in range(1, len(run.task.goals) + 1)]
-    lengths = sum(float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in paths)
-    return lengths / sum(float(np.linalg.norm(path[-1] - path[0])) for path in paths) - 1
-
-
-def changed_by_practice(
-    study: Study, model: Model, measured: Callable[[Trajectory], float], sign: int
-) -> Values:
-    """What the learner changes from the corrective process alone, its first trial."""
-    if model.method not in ("", EC2, EC3):
-        return mean_of([])
-    values = []
-    for arms in (1, 2):
-        alone = unmoved_tasks(study, MODELS["corrective process"], arms)
-        for task, runs in unmoved_tasks(study, model, arms).items():
-            if task in alone:
-                learned = np.mean([measured(run) for run in runs.runs])
-                values.append(np.array(sign * (learned - measured(alone[task].runs[0]))))
-    return mean_of(values)
-
-
-# Which hand, and what the other does
+# Two hands, and long tasks
 
 
 def first_movement(study: Study, model: Model) -> Values:
     """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
-    values = []
-    for runs in unmoved_tasks(study, model, 2).values():
+    values = {}
+    for task, runs in unmoved_tasks(study, model, 2).items():
         excess = []
         for run in runs.runs:
             alone = isolated_reach(run.task, run.task.q0, 1, run.hands[0])
             if run.hands[0] != run.hands[1] and alone is not None:
                 excess.append(int(run.execution.ticks_by_goal()[0]) - alone[0])
-        values += [np.array(np.mean(excess))] if excess else []
+        if excess:
+            values[task] = float(np.mean(excess))
     return mean_of(values)
-
-
-@cached
-def needs_other_hands(study: Study) -> set[str]:
-    """Tasks whose best solution takes a hand that is slower for some goal that others follow."""
-    best: dict[str, Trajectory] = {}
-    for model in MODELS.values():
-        for task, runs in unmoved_tasks(study, model, 2).items():
-            for run in runs.runs:
-                if task not in best or run.ticks < best[task].ticks:
-                    best[task] = run
-    return {task for task, run in best.items() if np.mean(isolated_agreement(run)[:-1]) < SERIAL}
-
-
-def late_less_early(study: Study, model: Model) -> Values:
-    """Share of goals hit with the quicker hand for them: the last but one, less those before."""
-    return mean_of([
-        np.array(np.mean([agree[-2] - np.mean(agree[:-2]) for agree in agreements]))
-        for task, runs in unmoved_tasks(study, model, 2).items()
-        if task in needs_other_hands(study)
-        and (agreements := [np.array(isolated_agreement(run), float) for run in runs.runs])
-    ])  # fmt: skip
 
 
 def near_tie_repeats(study: Study, model: Model) -> Values:
     """Share of near ties in which the hand stays the same."""
-    by_task = []
-    for runs in unmoved_tasks(study, model, 2).values():
+    by_task = {}
+    for task, runs in unmoved_tasks(study, model, 2).items():
         repeats = [
             run.hands[goal - 1] == run.hands[goal - 2]
             for run in runs.runs
             for goal in near_ties(run)
         ]
         if repeats:
-            by_task.append(np.array(repeats, dtype=np.float64)[:, None])
-    enough = sum(map(len, by_task)) >= FEWEST_TIES
+            by_task[task] = np.array(repeats, dtype=np.float64)[:, None]
+    enough = sum(map(len, by_task.values())) >= FEWEST_TIES
     return Values(by_task, lambda rows: float(rows.mean()) if enough else math.nan)
 
 
@@ -410,39 +358,27 @@ def near_ties(run: Trajectory) -> Iterator[int]:
             yield goal
 
 
-def waiting_hand(study: Study, model: Model) -> Values:
-    """Share of the way to its next goal that the waiting hand covers, mean over goals."""
-    of_tasks = [SIGNS["other arm"].of(runs) for runs in unmoved_tasks(study, model, 2).values()]
-    return mean_of([np.array(values.mean()) for values in of_tasks if len(values)])
-
-
 def sufficient_horizon(study: Study, model: Model) -> Values:
     """The fewest goals ahead with which the planner is within 1 % of all goals in view."""
     if model != MODELS["all goals ahead"]:
-        return mean_of([])
+        return mean_of({})
     ticks: dict[str, dict[int, int]] = {}
     for cell, parameters in cells_by_method(study).get(PLANNER, []):
         if len(study.tasks[cell.task].goals) >= LONG:
             horizon = min(parameters["horizon"], len(study.tasks[cell.task].goals) - 1)
             ticks.setdefault(cell.task, {})[horizon] = -int(cell.rewards[0])
-    enough = [
-        min(
-            h
-            for h, of_horizon in by_horizon.items()
-            if of_horizon <= ENOUGH * by_horizon[max(by_horizon)]
+    return mean_of({
+        task: float(
+            min(h for h, of_h in by_h.items() if of_h <= ENOUGH * by_h[max(by_h)])
         )
-        for by_horizon in ticks.values()
-    ]
-    return mean_of([np.array(float(h)) for h in enough])
+        for task, by_h in ticks.items()
+    })  # fmt: skip
 
 
 MEASURES: dict[str, Measure] = {
     "slope norm at distance 1": partial(slope_norm, distance=1),
     "slope norm at distance 2": partial(slope_norm, distance=2),
     "slope norm at distance -1": partial(slope_norm, distance=-1),
-    "slope norm of the base": partial(slope_norm, distance=1, joints=slice(0, BASE_DOF)),
-    "slope norm of the arm": partial(slope_norm, distance=1, joints=slice(BASE_DOF, None)),
-    "slope norm at distance 1 less that at distance 2": nearer_goal_more,
     "rise of the slope norm at distance 2": partial(practice, statistic=horizon_rise),
     "rise of the ratio of slope norms": partial(practice, statistic=ratio_rise),
     "benefit correlation": benefit_correlation,
@@ -450,13 +386,7 @@ MEASURES: dict[str, Measure] = {
     "bow slope": bow_slope,
     "turn saved at goals": turn_saved,
     "stop ratio": stop_ratio,
-    "ticks saved by practice": partial(
-        changed_by_practice, measured=lambda run: float(run.ticks), sign=-1
-    ),
-    "rise of the path excess": partial(changed_by_practice, measured=path_excess, sign=1),
     "first movement against isolated reach": first_movement,
-    "hand as in isolation, late less early": late_less_early,
     "near-tie repeats": near_tie_repeats,
-    "preshaping of the other arm": waiting_hand,
 }
 """Every measure by the name that ``human.toml`` calls it by."""

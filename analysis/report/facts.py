@@ -441,7 +441,7 @@ def objectives(study: Study) -> Facts | None:
 
 @cached
 def human(study: Study) -> Facts | None:
-    """The findings about people that tell models apart, and how often the learner agrees."""
+    """How often the learner agrees with findings about people, and where it could differ."""
     rows = judge.judged(study).drop_duplicates(["finding", "model"])
     if not len(rows):
         return None

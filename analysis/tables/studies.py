@@ -317,9 +317,14 @@ def in_words(tests: pd.DataFrame) -> str:
     return f"{verdict}: {'; '.join(effects)}" if effects else verdict
 
 
-@table("finding, model, measure, bound, value[], tasks, of_test, verdict, built_in, because")
+@table(
+    "finding, model, measure, bound, value[], tasks, over_guesses[], of_test, verdict, built_in, "
+    "because"
+)
 def human_effects(study: Study) -> Rows:
     """What each model shows of each finding, with its interval over tasks; why it is silent.
+
+    Of models whose solutions are picked from trials, also by how much it exceeds random guesses.
 
     The second test of one measure has its bound in the row's name.
     """
