@@ -334,7 +334,7 @@ def test_a_subtask_is_credited_with_its_return(discount):
         rewards[1] + discount * rewards[2],
         rewards[2],
     ]
-    assert sum(rewards) == run.reward == -319
+    assert sum(rewards) == run.rewards[0] == -319
     overall = learn(task, "EC1", seed=0, trials=1)
     assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
 

@@ -159,15 +159,6 @@ def test_the_pages_show_the_example_as_it_is():
     assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)
 
 
-def test_the_best_of_many_trials_of_the_page_is_a_method(tmp_path):
-    page = (ROOT / "docs" / "howto" / "method.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r'```python\n("""The best of.*?)```', page, re.DOTALL)
-    (tmp_path / "best.py").write_text(text, encoding="utf-8")
-    entry = registry([tmp_path / "best.py"])["best-of-many"]
-    laws = check_method(entry, tasks=[load_task("ascending"), load_task("two-armed-2")])
-    assert [law for law in laws if not law.passed] == []
-
-
 def test_the_agent_of_the_page_learns(tmp_path):
     page = (ROOT / "docs" / "howto" / "method.md").read_text(encoding="utf-8")
     (text,) = re.findall(r'```python\n("""REINFORCE.*?)```', page, re.DOTALL)

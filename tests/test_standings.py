@@ -215,6 +215,7 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     learns = seen.runs.method.str.contains("/EC")
     runs = seen.runs.assign(variant=np.where(learns, "", "width=0.2"))
     again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
+    vars(again)["rewards"] = lambda: iter(())
     ranked = tables.ranking(again)
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)
