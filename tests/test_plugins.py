@@ -12,7 +12,6 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
