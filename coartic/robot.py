@@ -95,15 +95,15 @@ class Robot:
     """
 
     left_links: _Links = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the left arm's links from shoulder to hand, length unit."""
+    """Lengths of the links of the left arm, from the shoulder outwards, length unit."""
     right_links: _Links = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the right arm's links, length unit."""
+    """Lengths of the links of the right arm."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
-    """Where the left shoulder is, x and y from the centre of the base, length unit."""
+    """Left shoulder, x and y from the centre of the base, length unit."""
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
-    """Where the right shoulder is, likewise."""
+    """Right shoulder."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
-    """Width and height of the base, length unit."""
+    """Width and height of the base, which matter for drawings only."""
 
     def __repr__(self) -> str:
         paper = type(self).__dataclass_fields__

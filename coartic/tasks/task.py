@@ -104,17 +104,19 @@ class Provenance(FileData):
     status: Literal["printed", "inferred", "chosen"]
     """Printed in the paper, inferred from it, or chosen by the task's author."""
     source: Line
+    """Place in the paper, or the person who chose it, in one line."""
 
 
 class Start(FileData):
     """The starting configuration q_0 as a task file states it; ``Task.q0`` is the array."""
 
     base: Point = (0.0, 0.0)
-    """Centre of the base, x and y, length unit."""
+    """Centre of the base, length unit."""
     left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Joint angles of the left arm from shoulder to hand, rad, each from the link before."""
+    """Angle of each joint of the left arm, rad, one for each link; the first is measured from
+    +x."""
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Joint angles of the right arm, rad."""
+    """Angles of the right arm."""
 
 
 Ticks = Annotated[float, Field(ge=0, le=MOST_PENALTY, allow_inf_nan=False)]
@@ -155,8 +157,11 @@ class Task(FileData):
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)]
+    """Name in commands, suites and tables: letters, digits, ``.``, ``_``, ``-``."""
     title: Line = ""
+    """Name in figures and tables; ``name`` if it is empty."""
     description: Line = ""
+    """A sentence for lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands the robot has."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
@@ -169,7 +174,9 @@ class Task(FileData):
     """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
     the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
+    """Configuration in which every trial begins: table ``[start]``."""
     robot: Robot = Robot()
+    """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     penalty: Penalty | None = None
     """What the reward loses beside 1 a tick; nothing in the paper's tasks."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
