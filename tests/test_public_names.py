@@ -82,6 +82,14 @@ def test_what_is_no_task(call):
         call("nowhere.toml")
 
 
+def test_what_is_no_condition():
+    for wrong in (None, 4, ["EC4"]):
+        with pytest.raises(
+            TypeError, match="condition is .*; it must be an ExplorationCondition or"
+        ):
+            coartic.learn(TASK, wrong, seed=0)
+
+
 Q = np.zeros(10)
 PATH = coartic.trajectory(TASK, coartic.corrective_trial(TASK, HANDS).movements)
 TAKES_A_HAND = {

@@ -150,9 +150,17 @@ VARIANTS = {
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or variant by its id; raises CoarticError for an unknown one."""
+    """A condition or variant by its id.
+
+    Raises CoarticError for an unknown one, and TypeError for what is neither id nor condition.
+    """
     if isinstance(condition, ExplorationCondition):
         return condition
+    if not isinstance(condition, str):
+        raise TypeError(
+            f"condition is {brief_value(condition)}; it must be an ExplorationCondition or the "
+            "name of one, such as 'EC4'"
+        )
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:

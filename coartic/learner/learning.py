@@ -220,6 +220,8 @@ def learn(
         The condition does not fit the task, or no first trial is found for it.
     CoarticError
         The condition is unknown.
+    TypeError
+        The task is neither a Task nor a text nor a path, or the condition is none.
     ValueError
         The seed is negative, there is no trial, no movement can be made with the model, or the
         task was changed into none.
@@ -276,6 +278,8 @@ def learn_many(
         The condition does not fit the task, or no first trial is found for it.
     CoarticError
         The condition is unknown.
+    TypeError
+        The task is neither a Task nor a text nor a path, or the condition is none.
     SolutionError
         The movements of ``start`` break the task's rules.
     ValueError

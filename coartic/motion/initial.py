@@ -52,6 +52,8 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     ------
     TaskError
         The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
     ValueError
         The hands do not fit the task, or no movement can be made with the model.
 
@@ -89,6 +91,8 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     ------
     TaskError
         The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
     NotApplicableError
         There are more than 4096 sequences.
     ValueError
@@ -179,6 +183,8 @@ def initial_hands(
     ------
     TaskError
         The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError

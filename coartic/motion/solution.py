@@ -151,6 +151,8 @@ def execute(
     ------
     TaskError
         The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
     SolutionError
         The solution breaks the task's rules: goals are missing or out of order, the robot does
         not have a hand, a target has the wrong shape or is not finite, a locked base moves.

@@ -119,6 +119,8 @@ def trajectory(
     ------
     TaskError
         The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
