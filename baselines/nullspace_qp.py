@@ -71,7 +71,7 @@ from coartic.method import Information, Method, MethodError, Parameters, Result,
 from coartic.motion.initial import changes_of_hand, too_many_sequences
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
-from coartic.tasks.task import LETTERS, MOST_GOALS, hands_of, letters_of
+from coartic.tasks.task import LETTERS, MOST_GOALS, beyond_reach, hands_of, letters_of
 
 FACES = 16
 """Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
@@ -151,7 +151,7 @@ class Controller:
         """
         (hand, goal, _), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         accuracy = self.session.model.correction_tolerance
-        short = self.task.beyond_reach(hand, self.task.goals[goal], accuracy)
+        short = beyond_reach(self.task, hand, self.task.goals[goal], accuracy)
         if short > self.task.radius:
             raise StuckError(
                 f"{name} ends {short:.3g} short of it with the base "

@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.errors import CoarticError, NotApplicableError, TaskError
+    from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import LearningRun, learn, learn_many
+    from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.model import PAPER, MotionModel
     from coartic.motion.corrective import Correction, correct
     from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
@@ -30,12 +31,14 @@ __all__ = [
     "PAPER",
     "VARIANTS",
     "Arm",
+    "BudgetError",
     "CoarticError",
     "Correction",
     "Execution",
     "ExplorationCondition",
     "Hand",
     "LearningRun",
+    "MethodError",
     "MotionModel",
     "MoveResult",
     "Movement",
@@ -44,10 +47,12 @@ __all__ = [
     "Optimiser",
     "Provenance",
     "Robot",
+    "SolutionError",
     "Start",
     "Task",
     "TaskError",
     "Trajectory",
+    "UndeclaredError",
     "builtin_tasks",
     "correct",
     "corrective_trial",
@@ -64,9 +69,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    "errors": ("CoarticError", "NotApplicableError", "TaskError"),
+    "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("LearningRun", "learn", "learn_many"),
+    "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
     "motion.corrective": ("Correction", "correct"),
     "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),
@@ -90,4 +96,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """The names of the API, and those that Python gives every module."""
+    return sorted({*__all__, *(name for name in globals() if name.endswith("__"))})

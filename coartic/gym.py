@@ -57,9 +57,10 @@ class Arms:
         observe: Literal["learner", "posture"] = "learner",
         model: MotionModel = PAPER,
     ) -> None:
-        from coartic import Task, corrective_trial, load_task  # the compiler takes a while
+        from coartic import corrective_trial  # the compiler takes a while
+        from coartic.tasks.task import as_task
 
-        self.task = task if isinstance(task, Task) else load_task(task)
+        self.task = as_task(task)
         self.scale, self.model = scale, model
         goals, dof = len(self.task.goals), self.task.robot.dof
         if isinstance(around, str):

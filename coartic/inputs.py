@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import CoarticError
-from coartic.text import did_you_mean, plain
+from coartic.text import did_you_mean, plain, short_repr
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -51,6 +51,18 @@ class FileData(BaseModel):
     """What a file states: it cannot be changed, and every key is known."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __repr__(self) -> str:
+        """What it states beyond the defaults, in a few lines."""
+        stated = {}
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if field.is_required() or value != field.get_default(call_default_factory=True):
+                stated[name] = value
+        return short_repr(self, **stated)
+
+    def __str__(self) -> str:
+        return repr(self)
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:

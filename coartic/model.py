@@ -9,18 +9,21 @@ from typing import NamedTuple
 class MotionModel(NamedTuple):
     """Constants of the paper's model; docs/model.md says where each comes from.
 
-    A named tuple, so that the compiled kernels take it as it is.
+    A named tuple, so that the compiled kernels take it as it is. Another one is made with keyword
+    arguments, ``MotionModel(gain=0.1)``, or from one: ``PAPER._replace(gain=0.1)``.
     """
 
     step: float = 0.01
-    """m: joint-space length of one movement step (printed)."""
+    """m: length of one movement step in joint space, in which a length unit of the base counts as
+    much as a rad of a joint (printed)."""
 
     arrival_tolerance: float = 0.01
     """θ^a: distance at which a hand has arrived, length unit (inferred; the
     extracted text prints 0.1, which does not give the published rewards)."""
 
     gain: float = 0.05
-    """α: step size of the corrective process (printed)."""
+    """α: step size of the corrective process, ``q += α Jᵀ e`` (printed). For the base it has no
+    unit; for the joints it is rad per squared length unit, which cancels the unit of ``Jᵀ e``."""
 
     correction_tolerance: float = 0.01
     """Distance to the goal's centre at which the corrective process ends, length

@@ -31,8 +31,7 @@ from coartic.motion.initial import too_many_sequences
 from coartic.motion.solution import Movement
 from coartic.motion.trials import movements_of
 from coartic.robot import HANDS, Array
-from coartic.tasks.catalogue import load_task
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, as_task, hands_of, letters_of
 from coartic.text import counted
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
@@ -215,7 +214,7 @@ def objective(
     MethodError where the corrective process completes no sequence, or where there are too many to
     try.
     """
-    chosen = task if isinstance(task, Task) else load_task(task)
+    chosen = as_task(task)
     if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):
         raise MethodError("infeasible", f"{reason}; say which hands")
     session = Session(chosen, 0, TOLD, model=model)

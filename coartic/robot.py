@@ -22,7 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from coartic.text import short_repr
+
 Hand = Literal["left", "right"]
+"""Which hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
 LARGEST = 1e4  # of any figure: far beyond use, and exact in all that follows
 MOST_LINKS = 100  # of an arm
@@ -35,12 +38,19 @@ BASE_DOF = 2
 
 
 class Arm(NamedTuple):
-    """One arm as the formulas and the compiled kernels read it."""
+    """One arm of a robot, as the formulas and the compiled kernels read it."""
 
-    first: int  # index in q of the first joint
-    links: Any  # (n,) link lengths, length unit
-    shoulder_x: float  # shoulder from the centre of the base, length unit
+    first: int
+    """Index in ``q`` of the angle of its first joint."""
+    links: Any
+    """Lengths of its links from shoulder to hand, shape ``(n,)``, length unit."""
+    shoulder_x: float
+    """Where its shoulder is, from the centre of the base, length unit."""
     shoulder_y: float
+    """The same in y."""
+
+    def __repr__(self) -> str:
+        return short_repr(self, **self._asdict())
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
@@ -74,18 +84,35 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class Robot:
-    """Geometry of a two-armed planar robot; the default is the paper's.
+    """Geometry of a two-armed planar robot, and its kinematics; the default is the paper's.
 
     Four unit links an arm on a box 1 wide and 0.2 high are printed (Figure 1).
     Shoulders on the top corners of the box are inferred: only a height of +0.1
     gives the published initial rewards of the one-armed tasks (docs/model.md).
+
+    A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
+    of the left arm and those of the right one (rad, each from the link before).
     """
 
     left_links: _Links = (1.0, 1.0, 1.0, 1.0)
+    """Lengths of the links of the left arm, from the shoulder outwards, length unit."""
     right_links: _Links = (1.0, 1.0, 1.0, 1.0)
+    """Lengths of the links of the right arm."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
+    """Left shoulder, x and y from the centre of the base, length unit."""
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
+    """Right shoulder."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
+    """Width and height of the base, which matter for drawings only."""
+
+    def __repr__(self) -> str:
+        paper = type(self).__dataclass_fields__
+        others = {
+            name: getattr(self, name)
+            for name in ("left_shoulder", "right_shoulder", "base_size")
+            if getattr(self, name) != paper[name].default
+        }
+        return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
 
     @property
     def dof(self) -> int:
@@ -94,7 +121,10 @@ class Robot:
 
     @property
     def shoulder_height(self) -> float:
-        """Of both shoulders above the base's centre; ValueError where they differ."""
+        """Height of both shoulders above the centre of the base, length unit.
+
+        Raises ValueError where the shoulders differ in it.
+        """
         (_, left), (_, right) = self.left_shoulder, self.right_shoulder
         if left != right:
             raise ValueError(f"the left shoulder is at {left}, the right one at {right}")
@@ -126,42 +156,138 @@ class Robot:
         }
 
     def arm(self, hand: Hand) -> Arm:
-        """The arm that carries ``hand``."""
+        """The arm that carries a hand.
+
+        Raises
+        ------
+        ValueError
+            The hand is neither ``"left"`` nor ``"right"``; so in all methods that take a hand.
+        """
         try:
             return self._arms[hand]
-        except KeyError:
+        except (KeyError, TypeError):
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """The part of ``q`` that holds the joints of one arm, without the base."""
+        """Where the joint angles of one arm are in a configuration, without the base.
+
+        Returns
+        -------
+        slice
+            ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad.
+
+        Raises
+        ------
+        ValueError
+            The hand is neither ``"left"`` nor ``"right"``.
+        """
         arm = self.arm(hand)
         return slice(arm.first, arm.first + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """Nearest and farthest distance of the hand from its shoulder, length unit."""
+        """How near to its shoulder a hand can be, and how far from it.
+
+        Returns
+        -------
+        tuple of float
+            The least and the greatest distance, length unit.
+
+        Raises
+        ------
+        ValueError
+            The hand is neither ``"left"`` nor ``"right"``.
+        """
+        self.arm(hand)  # refuses what is no hand
         links = self.left_links if hand == "left" else self.right_links
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
     def forward_kinematics(self, q: ArrayLike, hand: Hand) -> Array:
-        """Hand position F_a(q), shape ``(..., 2)``, for ``q`` of shape ``(..., dof)``."""
+        """Where a hand is: the forward kinematics F_a(q).
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+            Configurations, length unit (base) and rad (joints).
+        hand : {"left", "right"}
+            The hand.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            Its positions, x and y, length unit.
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another shape, or there is no such hand.
+
+        Notes
+        -----
+        Source: Craig (2004), planar serial chain.
+        """
         array = self._configuration(q)
         return self._hand(*self._numpy_chain(array, hand), array)
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
-        """Positions of shoulder, joints and hand, shape ``(..., n + 1, 2)``."""
+        """Where the shoulder, the joints and the hand of an arm are.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+            Configurations, length unit (base) and rad (joints).
+        hand : {"left", "right"}
+            The hand of the arm.
+
+        Returns
+        -------
+        ndarray, shape (..., n + 1, 2)
+            Positions from the shoulder to the hand of an arm with n links, length unit.
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another shape, or there is no such hand.
+        """
         xs, ys = self._numpy_chain(self._configuration(q), hand)
         return np.stack([np.stack(xs, axis=-1), np.stack(ys, axis=-1)], axis=-1)
 
     def jacobian(self, q: ArrayLike, hand: Hand) -> Array:
-        """Jacobian of the hand position by all of ``q``, shape ``(..., 2, dof)``.
+        """The Jacobian of a hand's position.
 
-        Columns of the other arm's joints are zero. Units: length unit per length
-        unit (base) or per rad (joints).
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+            Configurations, length unit (base) and rad (joints).
+        hand : {"left", "right"}
+            The hand.
+
+        Returns
+        -------
+        ndarray, shape (..., 2, dof)
+            Derivatives of x and y by each entry of ``q``: length unit per length unit (base) and
+            per rad (joints). Columns of the other arm's joints are zero.
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another shape, or there is no such hand.
         """
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """:meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, of one chain."""
+        """:meth:`forward_kinematics` and :meth:`jacobian` of the same ``q``, in one computation.
+
+        Returns
+        -------
+        tuple of ndarray
+            Hand positions, shape ``(..., 2)``, length unit, and their Jacobians, shape
+            ``(..., 2, dof)``, length unit per length unit (base) and per rad (joints).
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another shape than ``(..., dof)``, or there is no such hand.
+        """
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -173,20 +299,42 @@ class Robot:
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
-        """Corners of the base, counter-clockwise from lower left, shape ``(..., 4, 2)``."""
+        """The corners of the base.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+            Configurations, length unit (base) and rad (joints).
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 2)
+            The corners, counter-clockwise from the lower left one, length unit.
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another shape.
+        """
         array = self._configuration(q)
         half = np.array(self.base_size) / 2
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
         return array[..., None, :BASE_DOF] + corners
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Hand position as a CasADi expression, 2 x 1, for a CasADi ``q`` (dof x 1)."""
+        """Hand position as a CasADi expression, 2 x 1, length unit, for a CasADi ``q``, dof x 1.
+
+        Raises ValueError where ``q`` has another size, or there is no such hand.
+        """
         import casadi
 
         return casadi.vertcat(*self.symbolic_joints(q, hand)[-1])
 
     def symbolic_joints(self, q: Any, hand: Hand) -> list[tuple[Any, Any]]:
-        """Positions of shoulder, joints and hand, as :meth:`symbolic_hand`, x and y of each."""
+        """Positions of shoulder, joints and hand as CasADi expressions: x and y of each.
+
+        Raises ValueError where ``q`` has another size, or there is no such hand.
+        """
         import casadi
 
         arm = self.arm(hand)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import difflib
 import unicodedata
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -20,7 +20,11 @@ LONGEST_LINE = 500
 """Characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
 """Characters of a reason that is kept."""
+LONGEST_REPR = 500
+"""Characters of the ``repr`` of an object: five lines of 100."""
 _MOST_NAMED = 12  # in a sentence
+_MOST_FIGURES = 12  # of an array in a repr
+_LONGEST_FACT = 80  # characters in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
@@ -54,6 +58,26 @@ def shown(c: str) -> str:
 def counted(count: int, thing: str) -> str:
     """``1 run``, ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def short_repr(thing: object, /, *texts: str, **facts: object) -> str:
+    """The ``repr`` of an object: ``Name(text, fact=value)``, of at most :data:`LONGEST_REPR`
+    characters.
+
+    ``texts`` stand as they are. Of arrays with more than a few figures the shape is shown.
+    """
+    parts = [*texts, *(f"{name}={shown_fact(value)}" for name, value in facts.items())]
+    return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_REPR)
+
+
+def shown_fact(value: Any) -> str:
+    """A value as one short line: a NumPy array by its figures or its shape, others by ``repr``."""
+    if hasattr(value, "shape") and hasattr(value, "tolist"):
+        if len(value.shape) == 1 and value.size <= _MOST_FIGURES:
+            figures = (f"{x:.4g}" if isinstance(x, float) else repr(x) for x in value.tolist())
+            return plain(f"[{', '.join(figures)}]", _LONGEST_FACT + 20)
+        return f"<array of shape {value.shape}>"
+    return plain(repr(value), _LONGEST_FACT)
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ project = "coartic"
 author = copyright = "The coartic developers"  # noqa: A001
 version = release = coartic.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "site_directives"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_directives"]
 source_suffix = {".md": "myst-nb"}
 
 html_theme = "furo"
@@ -36,6 +36,7 @@ nb_merge_streams = True
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
 autodoc_preserve_defaults = True
+napoleon_google_docstring = False  # docstrings have NumPy's blocks
 autodoc_mock_imports = ["stable_baselines3", "torch"]  # of the extra coartic[rl]
 python_use_unqualified_type_names = True
 toc_object_entries = False

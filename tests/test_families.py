@@ -28,7 +28,7 @@ from coartic.tasks.families import (
     read_family,
     task_text,
 )
-from coartic.tasks.task import Address, address_of
+from coartic.tasks.task import Address, address_of, beyond_reach
 from tests.support.commands import call
 from tests.support.suites import ROOT
 
@@ -142,7 +142,7 @@ def test_every_instance_is_valid(address):
         position = task.robot.forward_kinematics(task.q0, hand)
         for goal in task.goals:
             assert math.dist(position, goal) > task.radius + 0.19
-            assert task.beyond_reach(hand, goal, 0.01) < 0
+            assert beyond_reach(task, hand, goal, 0.01) < 0
         jacobian = task.robot.jacobian(task.q0, hand)[:, task.robot.joints(hand)]
         singular = np.linalg.svd(jacobian, compute_uv=False)[1] < 1e-3
         assert not singular or not family.bent

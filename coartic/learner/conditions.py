@@ -11,15 +11,16 @@ measures what each does to learning.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
+from coartic.inputs import brief_value
 from coartic.robot import HANDS, Hand
-from coartic.text import unknown
+from coartic.text import short_repr, unknown
 
 if TYPE_CHECKING:
     from coartic.tasks.task import Task
@@ -44,16 +45,25 @@ Noise = Annotated[float, Field(ge=0, le=MOST_NOISE)]
 class ExplorationCondition:
     """What the learner explores. Source: paper, section *Experiments*.
 
-    Raises pydantic.ValidationError, a ValueError, for what cannot be.
+    ``CONDITIONS`` has the paper's four, ``VARIANTS`` has ours; ``dataclasses.replace`` makes others
+    of them. Raises pydantic.ValidationError, a ValueError, for what cannot be.
     """
 
     id: str
+    """Its name, such as ``"EC4"``."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
-    modify_chosen: bool  # AModChosen
-    modify_other: bool  # AModOther
-    hand_exploration: HandExploration  # "random" is DASel
-    epsilon: Share = 0.2  # ε
-    noise_sd: Noise = 0.05  # SD of η, length unit (base) or rad (joints)
+    """Hands that the learner uses."""
+    modify_chosen: bool
+    """AModChosen: whether noise moves the targets of the base and of the arm that is to hit."""
+    modify_other: bool
+    """AModOther: whether noise moves the targets of the other arm."""
+    hand_exploration: HandExploration
+    """How the hand for a goal is explored: not at all (``"none"``), by taking the one that is
+    closest to the goal (``"closest"``), or at random (``"random"``, DASel)."""
+    epsilon: Share = 0.2
+    """ε: the probability with which the hand for a goal is explored (printed)."""
+    noise_sd: Noise = 0.05
+    """Standard deviation of the noise η, length unit (base) and rad (joints) (printed)."""
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
@@ -90,6 +100,17 @@ class ExplorationCondition:
                 "a learner with credit 'subtask' is told nothing of the whole, so that its best "
                 "trial is no solution that it knows: set learned to 'replay'"
             )
+
+    def __repr__(self) -> str:
+        positional = ("hands", "modify_chosen", "modify_other", "hand_exploration")
+        facts = {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.default is not MISSING and getattr(self, field.name) != field.default
+        }
+        return short_repr(
+            self, brief_value(self.id), *(repr(getattr(self, name)) for name in positional), **facts
+        )
 
     def why_not(self, task: Task) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
@@ -129,9 +150,17 @@ VARIANTS = {
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or variant by its id; raises CoarticError for an unknown one."""
+    """A condition or variant by its id.
+
+    Raises CoarticError for an unknown one, and TypeError for what is neither id nor condition.
+    """
     if isinstance(condition, ExplorationCondition):
         return condition
+    if not isinstance(condition, str):
+        raise TypeError(
+            f"condition is {brief_value(condition)}; it must be an ExplorationCondition or the "
+            "name of one, such as 'EC4'"
+        )
     try:
         return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
     except KeyError:

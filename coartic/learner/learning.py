@@ -38,7 +38,8 @@ from coartic.motion.problem import problem_of
 from coartic.motion.solution import Execution, Movement, execute, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
+from coartic.text import short_repr
 
 TRIALS = 10_000  # trials of one run (printed)
 METHOD_PREFIX = "dual-process/"
@@ -48,16 +49,21 @@ CORRECTIONS = "corrections"
 
 @dataclass(frozen=True)
 class LearningRun:
-    """One run of the learner and everything it found."""
+    """One run of the learner and everything it found (:func:`learn`)."""
 
     task: Task
+    """The task."""
     condition: ExplorationCondition
+    """What the learner explored."""
     model: MotionModel
+    """The constants of movement and of the corrective process."""
     seed: int
+    """Seed of the run's random numbers."""
     first_hands: str
-    """Hands of trial 0."""
+    """Hands of trial 0, such as ``"RRRR"``."""
     rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
-    """Total reward of each trial, shape ``(trials,)``; masked where the trial failed."""
+    """Total reward of each trial, shape ``(trials,)``: minus its control ticks, and minus its
+    penalty where the task has one; masked where the trial failed."""
     best_trial: int | None
     """First trial with the highest total reward; None where none was completed."""
     initial: tuple[Movement, ...]
@@ -69,20 +75,38 @@ class LearningRun:
     replay_reward: int | None
     """Its reward; None where it did not hit every goal."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Ticks: total
-    rewards, or returns from that goal on where the condition credits subtasks."""
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
+    0: total rewards, or returns from that goal on where the condition credits subtasks; -inf
+    where nothing was learned."""
     targets: Array
-    """q*, shape ``(goals, 3, 2, dof)``; NaN where Q is -inf."""
+    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
+    -inf."""
     corrections: NDArray[np.int64]
     """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
     counters: Meter
     """What it spent; the replay is not part of it."""
     wall_s: float
-    """Its share of the time that it and the runs beside it took."""
+    """Its share of the time that it and the runs beside it took, seconds."""
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            task=self.task.name,
+            condition=self.condition.id,
+            seed=self.seed,
+            trials=len(self.rewards),
+            hands=self.hands,
+            reward=self.reward,
+            initial_reward=self.initial_reward,
+            replay_reward=self.replay_reward,
+        )
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Whether each trial hit every goal; the others failed and taught nothing."""
+        """Whether each trial hit every goal, shape ``(trials,)``.
+
+        The others failed: they changed neither ``values`` nor ``targets``.
+        """
         return ~np.ma.getmaskarray(self.rewards)
 
     @property
@@ -141,14 +165,25 @@ class LearningRun:
         return hands_in(self.replay) if self.replay_completed else None
 
     def execute(self) -> Execution:
-        """Execute what was learned again, apart from the learner."""
+        """Execute what was learned again, apart from the learner.
+
+        Returns
+        -------
+        Execution
+            What happened; its reward is that of the run.
+
+        Raises
+        ------
+        CoarticError
+            Nothing was learned.
+        """
         if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
         return execute(self.task, self.learned, model=self.model)
 
 
 def learn(
-    task: Task,
+    task: TaskLike,
     condition: str | ExplorationCondition,
     *,
     seed: int,
@@ -157,17 +192,49 @@ def learn(
 ) -> LearningRun:
     """Run the learner on a task under an exploration condition.
 
-    The result depends on the arguments alone. Raises NotApplicableError where the
-    condition does not fit the task, CoarticError for an unknown condition,
-    and ValueError for a negative seed, fewer than one trial, a model
-    that no movement can be made with, or a task that was changed into none. Source: paper,
-    Figure 3.
+    The result depends on the arguments alone.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    condition : str or ExplorationCondition
+        The condition, or the name of one in ``CONDITIONS`` or ``VARIANTS``, such as ``"EC4"``.
+    seed : int
+        Seed of the random numbers.
+    trials : int
+        Number of trials, the initial one included.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    LearningRun
+        The rewards of all trials, the solution, and the learner's tables.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    NotApplicableError
+        The condition does not fit the task, or no first trial is found for it.
+    CoarticError
+        The condition is unknown.
+    TypeError
+        The task is neither a Task nor a text nor a path, or the condition is none.
+    ValueError
+        The seed is negative, there is no trial, no movement can be made with the model, or the
+        task was changed into none.
+
+    Notes
+    -----
+    Source: paper, Figure 3.
     """
     return learn_many(task, condition, seeds=[seed], trials=trials, model=model, jobs=1)[0]
 
 
 def learn_many(
-    task: Task,
+    task: TaskLike,
     condition: str | ExplorationCondition,
     *,
     seeds: Iterable[int],
@@ -176,13 +243,50 @@ def learn_many(
     jobs: int = -1,
     start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
-    """Run :func:`learn` for many seeds; one run per seed, in their order.
+    """Run the learner for many seeds, as :func:`learn` for each of them.
 
-    ``start`` are movements that trial 0 makes in place of the corrective process, one to a target
-    for each goal, such as those of a plan; what they miss is corrected. Runs go on side by side, on
-    ``jobs`` threads, -1 for one per core; neither changes anything but the time. Raises what
-    :func:`learn` does, and SolutionError for such movements that break the rules.
+    Runs go on side by side, which changes nothing but the time.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    condition : str or ExplorationCondition
+        The condition, or the name of one in ``CONDITIONS`` or ``VARIANTS``, such as ``"EC4"``.
+    seeds : iterable of int
+        A seed for each run.
+    trials : int
+        Number of trials of each run, the initial one included.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+    jobs : int
+        Number of threads; -1 for one a core.
+    start : sequence of Movement
+        Movements that trial 0 makes in place of the corrective process, one to a target for each
+        goal, such as those of a plan. What they miss is corrected.
+
+    Returns
+    -------
+    list of LearningRun
+        A run for each seed, in their order.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    NotApplicableError
+        The condition does not fit the task, or no first trial is found for it.
+    CoarticError
+        The condition is unknown.
+    TypeError
+        The task is neither a Task nor a text nor a path, or the condition is none.
+    SolutionError
+        The movements of ``start`` break the task's rules.
+    ValueError
+        A seed is negative, there is no trial, no movement can be made with the model, or the task
+        was changed into none.
     """
+    task = as_task(task)
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:

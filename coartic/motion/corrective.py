@@ -29,6 +29,7 @@ from coartic.motion.lanes import (
 from coartic.motion.movement import checked_goal, configuration, largest_square
 from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.text import short_repr
 
 _CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 
@@ -42,13 +43,18 @@ class Corrector(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """Outcome of the corrective process."""
+    """What the corrective process found (:func:`correct`)."""
 
     q: Array
-    """Configuration found, shape ``(dof,)``; the last iterate if not converged."""
+    """Configuration found, shape ``(dof,)``, length unit (base) and rad (joints); the last
+    iterate if not converged."""
     converged: bool
+    """Whether the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
     """Descent steps, each with one Jacobian and one forward-kinematics evaluation."""
+
+    def __repr__(self) -> str:
+        return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
 
 
 @lanewise
@@ -141,11 +147,39 @@ def correct(
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Correction:
-    """A configuration that puts ``hand`` at ``goal``, found by descent from ``q``.
+    """The corrective process: find a configuration that puts a hand at a goal.
 
-    ``locked_base`` holds ``"x"`` and/or ``"y"``. No convergence within
-    ``model.max_iterations`` is an outcome, not an error. Raises ValueError for a
-    wrong shape, for figures that are not finite and for other locks.
+    It descends from ``q`` on the distance to the goal, by the transposed Jacobian. The other arm
+    does not move.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (dof,)
+        Where to begin, length unit (base) and rad (joints).
+    hand : {"left", "right"}
+        The hand.
+    goal : tuple of float
+        Centre of the goal, x and y, length unit.
+    locked_base : collection of {"x", "y"}
+        Coordinates of the base that do not move.
+    model : MotionModel
+        The constants; ``gain``, ``correction_tolerance`` and ``max_iterations`` matter.
+
+    Returns
+    -------
+    Correction
+        The configuration, whether it is at the goal, and how many iterations it took. Not to
+        converge within ``model.max_iterations`` is an outcome, not an error.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a figure is not finite, there is no such hand, or another lock is named.
+
+    Notes
+    -----
     Source: paper, Figure 2 (Whitney 1969; Craig 2004).
     """
     if not set(locked_base) <= {"x", "y"}:

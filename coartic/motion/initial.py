@@ -13,16 +13,56 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
 from coartic.errors import NotApplicableError
+from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import Execution, Movement, execute, execute_many
 from coartic.robot import HANDS, Hand
-from coartic.tasks.task import WITHOUT_REACH, Task, hands_of, letters_of
+from coartic.tasks.task import (
+    WITHOUT_REACH,
+    Task,
+    TaskLike,
+    as_task,
+    checked_hands,
+    hands_of,
+    letters_of,
+)
 
 MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 
-def corrective_trial(task: Task, hands: str, *, model: MotionModel = PAPER) -> Execution:
-    """One trial by the corrective process alone, with the given hands (``"RRRR"``)."""
+def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) -> Execution:
+    """Make one trial by the corrective process alone.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : str
+        The hand for each goal: ``"LRRR"`` is left, right, right, right.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    Execution
+        What happened: movements, configurations at the hits, control ticks and reward. Where the
+        corrective process does not converge, ``completed`` is False and ``reason`` says so.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    ValueError
+        The hands do not fit the task, or no movement can be made with the model.
+
+    Notes
+    -----
+    Source: paper, section *The Corrective Process*.
+    """
+    task = as_task(task)
+    hands = checked_hands(task, hands)
     return execute(task, corrective_movements(hands), model=model)
 
 
@@ -31,17 +71,51 @@ def corrective_movements(hands: str) -> list[Movement]:
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
-def hand_sequences(task: Task, hands: Iterable[Hand] | None = None) -> list[str]:
-    """All hand sequences of a task, left before right; 2^G of them for two hands.
+def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[str]:
+    """All hand sequences of a task.
 
-    Raises NotApplicableError above ``MOST_SEQUENCES``.
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : iterable of {"left", "right"}, optional
+        The hands that may be used; all that the robot has by default.
+
+    Returns
+    -------
+    list of str
+        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals,
+        2^G sequences for two hands.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    NotApplicableError
+        There are more than 4096 sequences.
+    ValueError
+        The robot has not all of these hands.
     """
-    allowed = task.hands if hands is None else tuple(hands)
+    task = as_task(task)
+    allowed = task.hands if hands is None else hands_among(task, hands)
     ordered = [hand for hand in HANDS if hand in allowed]
     reason = too_many_sequences(task, len(ordered))
     if reason is not None:
         raise NotApplicableError(reason)
     return [letters_of(s) for s in itertools.product(ordered, repeat=len(task.goals))]
+
+
+def hands_among(task: Task, hands: Iterable[Hand]) -> tuple[Hand, ...]:
+    """Some of the hands of a task's robot; ValueError where it does not have them."""
+    chosen = tuple(hands)
+    if not chosen or any(hand not in task.hands for hand in chosen):
+        raise ValueError(
+            f"hands is {brief_value(hands if isinstance(hands, str) else chosen)}; it must be a "
+            f"list of hands of task {task.name!r}: {' and '.join(map(repr, task.hands))}"
+        )
+    return chosen
 
 
 def too_many_sequences(task: Task, hands: int) -> str | None:
@@ -83,16 +157,46 @@ def ranked_sequences(
 
 
 def initial_hands(
-    task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+    task: TaskLike, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> str:
-    """The initial hand sequence of a task for a robot with the given hands.
+    """The hand sequence of a first trial of a task.
 
-    A named sequence stands as it is. Policies take the first of
-    :func:`ranked_sequences` among sequences of one hand (``best-single-hand``) or among
-    all (``best-of-all``). Raises NotApplicableError where no candidate completes the
-    task, or there are too many.
+    A sequence that the task names stands as it is. Of a policy it is the sequence with which the
+    corrective process alone gets the highest reward: among sequences of one hand
+    (``"best-single-hand"``), or among all (``"best-of-all"``).
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : tuple of {"left", "right"}, optional
+        The hands among which a policy chooses; all that the robot has by default.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    str
+        The hand for each goal, such as ``"RRRR"``.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    NotApplicableError
+        No candidate completes the task, or there are more than 4096.
+    ValueError
+        The robot has not all of these hands, or no movement can be made with the model.
+
+    Notes
+    -----
+    Source: paper, section *Experiments*.
     """
-    return search_initial_hands(task, hands, model=model)[0]
+    task = as_task(task)
+    chosen = None if hands is None else hands_among(task, hands)
+    return search_initial_hands(task, chosen, model=model)[0]
 
 
 def search_initial_hands(

@@ -38,6 +38,7 @@ from coartic.motion.lanes import (
     winding,
 )
 from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.text import short_repr
 
 # Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by
 # more: a joint's share of how far from 0 they, and the angles of the arm times its length, can be.
@@ -59,16 +60,20 @@ class Goal(NamedTuple):
 
 
 class MoveResult(NamedTuple):
-    """Outcome of one movement."""
+    """What came of one movement (:func:`move`)."""
 
     q: Array
-    """Configuration in which the movement stopped, shape ``(dof,)``."""
+    """Configuration in which the movement stopped, shape ``(dof,)``, length unit (base) and rad
+    (joints)."""
     ticks: int
     """Control ticks spent; the reward of the movement is ``-ticks``."""
     hit: bool
     """Whether the hand is within the goal's radius."""
     evaluations: int
     """Forward-kinematics evaluations the kernel made."""
+
+    def __repr__(self) -> str:
+        return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
 
 
 @inner
@@ -259,13 +264,41 @@ def move(
     stop_on_arrival: bool = True,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move from ``q`` towards ``target`` until the hand hits the goal or arrives.
+    """Move straight in joint space until the hand hits the goal or arrives.
 
-    ``q`` and ``target`` have shape ``(dof,)``. ``stop_on_arrival=False`` is a
-    corrective movement, which ends only on hitting the goal (or at its target).
-    Raises ValueError for a wrong shape and for figures that are not finite or beyond
-    ``LARGEST``. Source: paper, *Generating Movement for
-    Each Goal*.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (dof,)
+        Where it stands, length unit (base) and rad (joints).
+    target : ndarray, shape (dof,)
+        Target configuration, likewise.
+    hand : {"left", "right"}
+        The hand that is to hit the goal.
+    goal : tuple of float
+        Centre of the goal, x and y, length unit.
+    radius : float
+        Radius of the goal, length unit.
+    stop_on_arrival : bool
+        Whether the movement also ends where the hand is near the place to which the target brings
+        it. A corrective movement does not: it ends on hitting the goal, or at its target.
+    model : MotionModel
+        The constants.
+
+    Returns
+    -------
+    MoveResult
+        Where the robot stopped, the control ticks it took, and whether the goal is hit.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a figure is not finite or beyond 100,000, or there is no such hand.
+
+    Notes
+    -----
+    Source: paper, section *Generating Movement for Each Goal*.
     """
     runs = runs_for(1, robot)
     run, figures = runs[0], slice(robot.dof)

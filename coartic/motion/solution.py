@@ -21,7 +21,8 @@ from coartic.motion.movement import checked_goal, configuration, follow
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, reach_in_turn
 from coartic.robot import HANDS, Array, Hand
-from coartic.tasks.task import Task, letters_of
+from coartic.tasks.task import Task, TaskLike, as_task, letters_of
+from coartic.text import short_repr
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
@@ -29,36 +30,48 @@ KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
 
 @dataclass(frozen=True)
 class Movement:
-    """One movement of a solution."""
+    """One movement of a solution, which :func:`execute` makes.
+
+    Source: paper, section *Generating Movement for Each Goal*.
+    """
 
     goal: int
     """Number of the goal it is made for, from 1 as in the paper."""
     hand: Hand
+    """The hand that is to hit the goal, ``"left"`` or ``"right"``."""
     kind: Kind
-    """Learned and planned movements are straight in joint space and end on a hit or on
-    arrival; a path follows its waypoints and ends on a hit or at the last of them; a
-    corrective movement ends only on a hit and is made only if the goal is not hit. The
-    first movement for a goal, unless corrective, is always made; the others only while
-    the goal is not hit."""
+    """``"learned"``, ``"planned"``, ``"corrective"`` or ``"path"``. Learned and planned movements
+    are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
+    ends on a hit or at the last of them; a corrective movement ends only on a hit and is made
+    only if the goal is not hit. The first movement for a goal, unless corrective, is always made;
+    the others only while the goal is not hit."""
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``; the last waypoint of a path. None in a
-    corrective movement has the corrective process find it when the time comes."""
+    """Target configuration q^t, shape ``(dof,)``, length unit (base) and rad (joints); the last
+    waypoint of a path. None in a corrective movement has the corrective process find it when the
+    time comes."""
     ticks: int | None = None
-    """Ticks it took; None before it is executed."""
+    """Control ticks it took; None before it is executed."""
     waypoints: Array | None = None
-    """Of a path: configurations to pass through, shape ``(k, dof)``, from where the
-    robot stands to ``waypoints[-1]``; None for the other kinds."""
+    """Configurations that a path passes through, shape ``(k, dof)``, from where the robot stands
+    to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
+
+    def __repr__(self) -> str:
+        named = ("goal", "hand", "kind", "target", "ticks", "waypoints")
+        facts = {name: getattr(self, name) for name in named}
+        return short_repr(self, **{k: v for k, v in facts.items() if v is not None})
 
 
 @dataclass(frozen=True)
 class Execution:
-    """What happened when a solution was executed."""
+    """What happened when a solution was executed (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
     """The movements as made, with targets and ticks, in order."""
     configurations: Array
-    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``."""
+    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, length unit
+    (base) and rad (joints)."""
     ticks: int
+    """Control ticks spent in all."""
     corrections: int
     """Corrective movements made."""
     iterations: int = 0
@@ -68,7 +81,14 @@ class Execution:
     reason: str = ""
     """Why the task was not completed; empty where it was."""
     penalty: int = 0
-    """What the goals hit cost beside the ticks; 0 where the task has no penalty."""
+    """What the goals hit cost beside the ticks, in ticks; 0 where the task has no penalty."""
+
+    def __repr__(self) -> str:
+        facts = {"hands": self.hands, "reward": self.reward, "ticks": self.ticks}
+        facts |= {"penalty": self.penalty} if self.penalty else {}
+        facts |= {"corrections": self.corrections}
+        facts |= {"reason": self.reason} if self.reason else {}
+        return short_repr(self, **facts)
 
     @property
     def completed(self) -> bool:
@@ -86,7 +106,7 @@ class Execution:
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
-        """Ticks spent on each goal that was attempted."""
+        """Control ticks spent on each goal that was attempted, in the order of the goals."""
         spent: dict[int, int] = {}
         for movement in self.movements:
             spent[movement.goal] = spent.get(movement.goal, 0) + (movement.ticks or 0)
@@ -103,17 +123,47 @@ def hands_in(movements: Iterable[Movement]) -> str:
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
 
-def execute(task: Task, solution: Iterable[Movement], *, model: MotionModel = PAPER) -> Execution:
+def execute(
+    task: TaskLike, solution: Iterable[Movement], *, model: MotionModel = PAPER
+) -> Execution:
     """Execute a solution from the task's start and score it.
 
-    A goal that is still missed after its movements is corrected by **A** from where
-    the robot stands, and the correction is paid for. Where **A** does not converge
-    the execution ends there with a reason. Raises SolutionError for a solution that
-    breaks the task's rules: goals missing or out of order, a hand the robot does not
-    have, a target of the wrong shape or not finite, a locked base that moves. Raises
-    ValueError for a model that no movement can be made with.
+    The corrective process corrects a goal that is still missed after its movements, from where the
+    robot stands, and the correction is paid for.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    solution : iterable of Movement
+        At least one movement for each goal, in the order of the goals.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    Execution
+        What happened: movements as made, configurations at the hits, control ticks and reward.
+        Where the corrective process does not converge, the execution ends: ``completed`` is False
+        and ``reason`` says so.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    SolutionError
+        The solution breaks the task's rules: goals are missing or out of order, the robot does
+        not have a hand, a target has the wrong shape or is not finite, a locked base moves.
+    ValueError
+        No movement can be made with the model.
+
+    Notes
+    -----
+    Source: paper, section *Generating Movement for Each Goal*.
     """
-    (execution,) = execute_many(task, [solution], model=model)
+    (execution,) = execute_many(as_task(task), [solution], model=model)
     if isinstance(execution, Exception):
         raise execution
     return execution
@@ -314,7 +364,10 @@ def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, l
         of_goal = groups[-1][1]
         where = f"task {task.name!r}, goal {movement.goal}"
         if movement.hand not in task.hands:
-            raise SolutionError(f"{where}: the robot has no {movement.hand} hand")
+            raise SolutionError(
+                f"{where}: the robot has no {movement.hand} hand; it has "
+                f"{' and '.join(map(repr, task.hands))}"
+            )
         if of_goal and movement.hand != of_goal[0].hand:
             raise SolutionError(f"{where}: two hands for one goal")
         of_goal.append(checked_movement(task, movement, where))

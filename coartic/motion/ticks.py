@@ -14,23 +14,37 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import Array, Hand
-from coartic.tasks.task import Task, hands_of
+from coartic.tasks.task import Task, TaskLike, as_task, hands_of
+from coartic.text import short_repr
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Every control tick of an execution that hit all goals."""
+    """Every control tick of an execution that hit all goals (:func:`trajectory`)."""
 
     task: Task
+    """The task."""
     execution: Execution
+    """What :func:`coartic.execute` says of the solution."""
     configurations: Array
-    """Configurations passed, shape ``(ticks, dof)``: a row each control tick, the first one
-    the start. A movement of k steps gives k + 1 rows, the last one the tick that detects its
-    end, so the row after it (the next movement's first) repeats it. Under a model without
-    that tick k steps give k rows and the start one of its own: ``(ticks + 1, dof)``."""
+    """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
+    each control tick, the first one the start. A movement of k steps gives k + 1 rows, the last
+    one the tick that detects its end, so the row after it (the next movement's first) repeats it.
+    Under a model without that tick k steps give k rows and the start one of its own:
+    ``(ticks + 1, dof)``."""
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            task=self.task.name,
+            hands=self.execution.hands,
+            reward=self.execution.reward,
+            configurations=self.configurations,
+            hits=self.hits,
+        )
 
     @property
     def hands(self) -> tuple[Hand, ...]:
@@ -43,23 +57,76 @@ class Trajectory:
         return self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
-        """Position of either hand in each row, shape ``(rows, 2)``, length unit."""
+        """The path of a hand.
+
+        Parameters
+        ----------
+        hand : {"left", "right"}
+            Either hand, also one that the task does not let hit goals.
+
+        Returns
+        -------
+        ndarray, shape (rows, 2)
+            Its position in each row of ``configurations``, length unit.
+
+        Raises
+        ------
+        ValueError
+            The hand is neither ``"left"`` nor ``"right"``.
+        """
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
-        """Rows from the hit of the goal before (or the start) to that of ``goal``, both
-        included, shape ``(k, dof)``; ``goal`` counts from 1."""
+        """The configurations from the hit of the goal before, or the start, to that of a goal.
+
+        Parameters
+        ----------
+        goal : int
+            Number of the goal, from 1.
+
+        Returns
+        -------
+        ndarray, shape (k, dof)
+            Rows of ``configurations``, both ends included.
+        """
         first = self.hits[goal - 2] if goal > 1 else 0
         return self.configurations[first : self.hits[goal - 1] + 1]
 
 
-def trajectory(task: Task, movements: Iterable[Movement], model: MotionModel = PAPER) -> Trajectory:
+def trajectory(
+    task: TaskLike, movements: Iterable[Movement], model: MotionModel = PAPER
+) -> Trajectory:
     """Execute a solution and keep every control tick.
 
-    Agrees with :func:`~coartic.motion.solution.execute` bit for bit in the number of ticks and
-    the configuration at each hit. Raises SolutionError where the solution breaks the
-    task's rules or does not hit every goal.
+    The number of ticks and the configurations at the hits are those of :func:`coartic.execute`,
+    bit for bit.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    movements : iterable of Movement
+        The solution: at least one movement for each goal, in the order of the goals.
+    model : MotionModel
+        The constants of movement and of the corrective process.
+
+    Returns
+    -------
+    Trajectory
+        The configurations tick by tick, and the rows in which the goals were hit.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    TypeError
+        The task is neither a Task nor a text nor a path.
+    SolutionError
+        The solution breaks the task's rules, or does not hit every goal.
+    ValueError
+        No movement can be made with the model.
     """
+    task = as_task(task)
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")

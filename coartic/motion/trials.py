@@ -19,7 +19,7 @@ from coartic.motion.penalty import penalties
 from coartic.motion.reach import reach_in_turn
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
-from coartic.tasks.task import Task, hands_of, letters_of
+from coartic.tasks.task import Task, hands_misfit, hands_of, letters_of
 
 Hands = str | Sequence[str] | NDArray[np.integer[Any]]
 """Hand sequences of N trials: one for all (``"RRLR"``), one each, or an array of shape ``(N, G)``
@@ -124,7 +124,7 @@ def hand_codes(task: Task, hands: Hands, count: int) -> NDArray[np.int64]:
     no_texts = [sequence for sequence in each if not isinstance(sequence, str)]
     for sequence in no_texts or dict.fromkeys(each):
         if no_texts or len(sequence) != len(task.goals) or not set(sequence) <= letters:
-            raise ValueError(f"hands {sequence!r} do not fit task {task.name!r}")
+            raise ValueError(hands_misfit(task, sequence))
         codes[sequence] = [HANDS.index(hand) for hand in hands_of(sequence)]
     if several and len(each) != count:
         raise ValueError(f"{len(each)} hand sequences for {count} trials")

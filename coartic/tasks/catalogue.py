@@ -7,21 +7,50 @@ from functools import cache
 from pathlib import Path
 
 from coartic.errors import TaskError
+from coartic.inputs import brief_value
 from coartic.tasks.families import check_instance, instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
 from coartic.text import unknown
 
 
 def builtin_tasks() -> tuple[str, ...]:
-    """Names of the tasks that come with the package, in the paper's order."""
+    """The tasks that come with the package.
+
+    Returns
+    -------
+    tuple of str
+        Their names, in the paper's order. :func:`load_task` takes each of them.
+    """
     return tuple(shipped_tasks())
 
 
 def load_task(name_or_path: str | Path) -> Task:
-    """A shipped task, a member or an instance by name, or a task file by path.
+    """Load a task by its name, or from a file.
 
-    Raises TaskError, naming the file and the key, where it cannot be used.
+    Parameters
+    ----------
+    name_or_path : str or pathlib.Path
+        The name of a task that comes with the package (``"ascending"``), of a member of its
+        ensemble (``"two-armed-1-m017"``) or of an instance of a family (``"two-armed/v1/i017"``),
+        or the path of a task file. A text that ends in ``.toml`` is a path.
+
+    Returns
+    -------
+    Task
+        The task, checked.
+
+    Raises
+    ------
+    TaskError
+        There is no such task, or the file cannot be used. The message names the file and the key.
+    TypeError
+        The argument is neither a text nor a path.
     """
+    if not isinstance(name_or_path, str | Path):
+        raise TypeError(
+            f"task is {brief_value(name_or_path)}; it must be the name of a task, such as "
+            "'ascending', or the path of a task file"
+        )
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         task = read_task(Path(name_or_path))
         if "/" in task.name:

@@ -29,7 +29,7 @@ from coartic.errors import TaskError
 from coartic.inputs import FileData, brief_value, problems, read_toml, sentence
 from coartic.model import PAPER, MotionModel, checked_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
-from coartic.text import Line, counted, did_you_mean
+from coartic.text import Line, counted, did_you_mean, short_repr
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
@@ -52,8 +52,14 @@ Point = tuple[Finite, Finite]
 
 
 def hands_of(letters: str) -> tuple[Hand, ...]:
-    """``"RL"`` as ``("right", "left")``; KeyError for any other letter."""
-    return tuple(LETTERS[letter] for letter in letters)
+    """``"RL"`` as ``("right", "left")``; ValueError for any other letter."""
+    try:
+        return tuple(LETTERS[letter] for letter in letters)
+    except (KeyError, TypeError):
+        raise ValueError(
+            f"hands is {brief_value(letters)}; it must be a sequence of L (left) and R (right), "
+            "such as 'RRLR'"
+        ) from None
 
 
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
@@ -93,19 +99,24 @@ def address_of(name: str) -> Address | None:
 
 
 class Provenance(FileData):
-    """Where a figure of a task comes from."""
+    """Where a figure of a task comes from: the entry of a key in ``Task.provenance``."""
 
     status: Literal["printed", "inferred", "chosen"]
     """Printed in the paper, inferred from it, or chosen by the task's author."""
     source: Line
+    """Place in the paper, or the person who chose it, in one line."""
 
 
 class Start(FileData):
-    """Starting configuration q_0: base in length units, joint angles in rad."""
+    """The starting configuration q_0 as a task file states it; ``Task.q0`` is the array."""
 
     base: Point = (0.0, 0.0)
+    """Centre of the base, length unit."""
     left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    """Angle of each joint of the left arm, rad, one for each link; the first is measured from
+    +x."""
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    """Angles of the right arm."""
 
 
 Ticks = Annotated[float, Field(ge=0, le=MOST_PENALTY, allow_inf_nan=False)]
@@ -138,11 +149,19 @@ class Penalty(FileData):
 
 
 class Task(FileData):
-    """A sequence of spatial goals to be hit, each with one of the robot's hands."""
+    """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
+
+    :func:`load_task` reads one from a file, or finds it by its name. It cannot be changed.
+    Source of the shipped tasks: paper, section *Experiments*; ``provenance`` says where each
+    figure comes from.
+    """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)]
+    """Name in commands, suites and tables: letters, digits, ``.``, ``_``, ``-``."""
     title: Line = ""
+    """Name in figures and tables; ``name`` if it is empty."""
     description: Line = ""
+    """A sentence for lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands the robot has."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
@@ -155,7 +174,9 @@ class Task(FileData):
     """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
     the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
+    """Configuration in which every trial begins: table ``[start]``."""
     robot: Robot = Robot()
+    """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     penalty: Penalty | None = None
     """What the reward loses beside 1 a tick; nothing in the paper's tasks."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
@@ -183,8 +204,8 @@ class Task(FileData):
         return copied
 
     @model_serializer(mode="wrap")
-    def without_what_is_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Its content; ``penalty`` only where it has one, so that hashes of others stay."""
+    def _without_what_is_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # ``penalty`` only where there is one, so that hashes of other tasks stay.
         content: dict[str, Any] = write(self)
         if self.penalty is None:
             content.pop("penalty", None)
@@ -218,78 +239,129 @@ class Task(FileData):
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="after")
-    def is_consistent(self, info: ValidationInfo) -> Task:
-        """Refuses what cannot be, with the key and what would be right."""
-        if (problem := next(self.problems(), None)) is not None:
+    def _is_consistent(self, info: ValidationInfo) -> Task:
+        if (problem := next(contradictions(self), None)) is not None:
             raise sentence(problem)
         # No model's corrective process ends farther from a goal than its rim (checked_task).
-        if info.context != WITHOUT_REACH and (far := self.out_of_reach(self.radius)) is not None:
+        if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
             raise sentence(far)
         return self
 
-    def problems(self) -> Iterator[str]:
-        """What its keys say against each other, a sentence each."""
-        for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
-            if len(set(values)) < len(values):
-                yield f"{key} names the same entry twice: {', '.join(values)}"
-        for hand, angles in (("left", self.start.left), ("right", self.start.right)):
-            joints = len(self.robot.left_links if hand == "left" else self.robot.right_links)
-            if len(angles) != joints:
-                yield (
-                    f"start.{hand} has {len(angles)} joint angles; the {hand} arm has "
-                    f"{joints} joints"
-                )
-        for key in self.provenance:
-            if key not in type(self).model_fields:
-                yield f"provenance.{key} is not a key of a task{did_you_mean(key, all_keys())}"
-        text = self.initial_hands
-        if self.initial_is_policy:
-            return
-        if not text or set(text) - set(LETTERS):
+    def __repr__(self) -> str:
+        """Its name and what there is to hit, with which hands."""
+        return short_repr(
+            self,
+            repr(self.name),
+            counted(len(self.goals), "goal"),
+            hands=self.hands,
+            initial_hands=self.initial_hands,
+        )
+
+
+TaskLike = Task | str | Path
+"""What stands for a task: the task itself, the name of one, or the path of a task file."""
+
+
+def as_task(task: TaskLike) -> Task:
+    """The task that is meant by a task, the name of one or the path of a file.
+
+    Raises TaskError where there is no such task, and TypeError for anything else.
+    """
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str | Path):
+        raise TypeError(
+            f"task is {brief_value(task)}; it must be a Task, the name of one, such as "
+            "'ascending', or the path of a task file"
+        )
+    # Through the package: the catalogue has families, which are searched by moving the robot,
+    # and what moves the robot calls this.
+    from coartic import load_task
+
+    return load_task(task)
+
+
+def hands_misfit(task: Task, hands: object) -> str:
+    """The sentence on a hand sequence that does not fit a task."""
+    letters = " or ".join(letters_of(sorted(task.hands)))
+    return (
+        f"hands {brief_value(hands)} do not fit task {task.name!r}: needed is a text with "
+        f"{letters} for each of {counted(len(task.goals), 'goal')}"
+    )
+
+
+def checked_hands(task: Task, hands: str) -> str:
+    """The hand sequence itself; ValueError where it does not fit the task."""
+    fits = isinstance(hands, str) and len(hands) == len(task.goals)
+    if not fits or not set(hands) <= set(letters_of(task.hands)):
+        raise ValueError(hands_misfit(task, hands))
+    return hands
+
+
+def contradictions(task: Task) -> Iterator[str]:
+    """What the keys of a task say against each other, a sentence each."""
+    for key, values in (("hands", task.hands), ("locked_base", task.locked_base)):
+        if len(set(values)) < len(values):
+            yield f"{key} names the same entry twice: {', '.join(values)}"
+    for hand, angles in (("left", task.start.left), ("right", task.start.right)):
+        joints = len(task.robot.left_links if hand == "left" else task.robot.right_links)
+        if len(angles) != joints:
             yield (
-                f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such as "
-                f"'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
+                f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} joints"
             )
-        elif len(text) != len(self.goals):
-            yield f"initial_hands {brief_value(text)} names {len(text)} hands for " + counted(
-                len(self.goals), "goal"
+    for key in task.provenance:
+        if key not in Task.model_fields:
+            yield f"provenance.{key} is not a key of a task{did_you_mean(key, all_keys())}"
+    text = task.initial_hands
+    if task.initial_is_policy:
+        return
+    if not text or set(text) - set(LETTERS):
+        yield (
+            f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such as "
+            f"'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
+        )
+    elif len(text) != len(task.goals):
+        yield f"initial_hands {brief_value(text)} names {len(text)} hands for " + counted(
+            len(task.goals), "goal"
+        )
+    elif absent := sorted({LETTERS[letter] for letter in text} - set(task.hands)):
+        yield f"initial_hands {text!r} uses the {absent[0]} hand, which is not among hands"
+
+
+def out_of_reach(task: Task, tolerance: float) -> str | None:
+    """The first goal of a task, in words, that no hand, or not the initial one, can hit.
+
+    ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
+    length unit. None where all goals are within reach.
+    """
+    named = None if task.initial_is_policy else hands_of(task.initial_hands)
+    for index, goal in enumerate(task.goals):
+        excess = {hand: beyond_reach(task, hand, goal, tolerance) for hand in task.hands}
+        where = (
+            f"goals[{index}] ({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked "
+            f"in {' and '.join(task.locked_base)}"
+        )
+        if all(value > 0 for value in excess.values()):
+            return f"{where}: {min(excess.values()):.3g} too far"
+        if named is not None and excess[named[index]] > 0:
+            return (
+                f"{where} for the {named[index]} hand that initial_hands "
+                f"{task.initial_hands!r} gives it: {excess[named[index]]:.3g} too far"
             )
-        elif absent := sorted({LETTERS[letter] for letter in text} - set(self.hands)):
-            yield f"initial_hands {text!r} uses the {absent[0]} hand, which is not among hands"
+    return None
 
-    def out_of_reach(self, tolerance: float) -> str | None:
-        """The first goal, in words, that no hand, or not the initial one, can hit.
 
-        ``tolerance`` is the distance from a goal's centre at which the corrective process ends,
-        length unit. None where all goals are within reach.
-        """
-        named = None if self.initial_is_policy else hands_of(self.initial_hands)
-        for index, goal in enumerate(self.goals):
-            excess = {hand: self.beyond_reach(hand, goal, tolerance) for hand in self.hands}
-            where = (
-                f"goals[{index}] ({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked "
-                f"in {' and '.join(self.locked_base)}"
-            )
-            if all(value > 0 for value in excess.values()):
-                return f"{where}: {min(excess.values()):.3g} too far"
-            if named is not None and excess[named[index]] > 0:
-                return (
-                    f"{where} for the {named[index]} hand that initial_hands "
-                    f"{self.initial_hands!r} gives it: {excess[named[index]]:.3g} too far"
-                )
-        return None
-
-    def beyond_reach(self, hand: Hand, goal: Point, tolerance: float) -> float:
-        """How far short of where it would end, ``tolerance`` from the centre of a goal, the
-        corrective process must stay at least, length unit; not positive within reach."""
-        arm = self.robot.arm(hand)
-        near, far = self.robot.reach(hand)
-        dx = goal[0] - self.start.base[0] - arm.shoulder_x if "x" in self.locked_base else 0.0
-        dy = goal[1] - self.start.base[1] - arm.shoulder_y if "y" in self.locked_base else 0.0
-        distance = math.hypot(dx, dy)
-        # A base that is free in one coordinate can always back away.
-        inside = near - distance if len(self.locked_base) == 2 else 0.0
-        return max(distance - far, inside) - tolerance
+def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
+    """How far short of where it would end, ``tolerance`` from the centre of a goal, the
+    corrective process must stay at least, length unit; not positive within reach."""
+    arm = task.robot.arm(hand)
+    near, far = task.robot.reach(hand)
+    dx = goal[0] - task.start.base[0] - arm.shoulder_x if "x" in task.locked_base else 0.0
+    dy = goal[1] - task.start.base[1] - arm.shoulder_y if "y" in task.locked_base else 0.0
+    distance = math.hypot(dx, dy)
+    # A base that is free in one coordinate can always back away.
+    inside = near - distance if len(task.locked_base) == 2 else 0.0
+    return max(distance - far, inside) - tolerance
 
 
 def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
@@ -301,7 +373,7 @@ def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
         checked_model(model, radius=task.radius)
     except ValueError as error:
         raise TaskError(f"task {task.name!r}: {error}") from None
-    problem = task.out_of_reach(model.correction_tolerance)
+    problem = out_of_reach(task, model.correction_tolerance)
     if problem is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
     return task
@@ -319,10 +391,26 @@ def shipped_tasks() -> dict[str, Task]:
 
 
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:
-    """A task from the content of a TOML file; ``source`` names it in errors.
+    """Make a task from the content of a task file.
 
-    ``reach=False`` lets goals out of reach pass: how methods cope is checked with such.
-    Raises TaskError with one line per problem.
+    Parameters
+    ----------
+    content : dict
+        The content, as ``tomllib`` reads it from a TOML file.
+    source : str
+        What errors name it, such as the path of the file.
+    reach : bool
+        Whether to refuse goals that are out of reach.
+
+    Returns
+    -------
+    Task
+        The task, checked.
+
+    Raises
+    ------
+    TaskError
+        The content is no task. The message has a line for each problem.
     """
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)

@@ -1,0 +1,283 @@
+"""The names of ``coartic``: what they take, what they refuse, and how they show themselves."""
+
+import inspect
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import coartic
+from coartic import Movement, Robot, execute, load_task
+from coartic.method import Information, Session
+from coartic.robot import MOST_LINKS
+from coartic.tasks.task import MOST_GOALS, TASK_FOLDER
+from tests.support.strategies import tiny_task
+
+TASK = load_task("two-armed-2")
+FILE = next(path for path in TASK_FOLDER.glob("*.toml") if load_task(path).name == TASK.name)
+HANDS = "LRLR"
+
+
+def learned(task):
+    (run,) = coartic.learn_many(task, "EC4", seeds=[3], trials=30, jobs=1)
+    return run.rewards.tolist(), run.values.tolist(), run.targets.tobytes(), run.task.name
+
+
+def learned_alone(task):
+    run = coartic.learn(task, "EC4", seed=3, trials=30)
+    return run.rewards.tolist(), run.values.tolist(), run.targets.tobytes(), run.task.name
+
+
+def executed(execution):
+    return execution.reward, execution.evaluations, execution.configurations.tobytes()
+
+
+def passed(task):
+    path = coartic.trajectory(task, coartic.corrective_trial(TASK, HANDS).movements)
+    return path.configurations.tobytes(), path.hits.tolist()
+
+
+TAKES_A_TASK = {
+    "learn": learned_alone,
+    "learn_many": learned,
+    "execute": lambda task: executed(
+        coartic.execute(task, [Movement(n, "right", "corrective") for n in (1, 2, 3, 4)])
+    ),
+    "trajectory": passed,
+    "corrective_trial": lambda task: executed(coartic.corrective_trial(task, HANDS)),
+    "hand_sequences": lambda task: coartic.hand_sequences(task),
+    "initial_hands": lambda task: coartic.initial_hands(task),
+    "objective": lambda task: coartic.objective(task, HANDS).x0.tobytes(),
+}
+
+
+def test_all_functions_that_take_a_task_are_tried():
+    """By their first parameter; ``load_task`` takes what names one."""
+    functions = {name for name in coartic.__all__ if inspect.isfunction(getattr(coartic, name))}
+    first = {
+        name: next(iter(inspect.signature(getattr(coartic, name)).parameters), "")
+        for name in functions
+    }
+    assert {name for name in functions if first[name] == "task"} == {*TAKES_A_TASK}
+
+
+@pytest.mark.parametrize("name", TAKES_A_TASK)
+@pytest.mark.parametrize("given", [TASK.name, str(FILE), FILE], ids=["name", "text", "path"])
+def test_a_name_and_a_path_stand_for_the_task(name, given):
+    assert TAKES_A_TASK[name](given) == TAKES_A_TASK[name](TASK)
+
+
+@pytest.mark.parametrize(
+    "call", [*TAKES_A_TASK.values(), load_task], ids=[*TAKES_A_TASK, "load_task"]
+)
+def test_what_is_no_task(call):
+    for wrong in (None, 3, ["ascending"], b"ascending", {"name": "ascending"}):
+        with pytest.raises(TypeError, match=r"task is .*; it must be .* path of a task file"):
+            call(wrong)
+    with pytest.raises(coartic.TaskError, match="did you mean 'ascending'"):
+        call("ascendng")
+    with pytest.raises(coartic.TaskError, match="cannot be read"):
+        call("nowhere.toml")
+
+
+def test_what_is_no_condition():
+    for wrong in (None, 4, ["EC4"]):
+        with pytest.raises(
+            TypeError, match="condition is .*; it must be an ExplorationCondition or"
+        ):
+            coartic.learn(TASK, wrong, seed=0)
+
+
+Q = np.zeros(10)
+PATH = coartic.trajectory(TASK, coartic.corrective_trial(TASK, HANDS).movements)
+TAKES_A_HAND = {
+    "arm": Robot().arm,
+    "joints": Robot().joints,
+    "reach": Robot().reach,
+    "forward_kinematics": lambda hand: Robot().forward_kinematics(Q, hand),
+    "joint_positions": lambda hand: Robot().joint_positions(Q, hand),
+    "jacobian": lambda hand: Robot().jacobian(Q, hand),
+    "linearised": lambda hand: Robot().linearised(Q, hand),
+    "hand_path": PATH.hand_path,
+    "move": lambda hand: coartic.move(Robot(), Q, Q, hand, (1.0, 1.0), 0.1),
+    "correct": lambda hand: coartic.correct(Robot(), Q, hand, (1.0, 1.0)),
+    "hand_sequences": lambda hand: coartic.hand_sequences(TASK, (hand,)),
+    "initial_hands": lambda hand: coartic.initial_hands(TASK, (hand,)),
+    "condition": lambda hand: replace(coartic.CONDITIONS["EC1"], hands=(hand,)),
+}
+
+
+@pytest.mark.parametrize("name", TAKES_A_HAND)
+def test_a_wrong_hand_is_refused_with_the_choices(name):
+    TAKES_A_HAND[name]("left")
+    for wrong in ("x", "middle", "L", "Left", "", None, 0, ["left"]):
+        with pytest.raises(ValueError, match=r"'left'.* '?right'"):
+            TAKES_A_HAND[name](wrong)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda task, hands: coartic.corrective_trial(task, hands),
+        lambda task, hands: coartic.objective(task, hands),
+        lambda task, hands: Session(task, 0, Information).trials(hands, np.zeros((1, 3, 10))),
+    ],
+)
+def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
+    for wrong in ("XYZ", "rrr", "LLL", "RR", "RRRR", "", 3):
+        with pytest.raises(ValueError, match="do not fit task 'ascending': .* R for each of 3"):
+            call(load_task("ascending"), wrong)
+    with pytest.raises(coartic.SolutionError, match="no left hand; it has 'right'"):
+        execute("ascending", [Movement(n, "left", "corrective") for n in (1, 2, 3)])
+    for wrong in ("left", ()):
+        with pytest.raises(ValueError, match="'left' and 'right'"):
+            coartic.hand_sequences(TASK, wrong)
+
+
+def large():
+    """As much of everything as a task may have."""
+    links, title = [1.0] * MOST_LINKS, "x" * 500
+    source = {"status": "chosen", "source": title}
+    start = {"left": [1 / 3] * MOST_LINKS, "right": [1 / 3] * MOST_LINKS}
+    return tiny_task(
+        name="x" * 64, title=title, description=title, goals=[[5 / 3, 1.0]] * MOST_GOALS,
+        initial_hands="R" * MOST_GOALS, start=start, provenance={"goals": source},
+        robot={"left_links": links, "right_links": links, "left_shoulder": [1 / 3, 1 / 7]},
+        penalty={"joints": 1 / 3, "region": 1 / 3, "centre": [1 / 3, 1 / 3], "distinct": 1 / 3},
+    )  # fmt: skip
+
+
+def examples():
+    big, q = large(), np.full(2 * MOST_LINKS + 2, 1 / 3)
+    for task in (TASK, load_task("ascending"), big):
+        yield from (task, task.start, task.robot, task.robot.arm("left"), task.penalty)
+        yield from task.provenance.values()
+    yield from (coartic.CONDITIONS, coartic.VARIANTS, coartic.PAPER)
+    yield from (coartic.CONDITIONS | coartic.VARIANTS).values()
+    yield replace(coartic.CONDITIONS["EC4"], id="x" * 1000, noise_sd=1 / 3, ties="nearest")
+    failing = coartic.MotionModel(max_iterations=1)
+    yield from (failing, coartic.corrective_trial(TASK, HANDS, model=failing))
+    yield from (PATH, PATH.execution, *PATH.execution.movements)
+    yield Movement(1, "right", "path", q, 10**9, np.array([q] * 20))
+    yield Movement(1, "x" * 1000, ["y"] * 1000, np.array(["odd"]), None)
+    yield coartic.learn(TASK, "EC3", seed=2**62, trials=20)
+    yield coartic.learn(TASK, "EC3", seed=0, trials=2, model=failing)
+    yield coartic.learn(load_task("ascending"), "EC1", seed=0, trials=3000)
+    for task in (TASK, big):
+        yield coartic.correct(task.robot, task.q0, "right", (1.0, 1.0), model=failing)
+        yield coartic.move(task.robot, task.q0, task.q0, "right", (1.0, 1.0), 0.1)
+    yield coartic.objective(TASK, HANDS)
+    yield from (getattr(coartic, name) for name in coartic.__all__)
+
+
+def test_what_is_shown_of_an_object_fits_in_five_lines():
+    shown = {type(thing) for thing in examples()}
+    classes = {
+        thing for name in coartic.__all__ if inspect.isclass(thing := getattr(coartic, name))
+    }
+    errors = {each for each in classes if issubclass(each, Exception)}
+    assert classes - errors - {coartic.Optimiser} <= shown  # which is abstract
+    for thing in examples():
+        for text in (repr(thing), str(thing)):
+            assert sum(len(line) // 100 + 1 for line in text.splitlines()) <= 5, text
+    assert repr(TASK) == (
+        "Task('two-armed-2', 4 goals, hands=('left', 'right'), initial_hands='RRRR')"
+    )
+
+
+def test_conditions_are_shown_as_they_are_written():
+    for condition in (coartic.CONDITIONS | coartic.VARIANTS).values():
+        assert eval(repr(condition), {**vars(coartic)}) == condition
+
+
+def test_dir_shows_the_interface_alone():
+    assert {name for name in dir(coartic) if not name.startswith("__")} == {*coartic.__all__}
+    program = "import coartic; print(*dir(coartic))"  # nothing is loaded yet
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert {*coartic.__all__, "__version__"} <= {*done.stdout.split()}
+    assert len(set(coartic.__all__)) == len(coartic.__all__)
+
+
+def test_a_task_has_its_keys_and_what_follows_from_them():
+    """And no validators."""
+    for name, value in vars(coartic.Task).items():
+        if not name.startswith(("_", "model_")):
+            assert isinstance(value, property) or hasattr(value, "func"), name
+
+
+def told(*information, **options):
+    return Session(TASK, 0, information, **options)
+
+
+WRONG = {
+    "task": lambda: load_task("ascendng"),
+    "content": lambda: coartic.parse_task({}, "mine"),
+    "condition": lambda: coartic.learn(TASK, "EC9", seed=0),
+    "nothing learned": lambda: coartic.learn(
+        TASK, "EC3", seed=0, trials=1, model=coartic.MotionModel(max_iterations=0)
+    ).execute(),
+    "one hand": lambda: coartic.learn("ascending", "EC4", seed=0),
+    "no trial": lambda: coartic.learn(TASK, "EC4", seed=0, trials=0),
+    "start": lambda: coartic.learn_many(
+        TASK, "EC4", seeds=[0], trials=1, start=[Movement(1, "left", "learned", Q)]
+    ),
+    "sequences": lambda: coartic.hand_sequences(
+        tiny_task(goals=[[5, 1]] * 13, initial_hands="R" * 13)
+    ),
+    "solution": lambda: execute(TASK, []),
+    "path": lambda: coartic.trajectory(TASK, []),
+    "infeasible": lambda: coartic.objective(TASK, model=coartic.MotionModel(max_iterations=0)),
+    "budget": lambda: told(*Information, trial_budget=0).trial([]),
+    "undeclared": lambda: told().trial([]),
+    "shape": lambda: Robot().jacobian([1.0], "left"),
+    "model": lambda: coartic.corrective_trial(TASK, HANDS, model=coartic.MotionModel(step=0.0)),
+    "robot": lambda: Robot(left_links=()),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_raised_can_be_imported(name):
+    with pytest.raises((coartic.CoarticError, ValueError)) as caught:
+        WRONG[name]()
+    error = type(caught.value)
+    assert issubclass(error, ValueError) or getattr(coartic, error.__name__) is error
+
+
+def test_every_error_of_the_package_is_tried():
+    """Those of the baselines stay within them."""
+
+    def all_of(error):
+        return {error, *(each for sub in error.__subclasses__() for each in all_of(sub))}
+
+    errors = {each for each in all_of(coartic.CoarticError) if each.__module__.count(".") == 1}
+    raised = set()
+    for call in WRONG.values():
+        with pytest.raises((coartic.CoarticError, ValueError)) as caught:
+            call()
+        raised.add(type(caught.value))
+    assert errors <= raised
+    assert errors <= {getattr(coartic, name) for name in coartic.__all__ if name.endswith("Error")}
+
+
+FUNCTIONS = {
+    f"{owner.__name__}.{name}": getattr(owner, name)
+    for owner, names in (
+        (coartic, {*coartic.__all__} - {"objective"}),
+        (Robot, ("forward_kinematics", "joint_positions", "jacobian", "base_outline")),
+    )
+    for name in names
+    if inspect.isfunction(getattr(owner, name))
+}
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+def test_docstrings_say_what_goes_in_and_what_comes_out(name):
+    text = inspect.getdoc(FUNCTIONS[name])
+    for parameter in {*inspect.signature(FUNCTIONS[name]).parameters} - {"self"}:
+        assert f"\n{parameter} : " in text.partition("Parameters\n---")[2], parameter
+    assert "\nReturns\n-------\n" in text
+    assert "\nRaises\n------\n" in text or not inspect.signature(FUNCTIONS[name]).parameters
