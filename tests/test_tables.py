@@ -13,6 +13,7 @@ import pytest
 from coartic import load_task
 from coartic.analysis import tables
 from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL
+from coartic.analysis.tables import coarticulation
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -49,9 +50,9 @@ def study():
             rows.append(row(method, best, task=task, run=run, run_id=run_id, trials=trials,
                             seed=run, forward_kinematics=1_000 * trials))  # fmt: skip
     told = "kinematic model, reward as a formula"
-    for task, reward in ((ONE, -296), (TWO, -500)):
+    for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100)):
         rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0, told=told,
-                        forward_kinematics=500, movement_ticks=0, seed=0))  # fmt: skip
+                        forward_kinematics=500, movement_ticks=ticks, seed=0))  # fmt: skip
     frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     made_up = study_of(frame, [load_task(ONE), load_task(TWO)])
     parts = {"optima": made_up_optima(ONE, TWO), "rewards": lambda: iter(rewards.items())}
@@ -77,8 +78,13 @@ def gap_columns(gaps):
 
 def test_ranking(study):
     table = tables.ranking(study)
-    named = {CMA: (BY_TRIAL, FOUND, 6), BOTH: (BY_TRIAL, LEARNED, 6), PLAN: (BY_FORMULA, PLANNED, 2),
-             EC1: (BY_TRIAL, {ONE: LEARNED[ONE]}, 3), EC4: (BY_TRIAL, {TWO: LEARNED[TWO]}, 3)}  # fmt: skip
+    named = {
+        CMA: (BY_TRIAL, FOUND, 6),
+        BOTH: (BY_TRIAL, LEARNED, 6),
+        PLAN: (BY_FORMULA, PLANNED, 2),
+        EC1: (BY_TRIAL, {ONE: LEARNED[ONE]}, 3),
+        EC4: (BY_TRIAL, {TWO: LEARNED[TWO]}, 3),
+    }
     same(table.loc[list(named)], {
         name: {"method": name, "knows": knows, **gap_columns(gaps), "runs": runs}
         for name, (knows, gaps, runs) in named.items()
@@ -97,7 +103,7 @@ def test_variants(study):
         BOTH: {"method": BOTH, "runs": 6, **gap_columns(LEARNED), "trials": 1000, **costs},
         CMA: {"method": CMA, "runs": 6, **gap_columns(FOUND), "trials": 100, **costs},
         PLAN: {"method": PLAN, "runs": 2, **gap_columns(PLANNED), "trials": 0, **costs,
-               "movement_ticks": 0},
+               "movement_ticks": 50},
     })  # fmt: skip
 
 
@@ -127,7 +133,8 @@ def test_price(study):
     names = ["reached", "trials_to_quarter", "trials_to_quarter_low", "trials_to_quarter_high",
              "trials_to_half", "trials_to_half_low", "trials_to_half_high",
              "kinematics_to_half", "kinematics_to_half_low", "kinematics_to_half_high",
-             "seconds_to_half", "seconds_to_half_low", f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
+             "seconds_to_half", "seconds_to_half_low",
+             f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
     # The first run is cold: the time of the other two, which are too few for an interval.
     cells = {
         BOTH: (91 / 120, 200, 50, 200, 1000, 200, 1000, 1e6, 2e5, 1e6, 0.25, NONE, 500, 200),
@@ -154,3 +161,31 @@ def test_learning(study):
     same(tables.learning(study), {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
+
+
+def test_contexts(study, monkeypatch):
+    """Signatures of two goals that two methods share, each in its column; Holm by method."""
+    names = ["context distance", "context dependence", "motor-equivalent part",
+             "non-motor-equivalent part", "lead time"]  # fmt: skip
+    rows = [
+        {"task": ONE, "label": label, "goal": goal, "hand": "right", "against": TWO, "moving": None,
+         "signature": name, "value": value, "n": n, "p": p if name == names[1] else 0.9}
+        for label, goal, n, p, values in (
+            (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3, 20.0)),
+            (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08, None)),
+            (PLAN, 1, 2, 0.04, (0.2, 2.0, 0.12, 0.16, 7.0)),
+        )
+        for name, value in zip(names, values, strict=True)
+    ]  # fmt: skip
+    monkeypatch.setattr(coarticulation, "signature_values", lambda study: pd.DataFrame(rows))
+    monkeypatch.setattr(coarticulation, "placebo_p", lambda *what: 0.5 if CMA in what else NONE)
+    columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
+               "other", "lead"]  # fmt: skip
+    cells = {
+        f"{ONE} {CMA} goal 1 right": (CMA, 6, 0.5, 3.0, 0.02, 0.5, 0.4, 0.3, 20.0),
+        f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08, NONE),
+        f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16, 7.0),
+    }
+    frame = coarticulation.contexts(MadeUp(study))
+    same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
+    assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]
