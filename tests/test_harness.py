@@ -19,7 +19,7 @@ from coartic import (
     load_task,
 )
 from coartic.analysis.comparisons.paper import beside_paper
-from coartic.benchmarks.outcome import kept
+from coartic.benchmarks.outcome import kept, too_long
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.run import Selection, plan_suite
@@ -289,6 +289,12 @@ def test_what_is_kept_of_a_run():
         [2, "solver-failed", None, None, None, None, None, None, None, None, 3, 2.0, 1.0],
     ]
     assert kept_runs[2].row["reason"] == "it reported ok, but returned no solution"
+
+
+def test_ten_thousand_movements_are_not_too_many():
+    task, move = load_task("ascending"), Movement(1, "right", "corrective")
+    assert too_long(task, [move] * 10_000, PAPER) is None
+    assert "10001 movements" in str(too_long(task, [move] * 10_001, PAPER))
 
 
 def test_deterministic_methods_run_once():

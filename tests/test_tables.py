@@ -169,7 +169,8 @@ def test_contexts(study, monkeypatch):
              "non-motor-equivalent part", "lead time"]  # fmt: skip
     rows = [
         {"task": ONE, "label": label, "goal": goal, "hand": "right", "against": TWO, "moving": None,
-         "signature": name, "value": value, "n": n, "p": p if name == names[1] else 0.9}
+         "signature": name, "value": value, "n": n - (name == names[4]),
+         "p": p if name == names[1] else 0.9}
         for label, goal, n, p, values in (
             (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3, 20.0)),
             (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08, None)),
