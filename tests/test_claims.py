@@ -34,7 +34,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
 from coartic.benchmarks.suites import Cell
-from tests.support.made_up import MadeUp, plan_for, row, study_of
+from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import as_released, changed
 from tests.support.suites import KNOWN, InProcess, run_and_write
 
@@ -548,7 +548,7 @@ def with_paths(study, paths):
         (task, label): Trajectories(study.tasks[task], label, "", tuple(runs))
         for (task, label), runs in paths.items()
     }
-    return MadeUp(study, **vars(study), _trajectories=planted, _replays=planted)
+    return MadeUp(study, **vars(study), trajectories=made(planted), replays=made(planted))
 
 
 def beside_placebos(task, condition, paths, shown, rewards=MIDDLE):

@@ -20,9 +20,16 @@ def test_interval_against_an_exact_value_is_students():
 
 @pytest.mark.parametrize(
     ("shift", "spread", "verdict"),
-    [(0.0, 1.0, "equivalent"), (-30.0, 1.0, "different"), (0.0, 80.0, "undecided")],
-)
+    [
+        (0.0, 1.0, "equivalent"), (-30.0, 1.0, "different"), (30.0, 1.0, "different"),
+        (0.0, 80.0, "undecided"),
+        (6.0, 20.0, "undecided"), (-6.0, 20.0, "undecided"),  # the interval goes across the margin
+        (4.0, 20.0, "undecided"), (-4.0, 20.0, "undecided"),
+    ],
+)  # fmt: skip
 def test_verdicts(shift, spread, verdict):
+    """Of 20 evenly spaced values the standard error is spread · 0.607 / √20: of 20, an interval
+    of ± 5.7."""
     ours = -500 + shift + spread * np.linspace(-1, 1, 20)
     interval = difference(ours, -500, 1.0, 20)
     assert (interval.verdict, interval.margin) == (verdict, 5.0)

@@ -14,7 +14,7 @@ from coartic.analysis.generality.sample import one_by_one, sample, signs
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
 from coartic.tasks.families import names_in
-from tests.support.made_up import MadeUp, row, study_of
+from tests.support.made_up import MadeUp, made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -54,10 +54,10 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
                     rows += runs_of(name, label, value, noise=noise)
     runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     sequences = {
-        task.name: pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
+        (task.name,): pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
         for task in tasks
     }
-    parts = {"_sequences": sequences} | ({"optima": best} if optima else {})
+    parts = {"sequences": made(sequences)} | ({"optima": best} if optima else {})
     return MadeUp(study_of(runs, tasks), **parts)
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from coartic import (
+    PAPER,
     CoarticError,
     Movement,
     corrective_trial,
@@ -18,10 +19,12 @@ from coartic import (
     load_task,
 )
 from coartic.analysis.comparisons.paper import beside_paper
+from coartic.benchmarks.outcome import kept, too_long
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Entry, registry
 from coartic.benchmarks.run import Selection, plan_suite
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
+from coartic.benchmarks.worker import Answer, Outcome
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.learner.rows import movements_from
 from coartic.method import Information, Session
@@ -263,6 +266,35 @@ def test_a_session_counts_per_configuration():
     assert session.trials_left == 1
     with pytest.raises(ValueError, match="goals are numbered 1 to 3"):
         session.correct(session.q0, "right", 4)
+
+
+def test_what_is_kept_of_a_run():
+    """Of three runs of one job, whose solutions are the corrective process (319 ticks)."""
+    task = load_task("ascending")
+    movements = list(corrective_trial(task, "RRR").movements)
+    corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
+    told = {"parts": {"solution": movements}, "rewards": [None, -330, -319, -319]}
+    outcomes = [
+        Outcome("ok", details={"corrections": corrections}, **told),
+        Outcome("ok", details={"corrections": corrections[:-1]}, parts=told["parts"]),
+        Outcome("ok"),
+    ]
+    kept_runs = kept([{"run": k} for k in range(3)], Answer(outcomes, 6.0, 3.0), task, PAPER)
+    columns = ["run", "status", "reward", "hands", "best_trial", "early_corrections",
+               "late_corrections", "solution_corrections", "other_arm_travel", "replay_reward",
+               "together", "wall_s", "cpu_s"]  # fmt: skip
+    assert [[run.row[name] for name in columns] for run in kept_runs] == [
+        [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, 3, 2.0, 1.0],
+        [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, 3, 2.0, 1.0],
+        [2, "solver-failed", None, None, None, None, None, None, None, None, 3, 2.0, 1.0],
+    ]
+    assert kept_runs[2].row["reason"] == "it reported ok, but returned no solution"
+
+
+def test_ten_thousand_movements_are_not_too_many():
+    task, move = load_task("ascending"), Movement(1, "right", "corrective")
+    assert too_long(task, [move] * 10_000, PAPER) is None
+    assert "10001 movements" in str(too_long(task, [move] * 10_001, PAPER))
 
 
 def test_deterministic_methods_run_once():

@@ -49,6 +49,14 @@ def test_width_of_the_interval():
     assert noisy.high - noisy.low == pytest.approx(2 * 1.96 * wider, rel=0.08)
 
 
+def test_the_interval_of_few_instances_by_counting():
+    """Five instances -2 to 2. Of their 5^5 = 3125 resamples 56 (1.8 %) sum to -7 or less and 126
+    (4.0 %) to -6 or less, so that the 2.5 % quantile of means is -6/5; it is wider by √(5/4)."""
+    few = other_tasks({"a": [(np.full(2, float(c)),) for c in range(-2, 3)]})
+    end = 6 / 5 * math.sqrt(5 / 4)
+    assert (few.low, few.estimate, few.high) == pytest.approx((-end, 0, end))
+
+
 def test_families_count_alike_whatever_their_number_of_instances():
     many = [(np.array([1.0]),)] * 30
     few = [(np.array([0.0, 0.0]),)] * 3

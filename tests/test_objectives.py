@@ -21,9 +21,9 @@ from coartic.analysis.study import load
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
-from coartic.tasks.task import hands_of
+from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
-from tests.support.made_up import row, study_of
+from tests.support.made_up import MadeUp, row, study_of
 from tests.support.suites import KNOWN, InProcess
 
 SMALL = """
@@ -90,6 +90,44 @@ def test_regret_is_less_and_its_advantage_the_difference(study):
     table = crossings(study)
     assert (table.crossing_low <= table.crossing).all()
     assert (table.crossing <= table.crossing_high).all()
+
+
+def test_regret_is_to_the_best_single_run():
+    """Of two learners, without plans: the best run is the learner's, the best mean is CMA-ES's."""
+    plain = load_task("ascending")
+    dear = plain.model_copy(
+        update={"name": "ascending.distinct-100", "penalty": Penalty(distinct=100.0)}
+    )
+    runs = [
+        row(method, reward, task=task.name, run=k, reason="planted" * (status != "ok"),
+            status=status)
+        for task, method, rewards in (
+            (plain, "dual-process/EC1", [-300, -310, -320]),
+            (plain, "cma-es/bandit", [-320, -320, None]),
+            (dear, "dual-process/EC1", [-400, -420, -440]),
+            (dear, "cma-es/bandit", [-410, -410, -410]),
+            (dear, "random-search/pure", [-390]),  # not compared, so that nothing is of it
+        )
+        for k, reward in enumerate(rewards)
+        for status in ("infeasible" if reward is None else "ok",)
+    ]  # fmt: skip
+    frame = pd.DataFrame(runs).astype({"reward": "Int64"})
+    study = study_of(frame, [plain, dear], suite="objectives")
+    seen = rewards(MadeUp(study, movements=({}, {})))
+    expected = [
+        ("joints", 0.0, "learner", -310.0, 100 * 10 / 300),
+        ("joints", 0.0, "cma-es", -320.0, 100 * 20 / 300),
+        ("region", 0.0, "learner", -310.0, 100 * 10 / 300),
+        ("region", 0.0, "cma-es", -320.0, 100 * 20 / 300),
+        ("distinct", 0.0, "learner", -310.0, 100 * 10 / 300),
+        ("distinct", 0.0, "cma-es", -320.0, 100 * 20 / 300),
+        ("distinct", 100.0, "learner", -420.0, 5.0),
+        ("distinct", 100.0, "cma-es", -410.0, 2.5),
+    ]
+    names = ["term", "weight", "who", "reward", "regret"]
+    pd.testing.assert_frame_equal(seen[names], pd.DataFrame(expected, columns=names))
+    assert set(seen.task) == {"ascending"}
+    assert seen.family.isna().all()
 
 
 def test_where_a_line_crosses_zero():

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, execute, load_task
 from coartic.baselines.optimum import DynamicProgramming
@@ -65,18 +66,21 @@ def planar_task(**changes):
     return tiny_task(**{**content, **changes})
 
 
-def nearest_by_grid(task, q, goal, spacing=0.008):
-    """Least joint-space distance from ``q`` to a posture of the two links that hits a goal.
-
-    All angles that a shortest way may lead to, on a grid; the hand by trigonometry.
-    """
-    first, second = (np.arange(q[-2 + k] - math.pi, q[-2 + k] + math.pi, spacing) for k in (0, 1))
+def hits_on_grid(task, q, goal, spacing=0.008, around=math.pi):
+    """Postures of the two links that hit a goal, ``(n, 2)``, no joint further than ``around`` from
+    those of ``q``: on a grid; the hand by trigonometry."""
+    first, second = (np.arange(q[-2 + k] - around, q[-2 + k] + around, spacing) for k in (0, 1))
     a, b = np.meshgrid(first, second, indexing="ij")
     links, (x, y) = task.robot.right_links, task.robot.right_shoulder
     hand_x = x + links[0] * np.cos(a) + links[1] * np.cos(a + b)
     hand_y = y + links[0] * np.sin(a) + links[1] * np.sin(a + b)
     inside = np.hypot(hand_x - task.goals[goal][0], hand_y - task.goals[goal][1]) <= task.radius
-    return np.hypot(a - q[-2], b - q[-1])[inside].min()
+    return np.column_stack([a[inside], b[inside]])
+
+
+def nearest_by_grid(task, q, goal):
+    """Least joint-space distance from ``q`` to a posture of the two links that hits a goal."""
+    return np.linalg.norm(hits_on_grid(task, q, goal) - q[-2:], axis=1).min()
 
 
 @pytest.mark.parametrize("goals", [[[1.4, 1.3], [-0.6, 1.0]], [[0.6, -1.2], [1.9, 0.6]]])
@@ -88,6 +92,21 @@ def test_without_look_ahead_each_goal_is_reached_the_shortest_way(goals):
         length = nearest_by_grid(task, q, goal)
         assert abs(ticks - (math.ceil(length / PAPER.step) + 1)) <= 1
         q = execution.configurations[goal]
+
+
+def test_each_movement_is_the_first_of_a_plan_with_the_next_goal():
+    """One goal ahead, four goals: from where it stands, by brute force over pairs of postures."""
+    goals = [[1.4, 1.3], [-0.6, 1.0], [0.9, 1.1], [1.6, 0.6]]
+    task = planar_task(goals=goals, initial_hands="RRRR")
+    result, execution = solved(task, horizon=1)
+    assert result.details["windows"] == 3  # the last reaches the last goal
+    reached = [task.q0[-2:], *execution.configurations[:, -2:]]
+    for goal in range(3):
+        here, there = (hits_on_grid(task, task.q0, g, 0.02, 4.0) for g in (goal, goal + 1))
+        onward = KDTree(there)
+        through = np.linalg.norm(here - reached[goal], axis=1) + onward.query(here)[0]
+        moved = np.linalg.norm(reached[goal + 1] - reached[goal])
+        assert moved + onward.query(reached[goal + 1])[0] < through.min() + 0.03
 
 
 def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from coartic import load_task
 from coartic.analysis import tables
@@ -74,6 +75,25 @@ def test_the_learners_conditions_stand_together():
     assert over.algorithm.tolist() == ["CMA-ES", "learner"]
     assert (over.low < over.gap).all()
     assert (over.gap < over.high).all()
+
+
+def test_intervals_on_single_tasks_are_of_the_gaps_themselves():
+    """Of skewed rewards, so that the ends are not alike; without spread a point."""
+    rewards = [-310, -300, -301, -302, -300, -300]
+    seen = study({("ascending", "dual-process/EC1"): rewards,
+                  ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
+    table = standings(seen)
+    by_task = table.set_index("task").loc[["ascending", "two-armed-1"]]
+    gap = (np.array(rewards) + 292) / -292
+    ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
+    low, high = ends.confidence_interval
+    assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
+    expected = pd.DataFrame(
+        [("dual-process/EC1", BY_TRIAL, "learner", gap.mean(), low, high, 6),
+         ("dual-process/EC4", BY_TRIAL, "learner", 15 / 465, 15 / 465, 15 / 465, 3)],
+        index=by_task.index, columns=by_task.columns,
+    )  # fmt: skip
+    pd.testing.assert_frame_equal(by_task, expected, rtol=0.01)
 
 
 def test_a_rank_counts_algorithms():

@@ -20,7 +20,7 @@ from coartic.analysis.report import build, facts
 from coartic.analysis.report.text import sentence
 from coartic.analysis.signatures.signs import Sign
 from coartic.motion.costs import joint_costs
-from tests.support.made_up import MadeUp, row, study_of
+from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.suites import run_and_write, suite_of
 
 HORIZON, STOPS = tables.TABLES["horizon"], tables.TABLES["stops"]
@@ -94,7 +94,7 @@ def planted(
                     )
         add("dual-process/EC4", "", -round(BEST * (1 + factor * learner / 100)))
     frame = pd.DataFrame(rows)
-    return MadeUp(study_of(frame, tasks, suite="horizon"), _trajectories=trajectories)
+    return MadeUp(study_of(frame, tasks, suite="horizon"), trajectories=made(trajectories))
 
 
 @pytest.fixture(autouse=True)
@@ -241,7 +241,7 @@ def test_claims_on_stops(passing, stopping, expected, monkeypatch):
                 values[task.name, f"{studies.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
     monkeypatch.setattr(studies, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
     study = study_of(pd.DataFrame(rows), tasks, suite="stops")
-    assert list(verdicts(MadeUp(study, _trajectories=values)).values()) == expected
+    assert list(verdicts(MadeUp(study, trajectories=made(values))).values()) == expected
 
 
 @pytest.fixture(scope="module")

@@ -19,13 +19,19 @@ MADE_WITH = {
 
 
 class MadeUp(Study):
-    """A study with some of its parts made up: ``MadeUp(study, optima=...)``."""
+    """A study with some of its parts made up: ``MadeUp(study, optima=...)``; what its methods
+    return as well, ``MadeUp(study, trajectories=made(...))``."""
 
     def __init__(self, study, **parts):
         super().__init__(study.folder, study.plan, study.made_with, study.runs)
         for name in parts:
             assert isinstance(getattr(Study, name, None), cached_property) or hasattr(study, name)
         vars(self).update(parts)
+
+
+def made(values):
+    """A method that returns values by its arguments."""
+    return lambda *key: values[key]
 
 
 def made_up_optima(*tasks):

@@ -1,0 +1,192 @@
+"""The main tables of a made-up folder, with every cell worked out by hand.
+
+Ascending goes from -319 to -292, two-armed 1 from -675 to -465: in 20 targets, 1.35 and 10.5 ticks
+apart. The learner's runs on ascending differ, all else has no spread.
+"""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from coartic import load_task
+from coartic.analysis import tables
+from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL
+from coartic.analysis.tables import coarticulation
+from tests.support.made_up import MadeUp, made_up_optima, row, study_of
+
+ONE, TWO = "ascending", "two-armed-1"
+EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
+PLAN, BOTH = "trajectory-optimisation/path-length", "dual-process (EC1, EC4)"
+NONE = math.nan
+
+
+def trials_of(steps, trials):
+    """Reward of each trial: below all others but in those of ``steps``, numbered from 1."""
+    rewards = np.full(trials, -700.0)
+    for trial, reward in steps.items():
+        rewards[trial - 1] = reward
+    return rewards
+
+
+STEPS = {
+    (ONE, EC1): ({1: -319, 100: -312, 500: -305, 1000: -300}, {1: -319, 101: -310, 1000: -301},
+                 {1: -319, 20: -312, 50: -305, 1000: NONE}),
+    (TWO, EC4): ({1: -675, 200: -570, 1000: -480},) * 3,
+    (ONE, CMA): ({1: -319, 10: -293, 100: NONE},) * 3,
+    (TWO, CMA): ({1: -675, 10: -470, 100: NONE},) * 3,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def study():
+    rows, rewards = [], {}
+    for (task, method), runs in STEPS.items():
+        for run, steps in enumerate(runs):
+            run_id, trials = f"{task}-{method}-{run}", max(steps)
+            rewards[run_id] = trials_of(steps, trials)
+            best = int(np.nanmax(rewards[run_id]))
+            rows.append(row(method, best, task=task, run=run, run_id=run_id, trials=trials,
+                            seed=run, forward_kinematics=1_000 * trials))  # fmt: skip
+    told = "kinematic model, reward as a formula"
+    for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100)):
+        rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0, told=told,
+                        forward_kinematics=500, movement_ticks=ticks, seed=0))  # fmt: skip
+    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    made_up = study_of(frame, [load_task(ONE), load_task(TWO)])
+    parts = {"optima": made_up_optima(ONE, TWO), "rewards": lambda: iter(rewards.items())}
+    return MadeUp(made_up, **parts)
+
+
+def same(table, expected):
+    """The table's columns but the runs behind it are these, in this order."""
+    frame = pd.DataFrame.from_dict(expected, orient="index").rename_axis("row")
+    shown = table[frame.columns]
+    pd.testing.assert_frame_equal(shown, frame, check_dtype=False)
+
+
+LEARNED = {ONE: 10 / 292, TWO: 15 / 465}
+FOUND = {ONE: 1 / 292, TWO: 5 / 465}
+PLANNED = {ONE: 4 / 292, TWO: 35 / 465}
+
+
+def gap_columns(gaps):
+    mean = sum(gaps.values()) / 2 if len(gaps) == 2 else NONE
+    return {"gap": mean, f"on {ONE}": gaps.get(ONE, NONE), f"on {TWO}": gaps.get(TWO, NONE)}
+
+
+def test_ranking(study):
+    table = tables.ranking(study)
+    named = {
+        CMA: (BY_TRIAL, FOUND, 6),
+        BOTH: (BY_TRIAL, LEARNED, 6),
+        PLAN: (BY_FORMULA, PLANNED, 2),
+        EC1: (BY_TRIAL, {ONE: LEARNED[ONE]}, 3),
+        EC4: (BY_TRIAL, {TWO: LEARNED[TWO]}, 3),
+    }
+    same(table.loc[list(named)], {
+        name: {"method": name, "knows": knows, **gap_columns(gaps), "runs": runs}
+        for name, (knows, gaps, runs) in named.items()
+    })  # fmt: skip
+    assert table.index.tolist()[:3] == [CMA, BOTH, PLAN]
+    assert table.gap_low[CMA] == table.gap_high[CMA] == table.gap[CMA]
+    # Of two-armed 1 there is no spread: half of what ascending's runs span, -300 to -305.
+    assert LEARNED[TWO] / 2 + 8 / 584 <= table.gap_low[BOTH] < table.gap[BOTH]
+    assert table.gap[BOTH] < table.gap_high[BOTH] <= LEARNED[TWO] / 2 + 13 / 584
+    assert table.gap_low[[PLAN, EC1, EC4]].isna().all()
+
+
+def test_variants(study):
+    costs = {"instances": 0, "movement_ticks": 5000, "solve_s": 0.25}
+    same(tables.variants(study), {
+        BOTH: {"method": BOTH, "runs": 6, **gap_columns(LEARNED), "trials": 1000, **costs},
+        CMA: {"method": CMA, "runs": 6, **gap_columns(FOUND), "trials": 100, **costs},
+        PLAN: {"method": PLAN, "runs": 2, **gap_columns(PLANNED), "trials": 0, **costs,
+               "movement_ticks": 50},
+    })  # fmt: skip
+
+
+def test_methods(study):
+    shown = ["runs", "solved", "reward", "reward_sd", "gap", "hands", "trials",
+             "forward_kinematics", "told", "corrections", "other_arm"]  # fmt: skip
+    sd = math.sqrt((2**2 + 1**2 + 3**2) / 2)
+    expected = {
+        f"{ONE} {CMA}": (3, 3, -293.0, 0.0, 1 / 292, "LRLR 3", 100, 1e5, "AT", 0, "still"),
+        f"{ONE} {PLAN}": (1, 1, -296.0, NONE, 4 / 292, "LRLR", 0, 500, "KR", 0, "still"),
+        f"{ONE} {EC1}": (3, 3, -302.0, sd, 10 / 292, "LRLR 3", 1000, 1e6, "AT", 0, "still"),
+        f"{TWO} {CMA}": (3, 3, -470.0, 0.0, 5 / 465, "LRLR 3", 100, 1e5, "AT", 0, "still"),
+        f"{TWO} {EC4}": (3, 3, -480.0, 0.0, 15 / 465, "LRLR 3", 1000, 1e6, "AT", 0, "still"),
+        f"{TWO} {PLAN}": (1, 1, -500.0, NONE, 35 / 465, "LRLR", 0, 500, "KR", 0, "still"),
+    }
+    same(tables.methods(study), {
+        name: dict(zip(shown, cells, strict=True)) for name, cells in expected.items()
+    })  # fmt: skip
+
+
+def test_price(study):
+    """Within 20, 50, 100, 101, 200, 500 and 1000 trials the learner has 5, 10, 15, 21, 51, 56 and
+    91 of 120 pairs: 30 of two-armed 1 from trial 200.
+
+    An interval ends where 1 of 27 resamples of ascending's runs does, the last run three times.
+    """
+    names = ["reached", "trials_to_quarter", "trials_to_quarter_low", "trials_to_quarter_high",
+             "trials_to_half", "trials_to_half_low", "trials_to_half_high",
+             "kinematics_to_half", "kinematics_to_half_low", "kinematics_to_half_high",
+             "seconds_to_half", "seconds_to_half_low",
+             f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
+    # The first run is cold: the time of the other two, which are too few for an interval.
+    cells = {
+        BOTH: (91 / 120, 200, 50, 200, 1000, 200, 1000, 1e6, 2e5, 1e6, 0.25, NONE, 500, 200),
+        CMA: (38 / 40, 10, 10, 10, 10, 10, 10, 1e4, 1e4, 1e4, 0.025, NONE, 10, 10),
+        PLAN: (33 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
+    }
+    table = tables.price(study)
+    same(table.loc[list(cells)], {
+        name: dict(zip(names, row, strict=True)) for name, row in cells.items()
+    })  # fmt: skip
+    assert len(table) == 3
+
+
+def test_learning(study):
+    """Half of the gain of the three runs is there at trial 500, 101 and 20."""
+    names = ["runs", "initial", "after_100", "after_1000", "after_10000",
+             "half_gain", "half_gain_low", "half_gain_high"]  # fmt: skip
+    cells = {
+        f"{ONE} {EC1}": (3, -319.0, -312.0, -302.0, NONE, 101.0, 20.0, 500.0),
+        f"{TWO} {EC4}": (3, -675.0, -675.0, -480.0, NONE, 200.0, 200.0, 200.0),
+        f"{ONE} {CMA}": (3, -319.0, -293.0, NONE, NONE, 10.0, 10.0, 10.0),
+        f"{TWO} {CMA}": (3, -675.0, -470.0, NONE, NONE, 10.0, 10.0, 10.0),
+    }
+    same(tables.learning(study), {
+        name: dict(zip(names, row, strict=True)) for name, row in cells.items()
+    })  # fmt: skip
+
+
+def test_contexts(study, monkeypatch):
+    """Signatures of two goals that two methods share, each in its column; Holm by method."""
+    names = ["context distance", "context dependence", "motor-equivalent part",
+             "non-motor-equivalent part", "lead time"]  # fmt: skip
+    rows = [
+        {"task": ONE, "label": label, "goal": goal, "hand": "right", "against": TWO, "moving": None,
+         "signature": name, "value": value, "n": n - (name == names[4]),
+         "p": p if name == names[1] else 0.9}
+        for label, goal, n, p, values in (
+            (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3, 20.0)),
+            (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08, None)),
+            (PLAN, 1, 2, 0.04, (0.2, 2.0, 0.12, 0.16, 7.0)),
+        )
+        for name, value in zip(names, values, strict=True)
+    ]  # fmt: skip
+    monkeypatch.setattr(coarticulation, "signature_values", lambda study: pd.DataFrame(rows))
+    monkeypatch.setattr(coarticulation, "placebo_p", lambda *what: 0.5 if CMA in what else NONE)
+    columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
+               "other", "lead"]  # fmt: skip
+    cells = {
+        f"{ONE} {CMA} goal 1 right": (CMA, 6, 0.5, 3.0, 0.02, 0.5, 0.4, 0.3, 20.0),
+        f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08, NONE),
+        f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16, 7.0),
+    }
+    frame = coarticulation.contexts(MadeUp(study))
+    same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
+    assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]
