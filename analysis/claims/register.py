@@ -34,7 +34,9 @@ QUANTITIES = {
 }
 for _name, _sign in SIGNS.items():
     QUANTITIES[_name.replace(" ", "-")] = _sign.words
-    QUANTITIES[f"replayed-{_name.replace(' ', '-')}"] = f"in noiseless replays, {_sign.words}"
+    QUANTITIES[f"replayed-{_name.replace(' ', '-')}"] = (
+        f"in noiseless replays, {_sign.in_short or _sign.words}"
+    )
 """What is measured of runs beside their reward, by its name in comparisons."""
 _WHAT = "|".join(QUANTITIES)
 _METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
