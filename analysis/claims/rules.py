@@ -104,7 +104,8 @@ known reward, in each family"""
         for family in claim.families:
             values = over_instances(data, family, first, second)
             tests.append(bootstrap_test(values, margin, resamples=RESAMPLES_OF_FAMILIES))
-            seen = f"{family}: {estimate(mean(values), 2)}"
+            beyond = "" if second.what == "number" else f", more than {second}"
+            seen = f"{family}{beyond}: {estimate(mean(values), 2)}"
             if first.what in REWARDS:
                 seen = f"{family} {pair}: {estimate(mean(values), 1)} %"
             parts.append((first.what, f"{seen} on {len(values)} instances"))
