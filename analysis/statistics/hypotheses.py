@@ -96,10 +96,12 @@ def bootstrap_test(
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
     p = float(1 + extreme.sum()) / (1 + resamples)
-    # The most extreme resample has no spread: one value of each sample, drawn every time.
+    # No less is credible than an exact test of so few values could give: by signs, or by exchange.
     tails = 2 if alternative == "two-sided" else 1
-    alike = tails * math.prod(float(len(values)) ** -len(values) for values in shifted)
-    return replace(inference, p=p, resamples=resamples, least_p=max(alike, 1 / (1 + resamples)))
+    n = inference.n
+    ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
+    least = max(tails / ways, 1 / (1 + resamples))
+    return replace(inference, p=p, resamples=resamples, least_p=least)
 
 
 def sign_flip_test(differences: ArrayLike) -> Inference:
