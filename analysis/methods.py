@@ -28,8 +28,6 @@ TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""
 PLACEBO = "placebo/guesses"
 """The best of random guesses around the corrective process, which cannot coarticulate."""
-SUBTASK = {EC1: f"{EC1}-subtask", EC4: f"{EC4}-subtask"}
-"""The learner rewarded by subtask, the other placebo, by the condition that it is beside."""
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
 

@@ -14,7 +14,7 @@ from coartic import Hand, Task
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import MARGINS, Claim, Finding
 from coartic.analysis.claims.rules import base_steps, count_runs, judged_instances
-from coartic.analysis.methods import CONDITIONS, EC1, INITIAL, PLACEBO, SUBTASK, name_of
+from coartic.analysis.methods import CONDITIONS, EC1, INITIAL, PLACEBO, name_of
 from coartic.analysis.published import ENTRIES, Order, Solved, Summary, published_cell
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import dependence_below
@@ -50,7 +50,7 @@ def context(data: Data, _: Claim) -> Finding:
     less_p = dependence_below(*contexts.postures, bound, np.random.default_rng(SEED))
     tests = [test]
     against = [replace(test, estimate=bound - test.estimate, p=less_p)]
-    for label in (PLACEBO, SUBTASK[EC1]):
+    for label in (PLACEBO, f"{EC1}-subtask"):
         placebo = contexts_of(data, label)
         more = contexts.apart - placebo.apart
         beyond = replace(test, estimate=more, n=(contexts.n, placebo.n))

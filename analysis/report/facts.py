@@ -172,7 +172,7 @@ def paper(study: Study) -> Facts | None:
     rows = [row for row in beside_paper(study) if not row["hands"]]
     rewards = Counter(row["verdict"] for row in rows)
     return {
-        # Undecided, though sampling alone does not explain the difference.
+        # Undecided, though 0 is not in the interval.
         "off": [
             {
                 **{f"by{key}": row[f"difference{key}"] for key in ("", "_low", "_high")},
