@@ -21,8 +21,8 @@ from coartic.analysis.claims.register import MARGINS
 from coartic.analysis.methods import PLACEBO
 from coartic.analysis.signatures.context import beyond_p, context_dependence, permutation_p
 from coartic.analysis.statistics import estimates
-from coartic.analysis.statistics.equivalence import difference
-from coartic.analysis.statistics.estimates import LEVEL, Inference, Interval
+from coartic.analysis.statistics.equivalence import difference_to_printed
+from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
     independence_test,
@@ -49,7 +49,7 @@ POPULATIONS: dict[str, Draw] = {
 SHARE = 0.75
 
 
-def holds(interval: Inference | Interval, truth: float) -> bool:
+def holds(interval: estimates.Estimate, truth: float) -> bool:
     """Whether an interval holds a value, to rounding; no interval does not."""
     return interval.low - 1e-9 <= truth <= interval.high + 1e-9
 
@@ -66,7 +66,9 @@ def of_rewards(rng: np.random.Generator, draw: Draw, n: int, mean: float) -> dic
         "interval of paired differences (BCa)": holds(
             estimates.mean(a - b, resamples=RESAMPLES), 0
         ),
-        "interval to a printed mean (Welch)": holds(difference(a, float(b.mean()), sd, n), 0),
+        "interval to a printed mean (Welch)": holds(
+            difference_to_printed(a, float(b.mean()), sd, n), 0
+        ),
         "interval of a mean (Student)": holds(estimates.student_mean(a), mean),
         "test of a mean (bootstrap)": bootstrap_test(a, mean, resamples=RESAMPLES).p <= LEVEL,
         "test of two means (bootstrap)": bootstrap_test(a, b, resamples=RESAMPLES).p <= LEVEL,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic import Task
-    from coartic.analysis.statistics.estimates import Inference
+    from coartic.analysis.statistics.estimates import Estimate
 
 NONE = "–"
 """Shown where there is no value."""
@@ -74,9 +74,9 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def estimate(value: Inference, digits: int | None = None) -> str:
+def estimate(value: Estimate, digits: int | None = None) -> str:
     """``2.1 [1.3, 2.9]``; without the brackets where there is no interval."""
-    return f"{number(value.estimate, digits)} {in_brackets(value.low, value.high, digits)}".strip()
+    return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
 def marked(name: str, task: Task) -> str:

@@ -28,7 +28,7 @@ from coartic.analysis.claims.rules import higher
 from coartic.analysis.claims.single import shortest_reach
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
-from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.analysis.trajectories import Trajectories
@@ -45,7 +45,7 @@ def nothing():
 
 
 def test(p):
-    return Inference(1.0, (20,), "planted", p=p, resamples=9_999)
+    return Estimate(1.0, p=p, n=(20,), resamples=9_999)
 
 
 def planted(holds, *p, ids=("r",), against=None, **more):

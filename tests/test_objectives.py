@@ -146,7 +146,7 @@ def test_the_rule_compares_regrets(study):
     )  # fmt: skip
     finding = less_regret(Data(study), claim)
     values = advantage(study, "learner", "ticks", "distinct")[300.0]
-    assert finding.tests[0].estimate == pytest.approx(values.mean() - 1.0)
+    assert finding.tests[0].value == pytest.approx(values.mean() - 1.0)
     assert finding.holds == (values.mean() > 1.0)
     assert finding.evidence.startswith("The learner regrets less than the planner of ticks: ")
     assert " points at weight 300 (postures alike) on 3 random tasks." in finding.evidence

@@ -24,11 +24,10 @@ rewards = st.lists(st.integers(-20, 20).map(float), min_size=3, max_size=8)
 def test_bootstrap_test_on_the_mouse_data():
     """Welch's t is 1.06: p is 0.15 by Student's t, and by the book's algorithm near it."""
     greater = hypotheses.bootstrap_test(TREATMENT, CONTROL)
-    assert greater.estimate == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
+    assert greater.value == pytest.approx(30.63, abs=0.01)  # the book's 30.63 days
     assert 0.13 < greater.p < 0.18
     less = hypotheses.bootstrap_test(TREATMENT, CONTROL, "less")
     assert less.p + greater.p == pytest.approx(1, abs=0.01)
-    assert "two-sample" in greater.method
 
 
 @pytest.mark.parametrize(
@@ -120,10 +119,9 @@ def test_a_difference_to_a_known_number_is_of_one_sample():
 def test_degenerate_samples():
     interval = statistics.mean([4.0, 5.0])
     assert math.isnan(interval.low)
-    assert "fewer than 3" in interval.note
     interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
-    assert interval.low == interval.high == interval.estimate
-    assert interval.note == "the interval is a point: no spread"
+    assert interval.low == interval.high == interval.value
+    assert interval.value == 1.0
 
 
 def test_tests_that_cannot_be_made():
@@ -179,15 +177,17 @@ def test_pairing_by_seed():
 
 def test_closed_intervals():
     """Student's by hand, and Wilson's from its formula."""
-    assert statistics.student_mean(np.array([2.0, 4.0, 6.0]))[:3] == pytest.approx(
-        (4.0, 4 - 4.302653 * 2 / math.sqrt(3), 4 + 4.302653 * 2 / math.sqrt(3)), abs=1e-5
-    )
-    assert statistics.student_mean(np.full(6, 0.1))[1:3] == pytest.approx((0.1, 0.1), abs=1e-15)
-    assert np.isnan(statistics.student_mean(np.array([2.0]))[1:]).all()
+    three = statistics.student_mean(np.array([2.0, 4.0, 6.0]))
+    half = 4.302653 * 2 / math.sqrt(3)
+    assert (three.value, three.low, three.high) == pytest.approx((4, 4 - half, 4 + half), abs=1e-5)
+    same = statistics.student_mean(np.full(6, 0.1))
+    assert (same.low, same.high) == pytest.approx((0.1, 0.1), abs=1e-15)
+    assert math.isnan(statistics.student_mean(np.array([2.0])).low)
     z = stats.norm.ppf(0.975)
     centre, half = 7 + z**2 / 2, z * math.sqrt(7 * 3 / 10 + z**2 / 4)
     limits = [(centre + side * half) / (10 + z**2) for side in (-1, 1)]
-    assert statistics.wilson(7, 10)[:3] == pytest.approx((0.7, *limits))
+    share = statistics.wilson(7, 10)
+    assert (share.value, share.low, share.high) == pytest.approx((0.7, *limits))
 
 
 def test_rounding_is_no_spread():
@@ -201,7 +201,7 @@ def test_rounding_is_no_spread():
 def test_share_test():
     """20 of 20 where three quarters are expected: 0.75 to the 20th."""
     test = hypotheses.share_test(20, 20, 0.75, "greater")
-    assert test.estimate == pytest.approx(0.25)
+    assert test.value == pytest.approx(0.25)
     assert test.p == pytest.approx(0.75**20)
     assert hypotheses.share_test(0, 20, 0.75, "less").p == pytest.approx(0.25**20)
     assert hypotheses.share_test(15, 20, 0.75, "greater").p > 0.5
@@ -222,10 +222,9 @@ def test_fishers_test_of_two_rows(monkeypatch):
     expected = sum(n for n in seen.values() if n <= seen[tuple(first)]) / total
     exact = hypotheses.independence_test(first, second)
     assert exact.p == pytest.approx(expected)
-    assert exact.estimate == pytest.approx(0.8)
+    assert exact.value == pytest.approx(0.8)
     monkeypatch.setattr(hypotheses, "MOST_TABLES", 1)
     drawn = hypotheses.independence_test(first, second)
     assert drawn.p == pytest.approx(expected, abs=0.02)
-    assert "Monte Carlo" in drawn.method
     with pytest.raises(ValueError, match="no counts"):
         hypotheses.independence_test([0, 0], [1, 2])

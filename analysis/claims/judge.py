@@ -79,7 +79,7 @@ def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
         # NaN: counted exactly, or no spread in any sample.
         return "undecided" if p >= LEVEL else "supported"
     certain = not finding.tests or any(
-        test.estimate <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in finding.tests
+        test.value <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in finding.tests
     )
     return "not supported" if certain or opposite < LEVEL else "undecided"
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import Inference
+from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.words import read_beside
 from coartic.inputs import FileData
 
@@ -87,9 +87,9 @@ class Finding:
     holds: bool | None
     """Whether what the claim says is seen; None where that cannot be said."""
     evidence: str
-    tests: tuple[Inference, ...] = ()
+    tests: tuple[Estimate, ...] = ()
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
-    against: tuple[Inference, ...] | None = None
+    against: tuple[Estimate, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
     failed: tuple[tuple[str, str], ...] = ()
     """Cells that it lacks, as some of their runs failed: task, and label of the method."""

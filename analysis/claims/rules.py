@@ -35,7 +35,7 @@ from coartic.analysis.published import (
 )
 from coartic.analysis.statistics.estimates import (
     FEWEST,
-    Inference,
+    Estimate,
     difference_of_means,
     mean,
 )
@@ -89,7 +89,7 @@ def some_higher(data: Data, claim: Claim) -> Finding:
 holds, the smallest p times their number (Bonferroni)"""
     every = higher(data, claim)
     best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
-    holds = any(test.estimate > 0 for test in every.tests)
+    holds = any(test.value > 0 for test in every.tests)
     if holds:
         best = replace(best, p=min(1.0, best.p * len(every.tests)))
     return Finding(holds, every.evidence, (best,))
@@ -230,20 +230,18 @@ def about_half(
         if isinstance(entry, Number) and entry.difference_of
     )
     share = count / total
-    within = Inference(
+    within = Estimate(
         min(share - few, most - share),
-        (total,),
-        f"two one-tailed exact binomial tests, {few:.0%} and {most:.0%}",
+        n=(total,),
         p=max(
             share_test(count, total, few, "greater").p,
             share_test(count, total, most, "less").p,
         ),
     )
     table = [[count, total - count], [printed, printed_total - printed]]
-    unlike = Inference(
+    unlike = Estimate(
         share - printed / printed_total,
-        (total, printed_total),
-        "Fisher's exact test, two-tailed, against the printed counts",
+        n=(total, printed_total),
         p=float(stats.fisher_exact(table).pvalue),
     )
     return Finding(
@@ -297,9 +295,9 @@ def evidence(parts: Parts) -> str:
     return " ".join(f"{words}{'; '.join(of_quantity)}." for words, of_quantity in by_what.items())
 
 
-def all_hold(tests: list[Inference], parts: Parts) -> Finding:
+def all_hold(tests: list[Estimate], parts: Parts) -> Finding:
     """What is seen where every test points as claimed."""
-    return Finding(all(test.estimate > 0 for test in tests), evidence(parts), tuple(tests))
+    return Finding(all(test.value > 0 for test in tests), evidence(parts), tuple(tests))
 
 
 def in_words(what: str, values: Array) -> str:

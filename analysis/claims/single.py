@@ -20,7 +20,7 @@ from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import dependence_below
 from coartic.analysis.signatures.manifold import movable
 from coartic.analysis.signatures.subtasks import postures_before, ticks_slower
-from coartic.analysis.statistics.estimates import SEED, Inference, difference_of_means
+from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
 from coartic.analysis.statistics.hypotheses import independence_test, share_test
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import estimate, number, tally
@@ -46,22 +46,22 @@ def context(data: Data, _: Claim) -> Finding:
         f"in noiseless replays {number(replayed.apart, 2)} apart",
     ]
     bound = MARGINS["spread"]
-    test = Inference(contexts.spreads, (contexts.n,), "permutation test over runs", p=contexts.p)
+    test = Estimate(contexts.spreads, p=contexts.p, n=(contexts.n,))
     less_p = dependence_below(*contexts.postures, bound, np.random.default_rng(SEED))
     tests = [test]
-    against = [replace(test, estimate=bound - test.estimate, p=less_p)]
+    against = [replace(test, value=bound - test.value, p=less_p)]
     for label in (PLACEBO, f"{EC1}-subtask"):
         placebo = contexts_of(data, label)
         more = contexts.apart - placebo.apart
-        beyond = replace(test, estimate=more, n=(contexts.n, placebo.n))
+        beyond = replace(test, value=more, n=(contexts.n, placebo.n))
         tests.append(replace(beyond, p=contexts.p_beyond(placebo)))
-        against.append(replace(beyond, estimate=-more, p=placebo.p_beyond(contexts)))
+        against.append(replace(beyond, value=-more, p=placebo.p_beyond(contexts)))
         parts.append(f"{name_of(label)}: {number(placebo.apart, 2)} apart")
     for label in CONTROLS:
         with suppress(MissingError):
             apart = contexts_of(data, label).apart
             parts.append(f"{name_of(label)}: {number(apart, 2)} apart")
-    holds = contexts.spreads > bound and all(each.estimate > 0 for each in tests)
+    holds = contexts.spreads > bound and all(each.value > 0 for each in tests)
     return Finding(holds, f"{'; '.join(parts)}.", tuple(tests), tuple(against))
 
 
@@ -90,15 +90,15 @@ def slower_hands_are_chosen(data: Data, claim: Claim) -> Finding:
         table = [[count, total - count], [int(of_placebo.sum()), int((~of_placebo).sum())]]
         p = float(stats.fisher_exact(table, alternative="greater").pvalue)
         more = min(does.mean() - of_placebo.mean(), does.mean() - MARGINS["few"])
-        tests.append(Inference(more, (total, len(of_placebo)), "Fisher's exact test", p=p))
+        tests.append(Estimate(more, p=p, n=(total, len(of_placebo))))
         against.append(share_test(count, total, MARGINS["few"], "less"))
         seen = beside(data, task, who, chosen[who])
         parts.append(f"{task} {who}: {count} of {total} runs{seen}")
     parts.append(f"{name_of(PLACEBO)}: {of_placebo.sum()} of {len(of_placebo)} runs")
-    best = min(tests, key=lambda test: (test.estimate <= 0, test.p))
+    best = min(tests, key=lambda test: (test.value <= 0, test.p))
     test = replace(best, p=min(1.0, best.p * len(tests)))
     contrary = max(against, key=lambda test: test.p)
-    return Finding(test.estimate > 0, f"{'; '.join(parts)}.", (test,), (contrary,))
+    return Finding(test.value > 0, f"{'; '.join(parts)}.", (test,), (contrary,))
 
 
 def chosen_slower(cell: Trajectories, initial: str) -> Array:
@@ -157,7 +157,7 @@ def sequences_change(data: Data, claim: Claim) -> Finding:
     against.append(count_runs(data, two, "most", condition, what.removeprefix("not ")).tests[0])
     seen = ", ".join(f"{c} {tally(n)}" for c, n in zip(conditions, (before, after), strict=True))
     return Finding(
-        bool(test.estimate > 0 and left.holds),
+        bool(test.value > 0 and left.holds),
         f"{one}: {seen}; {left.evidence}.",
         (test,),
         tuple(against),

@@ -19,7 +19,7 @@ from coartic.analysis.claims.register import MARGINS, Claim, Finding
 from coartic.analysis.generality.sample import sample
 from coartic.analysis.methods import most_exploring
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import FEWEST, Inference, mean
+from coartic.analysis.statistics.estimates import FEWEST, Estimate, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import gap_share
 from coartic.analysis.studies.objectives import TERMS, WHO, advantage
@@ -101,7 +101,7 @@ def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataF
     return chosen
 
 
-def over_tasks(values: pd.Series, margin: float = 0.0) -> Inference:
+def over_tasks(values: pd.Series, margin: float = 0.0) -> Estimate:
     """One-tailed test that the mean over tasks is above a margin; MissingError for too few."""
     there = values.dropna().to_numpy(dtype=np.float64)
     if len(there) < FEWEST:
@@ -123,7 +123,7 @@ def finding(parts: dict[str, tuple[pd.Series, float, int]]) -> Finding:
     """
     tests = tuple(over_tasks(sign * v, sign * bound) for v, bound, sign in parts.values())
     seen = [in_words(sentence, values) for sentence, (values, _, _) in parts.items()]
-    return Finding(all(test.estimate > 0 for test in tests), one_sentence(seen), tests)
+    return Finding(all(test.value > 0 for test in tests), one_sentence(seen), tests)
 
 
 def one_sentence(parts: list[str]) -> str:
@@ -271,4 +271,4 @@ more than {regret:g} % of the best known reward"""
     data.run_ids.extend(data.study.runs.run_id)
     seen = one_sentence([f"{pair}: {', '.join(parts)}" for pair, parts in by_pair.items()])
     seen += " Points are per cent of the best known reward."
-    return Finding(all(test.estimate > 0 for test in tests), seen, tuple(tests))
+    return Finding(all(test.value > 0 for test in tests), seen, tuple(tests))

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis.statistics.equivalence import MARGIN, equivalence
+from coartic.analysis.statistics.equivalence import MARGIN, verdict, welch
 from coartic.analysis.statistics.estimates import (
     FEWEST,
     difference_of_means,
@@ -108,11 +108,11 @@ def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
     difference = difference_of_means(*samples)
     test = sign_flip_test(y - x) if len(x) >= FEWEST else bootstrap_test(*samples, "two-sided")
     few = min(len(a.good), len(b.good)) < FEWEST
-    agreement = equivalence(*samples, MARGIN * abs(a.rewards.mean()))
+    agreement = verdict(welch(*samples), MARGIN * abs(a.rewards.mean()))
     return row | {
         **interval("difference", difference),
         "p": test.p,
-        "verdict": "too few runs" if few else agreement.verdict,
+        "verdict": "too few runs" if few else agreement,
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.published import RUNS, TRIALS, PublishedCell, published_cell
-from coartic.analysis.statistics.equivalence import MARGIN, difference
+from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import interval, standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
 
@@ -57,9 +57,9 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
                 "verdict": None,
             }
             if summary and len(rewards):
-                apart = difference(rewards, summary.mean, summary.sd, summary.runs)
+                apart = difference_to_printed(rewards, summary.mean, summary.sd, summary.runs)
                 row |= interval("difference", apart)
                 if (cell.good.trials == TRIALS).all():
-                    row["verdict"] = apart.verdict
+                    row["verdict"] = verdict(apart, row["margin"])
             rows.append(row)
     return rows

@@ -21,7 +21,7 @@ from coartic.analysis.comparisons.methods import group_of, numbers, solve_times
 from coartic.analysis.comparisons.standings import ALL_TASKS, gaps, initial_and_optimum
 from coartic.analysis.methods import in_order, is_search, is_variant
 from coartic.analysis.optima import locks_base
-from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Interval, interval
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Estimate, interval
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.robot import Array
 
@@ -156,7 +156,7 @@ class Targets:
         """Share that is reached in the end."""
         return float(self.weights[np.isfinite(self.values)].sum())
 
-    def crossing(self, level: float) -> Interval:
+    def crossing(self, level: float) -> Estimate:
         """The least budget within which ``level`` of the pairs are reached; infinite without any.
 
         With its percentile interval: runs are drawn anew within their task, and the tasks stay.
@@ -166,7 +166,7 @@ class Targets:
         steps = np.append(self.values, math.inf)
         budget = float(steps[(np.cumsum(self.weights) < level - 1e-9).sum()])
         if min(self.sizes) < FEWEST:
-            return Interval(budget)
+            return Estimate(budget)
         # First between which of some places of the curve resamples cross, then at which pair.
         places = np.unique(np.linspace(0, len(self.values), COARSE + 1).astype(int))
         parts = [
@@ -185,7 +185,7 @@ class Targets:
             )
             budgets.append(steps[near.start + (shares < level - 1e-9).sum(axis=1)])
         low, high = np.quantile(np.concatenate(budgets), TAILS, method="inverted_cdf")
-        return Interval(budget, float(low), float(high))
+        return Estimate(budget, float(low), float(high))
 
 
 @lru_cache(maxsize=2)

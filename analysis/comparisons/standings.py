@@ -25,7 +25,7 @@ from coartic.analysis.methods import (
     is_search,
     is_variant,
 )
-from coartic.analysis.statistics.estimates import Inference, mean
+from coartic.analysis.statistics.estimates import Estimate, mean
 from coartic.analysis.statistics.hypotheses import sign_flip_test
 from coartic.analysis.statistics.instances import gap_share, task_mean
 from coartic.analysis.study import Study, cached
@@ -118,7 +118,7 @@ def over_all(study: Study) -> Iterator[tuple[str, str, float, float, float, int]
         by_task = {str(task): of_task.gap.to_numpy() for task, of_task in runs.groupby("task")}
         if len(tasks) > 1 and len(by_task) == len(tasks) and runs.gap.notna().all():
             gap = task_mean(by_task)
-            yield ALL_TASKS, str(name), gap.estimate, gap.low, gap.high, len(runs)
+            yield ALL_TASKS, str(name), gap.value, gap.low, gap.high, len(runs)
 
 
 def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, int]]:
@@ -129,7 +129,7 @@ def task_by_task(study: Study) -> Iterator[tuple[str, str, float, float, float, 
         if has_gap and len(cell.good) == len(cell.runs):
             best, reward = study.optima[task].reward, mean(cell.rewards)
             # The higher the reward, the smaller the gap.
-            gap, low, high = gap_share([reward.estimate, reward.high, reward.low], best).tolist()
+            gap, low, high = gap_share([reward.value, reward.high, reward.low], best).tolist()
             yield task, label, gap, low, high, len(cell.runs)
 
 
@@ -152,7 +152,7 @@ def leaders(study: Study, group: str) -> pd.DataFrame:
     return shown.assign(p=first + p, least_p=first + least)
 
 
-def apart(study: Study, first: str, second: str) -> Inference:
+def apart(study: Study, first: str, second: str) -> Estimate:
     """Two-tailed test of the difference of mean gaps of two methods over the tasks of both.
 
     A sign-flip test of runs paired by seed within their task; a method that is run once is compared
@@ -168,5 +168,5 @@ def apart(study: Study, first: str, second: str) -> Inference:
         both = a.merge(b, on="seed" if min(len(a), len(b)) > 1 else "task")
         differences.append((both.gap_x - both.gap_y).to_numpy(np.float64))
     if not differences or not all(map(len, differences)):
-        return Inference(math.nan, (), "no pairs")
+        return Estimate(math.nan)
     return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))

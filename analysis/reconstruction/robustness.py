@@ -154,7 +154,7 @@ def judge_view(
         row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
         if finding.tests:
             first = finding.tests[0]
-            row |= {"effect": first.estimate, "low": first.low, "high": first.high, "p": first.p}
+            row |= {"effect": first.value, "low": first.low, "high": first.high, "p": first.p}
         rows.append(row)
     return specification, rows, claims_judged
 

@@ -23,7 +23,7 @@ from scipy.cluster.hierarchy import DisjointSet
 from coartic import Task
 from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.context import p_values
-from coartic.analysis.statistics.estimates import RESAMPLES, Interval, centred, student, varies
+from coartic.analysis.statistics.estimates import RESAMPLES, Estimate, centred, student, varies
 from coartic.robot import Array
 
 LEAST = 3
@@ -71,12 +71,12 @@ def _along(points: Array) -> Array:
     return positions
 
 
-def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Interval]:
+def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Estimate]:
     """One slope per joint, by least squares over the mean posture at each position.
 
     Length unit (base) or rad (joint) per length unit, -∞ to ∞; 0 no dependence, of which ``p``
     is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row
-    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Interval and
+    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Estimate and
     test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
     run once or often, and take what departs from the line as independent and of equal variance
     between positions: curvature widens the interval. Joints that do not change have slope 0 and
@@ -85,7 +85,7 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     x, means = _by_position(configurations, positions)
     slopes = []
     for joint in means.T:
-        slope = Interval(0.0, 0.0, 0.0, 1.0)
+        slope = Estimate(0.0, 0.0, 0.0, 1.0)
         if varies(joint):
             fit = stats.linregress(x, joint)
             value, error, p = map(float, (fit.slope, fit.stderr, fit.pvalue))
@@ -96,7 +96,7 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
 
 def slope_norm(
     configurations: Array, positions: Sequence[float] | Array, rng: np.random.Generator
-) -> Interval:
+) -> Estimate:
     """Length of the vector of all joints' slopes (:func:`locus_slopes`), without interval.
 
     Length unit and rad mixed, per length unit; ≥ 0 and so biased upwards. Permutation test: the
@@ -114,7 +114,7 @@ def slope_norm(
         ways = rng.permuted(np.tile(np.arange(len(x)), (RESAMPLES, 1)), axis=1)
     observed = np.asarray(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
-    return Interval(float(observed), p=float(p_values(null, observed, exact=exact)))
+    return Estimate(float(observed), p=float(p_values(null, observed, exact=exact)))
 
 
 def _by_position(configurations: Array, positions: Sequence[float] | Array) -> tuple[Array, Array]:

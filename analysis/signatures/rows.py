@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from coartic.analysis.statistics.estimates import Interval
+from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.words import read_beside
 from coartic.inputs import FileData
 
@@ -78,10 +78,11 @@ def row(signature: str, place: Row, **values: Any) -> Row:
     return {**COLUMNS, **names, **values, **PLACE, **place}
 
 
-def estimated(signature: str, place: Row, interval: Interval, n: int, **values: Any) -> Row:
+def estimated(signature: str, place: Row, of: Estimate, n: int, **values: Any) -> Row:
     """A row for a value with its interval or test, over ``n`` runs."""
     why = "one run: no interval" if n == 1 else ""
-    return row(signature, place, **{"why_not": why, "n": n, **interval._asdict(), **values})
+    numbers = {"value": of.value, "low": of.low, "high": of.high, "p": of.p}
+    return row(signature, place, **{"why_not": why, "n": n, **numbers, **values})
 
 
 def without(

@@ -20,7 +20,7 @@ from coartic.analysis.signatures.subtasks import (
     travel,
     turning_angles,
 )
-from coartic.analysis.statistics.estimates import Interval, student_mean, wilson
+from coartic.analysis.statistics.estimates import Estimate, student_mean, wilson
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
@@ -73,7 +73,7 @@ def over_some(signature: str, values: Array, place: Row) -> Row:
     """A mean over the runs that have a value with Student's interval, a share with Wilson's."""
     if REGISTER[signature].share:
         count, total = int(values.sum()), len(values)
-        share = wilson(count, total) if total > 1 else Interval(count / total)
+        share = wilson(count, total) if total > 1 else Estimate(count / total)
         return estimated(signature, place, share, total)
     finite = values[np.isfinite(values)].astype(np.float64)
     if not len(finite):

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,45 +41,30 @@ LARGE, RESAMPLES_OF_LARGE = 500, 1_999
 square of the number of values, and corrects nothing there."""
 NEGLIGIBLE = 1e-9
 """Values that differ by less than this share of their size do not differ: it is rounding."""
-NO_SPREAD = "the interval is a point: no spread"
 
 
 @dataclass(frozen=True)
-class Inference:
-    """A number, how sure it is, and how it was obtained. NaN means that there is none."""
+class Estimate:
+    """A number and how sure it is. NaN where there is no interval or no test."""
 
-    estimate: float
-    n: tuple[int, ...]
-    """Values in each sample; a number taken as known is no sample."""
-    method: str
-    """The interval or test, in words."""
+    value: float
     low: float = math.nan
     """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     p: float = math.nan
+    n: tuple[int, ...] = ()
+    """Values in each sample; a number taken as known is no sample."""
     resamples: int = 0
     """Resamples that p was counted in; 0 for an exact test."""
     least_p: float = 0.0
     """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
-    note: str = ""
-    """Why there is no interval or p-value, or why it is a special one."""
 
 
-class Interval(NamedTuple):
-    """A value with an interval in closed form and the p of its test; NaN where there is none."""
-
-    value: float
-    low: float = math.nan
-    high: float = math.nan
-    p: float = math.nan
-
-
-def interval(name: str, estimated: Inference | Interval | None) -> dict[str, float]:
-    """An estimate with its interval, as three columns of a table; nothing where there is none."""
-    if estimated is None:
+def interval(name: str, estimate: Estimate | None) -> dict[str, float]:
+    """Three columns of a table: an estimate and both ends of its interval; none without it."""
+    if estimate is None:
         return {}
-    value = estimated.value if isinstance(estimated, Interval) else estimated.estimate
-    return {name: value, f"{name}_low": estimated.low, f"{name}_high": estimated.high}
+    return {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
 
 
 def sample(values: ArrayLike) -> Array:
@@ -120,35 +105,33 @@ def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Ar
     return both.reward_x.to_numpy(np.float64), both.reward_y.to_numpy(np.float64)
 
 
-def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Inference:
+def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
     """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
-    return bootstrap_estimate("mean", (sample(values),), np.mean, resamples)
+    return bootstrap_estimate((sample(values),), np.mean, resamples)
 
 
 def difference_of_means(
     first: ArrayLike, second: ArrayLike | float, *, resamples: int = RESAMPLES
-) -> Inference:
+) -> Estimate:
     """Mean of ``first`` less mean of ``second``, independent samples, or a sample and a number.
 
     Of pairs it is the mean of their differences, ``difference_of_means(first - second, 0)``.
     """
     samples = samples_of(first, second)
     if len(samples) == 1:
-        name = "difference to a known value"
-        return bootstrap_estimate(name, samples, np.mean, resamples)
+        return bootstrap_estimate(samples, np.mean, resamples)
 
     def difference(a: Array, b: Array, axis: int) -> Array:
         return np.asarray(a.mean(axis) - b.mean(axis))
 
-    return bootstrap_estimate("difference of means", samples, difference, resamples)
+    return bootstrap_estimate(samples, difference, resamples)
 
 
 def bootstrap_estimate(
-    name: str,
     samples: tuple[Array, ...],
     statistic: Callable[..., Any],
     resamples: int = RESAMPLES,
-) -> Inference:
+) -> Estimate:
     """A statistic of one or more independent samples with its BCa interval.
 
     ``statistic(*samples, axis)`` is vectorised over leading axes. Each sample is resampled
@@ -159,15 +142,12 @@ def bootstrap_estimate(
       spread, not that the populations have none;
     - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
       percentile interval.
-
-    ``note`` says which it is.
     """
-    estimate, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
-    inference = Inference(estimate, n, f"{name}, BCa bootstrap, {resamples} resamples")
+    value, n = float(statistic(*samples, axis=-1)), tuple(map(len, samples))
     if min(n) < FEWEST:
-        return replace(inference, note=f"no interval: a sample has fewer than {FEWEST} values")
+        return Estimate(value, n=n)
     if not any(map(varies, samples)):
-        return replace(inference, low=estimate, high=estimate, note=NO_SPREAD)
+        return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, RESAMPLES_OF_LARGE) if large else resamples
     with warnings.catch_warnings():
@@ -185,24 +165,21 @@ def bootstrap_estimate(
             rng=np.random.default_rng(SEED),
         )
     low, high = map(float, result.confidence_interval)
-    if math.isfinite(low) and math.isfinite(high) and not large:
-        return replace(inference, low=low, high=high)
-    low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
-    method = f"{name}, percentile bootstrap, {resamples} resamples"
-    note = "" if large else "BCa is not defined for this sample"
-    return replace(inference, method=method, low=low, high=high, note=note)
+    if large or not (math.isfinite(low) and math.isfinite(high)):
+        low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
+    return Estimate(value, low, high, n=n)
 
 
-def student(value: float, error: float, freedom: float, p: float = math.nan) -> Interval:
+def student(value: float, error: float, freedom: float, p: float = math.nan) -> Estimate:
     """A value with Student's interval, by its standard error and degrees of freedom."""
     half = float(special.stdtrit(freedom, TAILS[1])) * error
-    return Interval(value, value - half, value + half, p)
+    return Estimate(value, value - half, value + half, p)
 
 
-def student_mean(values: Array) -> Interval:
+def student_mean(values: Array) -> Estimate:
     """Mean of values (n,) with Student's interval; without one for a single value."""
     if len(values) < 2:
-        return Interval(float(np.mean(values)))
+        return Estimate(float(np.mean(values)))
     error = standard_deviation(values) / math.sqrt(len(values))
     return student(float(np.mean(values)), error, len(values) - 1)
 
@@ -213,7 +190,7 @@ def standard_deviation(values: Array) -> float:
 
 
 @cache
-def wilson(count: int, total: int) -> Interval:
+def wilson(count: int, total: int) -> Estimate:
     """``count`` of ``total`` runs as a share, with Wilson's interval (1927)."""
     ends = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(count / total, float(ends.low), float(ends.high))
+    return Estimate(count / total, float(ends.low), float(ends.high))

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -25,19 +24,13 @@ from coartic.analysis.statistics.estimates import (
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
-    Inference,
+    Estimate,
     centred,
     sample,
     samples_of,
 )
 
 Alternative = Literal["greater", "less", "two-sided"]
-TAILS = {
-    "greater": "one-tailed (greater)",
-    "less": "one-tailed (less)",
-    "two-sided": "two-tailed",
-}
-"""What tests with an alternative are called."""
 AT_ONCE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 MOST_TABLES = 1_000_000
@@ -50,7 +43,7 @@ def bootstrap_test(
     alternative: Alternative = "greater",
     *,
     resamples: int = RESAMPLES,
-) -> Inference:
+) -> Estimate:
     """Test of equal means by the bootstrap: the paper's own kind of test.
 
     Efron & Tibshirani (1993), Algorithm 16.2: every sample is shifted to the mean 0 and resampled,
@@ -63,20 +56,13 @@ def bootstrap_test(
     NaN with fewer than two values in a sample, or no spread in any.
     """
     samples = samples_of(first, second)
-    estimate = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
-    inference = Inference(
-        estimate,
-        tuple(map(len, samples)),
-        f"{TAILS[alternative]} {'two' if len(samples) > 1 else 'one'}-sample bootstrap test "
-        f"of the mean, studentised, {resamples} resamples",
-    )
-    if min(inference.n) < 2:
-        return replace(inference, note="no test: a sample has fewer than 2 values")
+    difference = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
+    n = tuple(map(len, samples))
     shifted = list(map(centred, samples))
     size = max(np.abs(values).max() for values in shifted)
-    if not size:
-        return replace(inference, note="no test: no spread to resample")
-    observed = estimate / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
+    if min(n) < 2 or not size:
+        return Estimate(difference, n=n)
+    observed = difference / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
     rng = np.random.default_rng(SEED)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
     for values, sign in zip(shifted, (1, -1), strict=False):
@@ -98,13 +84,12 @@ def bootstrap_test(
     p = float(1 + extreme.sum()) / (1 + resamples)
     # No less is credible than an exact test of so few values could give: by signs, or by exchange.
     tails = 2 if alternative == "two-sided" else 1
-    n = inference.n
     ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
     least = max(tails / ways, 1 / (1 + resamples))
-    return replace(inference, p=p, resamples=resamples, least_p=least)
+    return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
 
 
-def sign_flip_test(differences: ArrayLike) -> Inference:
+def sign_flip_test(differences: ArrayLike) -> Estimate:
     """Permutation test of paired differences (n,): each may change its sign.
 
     Exact in level where the differences are symmetric about 0, as they are if within each
@@ -112,15 +97,9 @@ def sign_flip_test(differences: ArrayLike) -> Inference:
     :data:`RESAMPLES` (13 pairs), otherwise as many are drawn. NaN with fewer than two pairs.
     """
     values = sample(differences)
-    exact = 2 ** len(values) <= RESAMPLES
-    inference = Inference(
-        float(values.mean()),
-        (len(values),),
-        "two-tailed sign-flip test of paired differences, "
-        + ("exact" if exact else f"{RESAMPLES} resamples"),
-    )
+    mean, n = float(values.mean()), (len(values),)
     if len(values) < 2:
-        return replace(inference, note="no test: fewer than 2 pairs")
+        return Estimate(mean, n=n)
     result = stats.permutation_test(
         (values,),
         np.mean,
@@ -131,20 +110,19 @@ def sign_flip_test(differences: ArrayLike) -> Inference:
         rng=np.random.default_rng(SEED),
     )
     least = 2 / min(2 ** len(values), 1 + RESAMPLES)
-    return replace(inference, p=float(result.pvalue), least_p=least)
+    return Estimate(mean, p=float(result.pvalue), n=n, least_p=least)
 
 
-def share_test(count: int, total: int, share: float, alternative: Alternative) -> Inference:
+def share_test(count: int, total: int, share: float, alternative: Alternative) -> Estimate:
     """Exact binomial test of ``count`` of ``total`` runs against a share (0 to 1).
 
     The estimate is the share seen less that one.
     """
     p = float(stats.binomtest(count, total, share, alternative).pvalue)
-    name = f"{TAILS[alternative]} exact binomial test against {share:.0%}"
-    return Inference(count / total - share, (total,), name, p=p)
+    return Estimate(count / total - share, p=p, n=(total,))
 
 
-def independence_test(first: Sequence[int], second: Sequence[int]) -> Inference:
+def independence_test(first: Sequence[int], second: Sequence[int]) -> Estimate:
     """Fisher's exact test that two rows of counts share one distribution over categories.
 
     Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all
@@ -158,13 +136,12 @@ def independence_test(first: Sequence[int], second: Sequence[int]) -> Inference:
     if min(n, m) < 1:
         raise ValueError("a row has no counts")
     apart = float(np.abs(rows[0] / n - rows[1] / m).sum() / 2)
-    inference = Inference(apart, (n, m), "Fisher's exact test")
     pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
     *columns, (last, of_first) = sorted(pairs)
     if math.prod(count + 1 for count, _ in columns) > MOST_TABLES:
         method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
         p = float(stats.fisher_exact(rows, method=method).pvalue)
-        return replace(inference, method=f"{inference.method}, Monte Carlo", p=p)
+        return Estimate(apart, p=p, n=(n, m))
     # Ways to choose the first row's runs, by how many it has of the columns so far.
     ways, seen = {0: [1]}, math.comb(last, of_first)
     for count, in_first in columns:
@@ -180,7 +157,7 @@ def independence_test(first: Sequence[int], second: Sequence[int]) -> Inference:
         for product in products
         if product * math.comb(last, n - used) <= seen
     )
-    return replace(inference, p=extreme / math.comb(n + m, n))
+    return Estimate(apart, p=extreme / math.comb(n + m, n), n=(n, m))
 
 
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:

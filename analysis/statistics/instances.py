@@ -23,10 +23,9 @@ from numpy.typing import ArrayLike
 from coartic.analysis.statistics.estimates import (
     FEWEST,
     NEGLIGIBLE,
-    NO_SPREAD,
     SEED,
     TAILS,
-    Inference,
+    Estimate,
     bootstrap_estimate,
     sample,
 )
@@ -46,14 +45,13 @@ def gap_share(rewards: ArrayLike, optimum: float) -> Array:
     return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
 
 
-def task_mean(values: Mapping[str, ArrayLike]) -> Inference:
+def task_mean(values: Mapping[str, ArrayLike]) -> Estimate:
     """Mean over given tasks of the mean over runs, with stratified BCa interval."""
 
     def statistic(*strata: Array, axis: int = -1) -> Array:
         return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
 
-    name = f"mean over {len(values)} tasks, stratified"
-    return bootstrap_estimate(name, tuple(map(sample, values.values())), statistic)
+    return bootstrap_estimate(tuple(map(sample, values.values())), statistic)
 
 
 def value(runs: Runs) -> float:
@@ -61,7 +59,7 @@ def value(runs: Runs) -> float:
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
-def other_tasks(scores: Scores) -> Inference:
+def other_tasks(scores: Scores) -> Estimate:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
     The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
@@ -75,16 +73,14 @@ def other_tasks(scores: Scores) -> Inference:
     values = {family: np.array(list(map(value, instances))) for family, instances in scores.items()}
     estimate = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
-    name = f"mean over instances, families alike; hierarchical bootstrap, {RESAMPLES} resamples"
     if min(n) < FEWEST:
-        note = f"no interval: a family has fewer than {FEWEST} instances"
-        return Inference(estimate, n, name, note=note)
+        return Estimate(estimate, n=n)
     deviations = np.zeros(RESAMPLES)
     for place, (family, instances) in enumerate(scores.items()):
         rng = np.random.default_rng([SEED, place])
         deviations += resampled_deviations(instances, values[family], rng)
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(estimate):
-        return Inference(estimate, n, name, estimate, estimate, note=NO_SPREAD)
+        return Estimate(estimate, estimate, estimate, n=n)
     low, high = estimate + np.quantile(deviations / len(values), TAILS)
     least = np.mean(
         [min(-greatest_value(runs, -1) for runs in instances) for instances in scores.values()]
@@ -93,7 +89,7 @@ def other_tasks(scores: Scores) -> Inference:
         [max(greatest_value(runs, 1) for runs in instances) for instances in scores.values()]
     )
     ends = max(float(low), float(least)), min(float(high), float(most))
-    return Inference(estimate, n, name, *ends)
+    return Estimate(estimate, *ends, n=n)
 
 
 def greatest_value(runs: Runs, sign: int) -> float:

@@ -67,7 +67,7 @@ def family_gaps(study: Study) -> Rows:
                 row |= interval(name, other_tasks({family: gaps[family] for family in two_armed}))
         for family in instances.families:
             row[f"in {family}"] = (
-                other_tasks({family: scores[family]}).estimate if family in scores else math.nan
+                other_tasks({family: scores[family]}).value if family in scores else math.nan
             )
         cells = [
             cell
