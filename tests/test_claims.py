@@ -11,8 +11,7 @@ import pytest
 from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
-from coartic.analysis import tables
-from coartic.analysis.claims import judge, single
+from coartic.analysis.claims import judge
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.ensemble import held_by
 from coartic.analysis.claims.judge import by_tests, opposite_p, p_of
@@ -25,12 +24,14 @@ from coartic.analysis.claims.register import (
     read_side,
 )
 from coartic.analysis.claims.rules import higher
-from coartic.analysis.claims.single import shortest_reach
+from coartic.analysis.report.contents import TABLES
 from coartic.analysis.signatures.context import context_dependence, dependence_below
 from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
+from coartic.analysis.topics.paper import claims as single
+from coartic.analysis.topics.paper.claims import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
 from coartic.benchmarks.suites import Cell
@@ -765,7 +766,7 @@ def test_the_register_on_runs(study):
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):
         assert entries[name].verdict == "undecided"
         assert "this folder has no runs of" in entries[name].finding.evidence
-    table = tables.claims(study)
+    table = TABLES["claims"](study)
     assert table.verdict.tolist() == [entry.verdict for entry in entries.values()]
 
 

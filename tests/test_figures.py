@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.figures import FIGURES, save
+from coartic.analysis.figures.plot import save
 from coartic.analysis.figures.style import looks
-from coartic.analysis.figures.tasks import draw_tasks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
+from coartic.analysis.report.contents import FIGURES
 from coartic.analysis.study import typical_run
-from coartic.analysis.tables.paper import hand_shares, published_differences
+from coartic.analysis.topics.paper.tables import hand_shares, published_differences
+from coartic.analysis.topics.tasks import draw_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
 
@@ -54,7 +55,7 @@ def test_the_typical_run_is_nearest_the_median(study):
 
 def test_learning_curves_against_a_loop(study, monkeypatch):
     window = 7
-    comparison = import_module("coartic.analysis.tables.comparison")
+    comparison = import_module("coartic.analysis.topics.comparison.tables")
     monkeypatch.setattr(comparison, "WINDOW", window)
     data = comparison.learning_curves.__wrapped__(study)
     rewards = dict(study.rewards())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
+from coartic.analysis.folders import compared_cells, differences, load_pair
 from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write

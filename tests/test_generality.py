@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis import tables
 from coartic.analysis.claims import data, judge
 from coartic.analysis.claims.register import CLAIMS
-from coartic.analysis.generality.sample import one_by_one, sample, signs
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
+from coartic.analysis.report.contents import TABLES
+from coartic.analysis.topics.families.sample import one_by_one, sample, signs
 from coartic.tasks.families import names_in
 from tests.support.made_up import MadeUp, made, row, study_of
 
@@ -89,7 +89,7 @@ def test_a_method_that_beats_the_search_makes_the_best_known():
 def test_planted_contrasts():
     """EC4 over EC3: 10 of 500 on all instances but the last of each family, where it loses 20."""
     study = rewarded({**RISING, EC4: lambda n: -540 if n < 4 else -570})
-    planted = tables.exploration(study)
+    planted = TABLES["exploration"](study)
     mixed = planted.loc["learner EC4 over learner EC3, long/v1"]
     assert mixed.gain == pytest.approx((4 * 0.02 - 0.04) / 5)
     assert (mixed.better, mixed.worse, mixed.instances, mixed.told_apart) == (4, 1, 5, 5)
@@ -108,7 +108,7 @@ def test_what_hands_make_of_a_contrast():
     runs = study.runs
     of_two = runs.method == EC2
     runs.loc[of_two, "hands"] = [hands_of(task, "L") for task in runs.task[of_two]]
-    arm = tables.exploration(study).loc["learner EC4 over learner EC2, all"]
+    arm = TABLES["exploration"](study).loc["learner EC4 over learner EC2, all"]
     assert (arm.gain, arm["median"]) == (pytest.approx(0.04), pytest.approx(0.04))
     assert arm.by_hands == pytest.approx((-536 + 556) / 500)  # the best run of either
 
@@ -143,7 +143,7 @@ def with_signs(study, **values):
 
 def test_presence():
     study = with_signs(rewarded(RISING), waiting=0.07)
-    present = tables.family_signs(study)
+    present = TABLES["family-signs"](study)
     waiting = present.loc[f"other arm, {EC4}, long/v1"]
     assert waiting["mean"] == pytest.approx(0.09)
     assert (waiting.instances, waiting.there) == (5, 1)  # the last beyond a tenth of the way
@@ -219,12 +219,12 @@ def test_tables_over_instances():
     """Means are recomputed from the rewards; many instances are not shown one by one."""
     study = with_signs(rewarded(RISING))
     assert not one_by_one(study)
-    rows = tables.family_gaps(study)
+    rows = TABLES["family-gaps"](study)
     runs = study.runs[study.runs.method == EC3]
     assert rows.gap[EC3] == pytest.approx(((BEST - runs.reward.astype(float)) / -BEST).mean())
     assert set(rows.run_ids[EC3].split()) == set(runs.run_id)
-    assert tables.exploration(study).gain["learner EC3 over learner EC2, all"] == pytest.approx(
+    assert TABLES["exploration"](study).gain["learner EC3 over learner EC2, all"] == pytest.approx(
         0.02
     )
-    assert len(tables.family_signs(study)) > 10
-    assert not len(tables.methods(study))
+    assert len(TABLES["family-signs"](study)) > 10
+    assert not len(TABLES["methods"](study))

@@ -11,9 +11,9 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from coartic.analysis import tables
-from coartic.analysis.human import judge, measures
-from coartic.analysis.human.judge import (
+from coartic.analysis.report.contents import TABLES
+from coartic.analysis.topics.human import judge, measures
+from coartic.analysis.topics.human.judge import (
     AGREES,
     DISAGREES,
     FINDINGS,
@@ -28,7 +28,7 @@ from coartic.analysis.human.judge import (
     verdict_of,
     verdict_of_test,
 )
-from coartic.analysis.human.measures import MODELS, Values
+from coartic.analysis.topics.human.measures import MODELS, Values
 from tests.support.suites import run_and_write, suite_of
 
 ABOVE, BETWEEN, RATIO = (
@@ -246,7 +246,7 @@ grid = { horizon = [0, 1, 7] }
 
 def test_a_small_study(small, monkeypatch):
     assert (small.runs.status == "ok").all()
-    monkeypatch.setattr("coartic.analysis.human.judge.FEWEST_TASKS", 2)
+    monkeypatch.setattr("coartic.analysis.topics.human.judge.FEWEST_TASKS", 2)
     for model in ("learner", "learner, replayed"):
         monkeypatch.setitem(MODELS[model].parameters, "trials", 150)
     rows = judged(small).set_index(["finding", "model", "measure"])
@@ -264,6 +264,6 @@ def test_a_small_study(small, monkeypatch):
     assert far.verdict["one goal ahead"] == DISAGREES
     assert far.verdict["learner EC2"] == SILENT
     assert far.because["learner EC2"]
-    table = tables.TABLES["human"](small)
+    table = TABLES["human"](small)
     assert table["of one goal ahead"]["two-ahead"].startswith("disagrees *: 0.00")
     assert set(table.run_ids["two-ahead"].split()) <= set(small.runs.run_id)

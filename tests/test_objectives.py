@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from coartic.analysis.claims.studies import less_regret
 
 from coartic import execute, load_task
-from coartic.analysis import tables
 from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.claims.studies import less_regret
-from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.report import build, facts
+from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
-from coartic.analysis.studies import objectives
-from coartic.analysis.studies.objectives import advantage, crossing, crossings, rewards
 from coartic.analysis.study import load
+from coartic.analysis.topics import objectives
+from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.topics.objectives import advantage, crossing, crossings, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from
@@ -189,12 +189,12 @@ def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
     frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
     monkeypatch.setattr(objectives, "rewards", lambda study: frame)
     study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
-    table = tables.TABLES["objectives"](study)
+    table = TABLES["objectives"](study)
     assert table.regret["region 300 ticks"] == pytest.approx(50)
     assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]
     assert table.helps["region 100 from plan"] == pytest.approx(15)  # 20 % against 5 %
     assert set(table.tasks) == {10}
-    crossings = tables.TABLES["crossings"](study)
+    crossings = TABLES["crossings"](study)
     # 25 % at 100, so that 20 % lie at 80.
     assert crossings.crossing["region learner"] == pytest.approx(80)
     assert list(crossings.index) == ["region learner"]

@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
 from coartic.analysis.claims.register import CLAIMS
-from coartic.analysis.published import (
+from coartic.analysis.topics.paper.published import (
     ENTRIES,
     RUNS,
     TRIALS,

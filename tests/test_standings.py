@@ -9,10 +9,13 @@ import pytest
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis import tables
-from coartic.analysis.comparisons.methods import BY_TRIAL, UNTOLD, group_of
-from coartic.analysis.comparisons.reached import WAY, Targets, halfway, price, targets
-from coartic.analysis.comparisons.standings import (
+from coartic.analysis.optima import KnownOptimum
+from coartic.analysis.report import facts
+from coartic.analysis.report.contents import TABLES
+from coartic.analysis.statistics.estimates import SEED
+from coartic.analysis.topics.comparison.groups import BY_TRIAL, UNTOLD, group_of
+from coartic.analysis.topics.comparison.runtimes import WAY, Targets, halfway, price, targets
+from coartic.analysis.topics.comparison.scores import (
     ALL_TASKS,
     apart,
     gaps,
@@ -20,9 +23,6 @@ from coartic.analysis.comparisons.standings import (
     leaders,
     standings,
 )
-from coartic.analysis.optima import KnownOptimum
-from coartic.analysis.report import facts
-from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import initial_reward
 from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
@@ -199,8 +199,8 @@ def test_a_method_from_a_file_changes_nobody_elses_p():
     """Holm's correction is over one method's tasks, and a difference to the best is one test."""
     alone = study(TEN | strangers(("mine", 2), runs=10))
     beside = study(TEN | strangers(("mine", 2), ("yours", 3), ("theirs", 0), runs=10))
-    mine = tables.TABLES["against-learner"](alone).loc[["ascending mine", "two-armed-1 mine"]]
-    again = tables.TABLES["against-learner"](beside).loc[mine.index]
+    mine = TABLES["against-learner"](alone).loc[["ascending mine", "two-armed-1 mine"]]
+    again = TABLES["against-learner"](beside).loc[mine.index]
     assert mine.p_holm.tolist() == again.p_holm.tolist()
     assert (mine.p_holm < 0.05).all()
     learner = leaders(beside, BY_TRIAL).set_index("method").p["dual-process (EC1, EC4)"]
@@ -217,10 +217,10 @@ def test_a_test_that_cannot_reject_counts_nothing():
         seen = study(rewards | plan)
         declared = replace(seen.plan.methods["my-plan"], stochastic=False)
         seen.plan.methods["my-plan"] = declared
-        rows = tables.TABLES["against-learner"](seen)
+        rows = TABLES["against-learner"](seen)
         least = rows.least_p["ascending my-plan"]
         assert least == pytest.approx(2 / 8 if runs == 3 else 2 / 1024)
-        row_of = tables.ranking(seen).loc["my-plan"]
+        row_of = TABLES["ranking"](seen).loc["my-plan"]
         if runs == 3:
             assert math.isnan(row_of.better)
             assert math.isnan(row_of.worse)
@@ -236,7 +236,7 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     runs = seen.runs.assign(variant=np.where(learns, "", "width=0.2"))
     again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
     vars(again)["rewards"] = lambda: iter(())
-    ranked = tables.ranking(again)
+    ranked = TABLES["ranking"](again)
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)
     assert ranked.better["mine width=0.2"] == 2

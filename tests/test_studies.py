@@ -10,20 +10,20 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from coartic.analysis.claims.studies import HORIZONS, gaps_by_horizon
 
 from coartic import load_task
-from coartic.analysis import tables
 from coartic.analysis.claims import studies
 from coartic.analysis.claims.judge import judged
-from coartic.analysis.claims.studies import HORIZONS, gaps_by_horizon
 from coartic.analysis.report import build, facts
+from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
 from coartic.analysis.signatures.signs import Sign
 from coartic.motion.costs import joint_costs
 from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.suites import run_and_write, suite_of
 
-HORIZON, STOPS = tables.TABLES["horizon"], tables.TABLES["stops"]
+HORIZON, STOPS = TABLES["horizon"], TABLES["stops"]
 BEST = 100_000  # ticks: rounding of a reward is then a thousandth of a per cent
 FALLING = (30.0, 8.0, 2.0, 1.0, 0.5, 0.0)  # per cent by horizon
 CLAIMS = {
@@ -280,7 +280,7 @@ def test_a_small_study_of_horizons(small):
         there = [task for task in ticks.index if len(study.tasks[task].goals) > h]
         mean = (ticks[h] / best - 1)[there].mean()
         assert HORIZON(study).gap[f"all all h={h}"] == pytest.approx(mean)
-    signs = tables.TABLES["horizon-signs"](study)
+    signs = TABLES["horizon-signs"](study)
     assert signs["mean"]["whole h=all"] > signs["mean"]["whole h=0"]
     assert build.drawn(study, "horizon")
     assert "looks no goal ahead ends" in sentence("horizon", facts.horizon(study))

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis import tables
-from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL
-from coartic.analysis.tables import coarticulation
+from coartic.analysis.report.contents import TABLES
+from coartic.analysis.topics.coarticulation import tables as coarticulation
+from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -77,7 +77,7 @@ def gap_columns(gaps):
 
 
 def test_ranking(study):
-    table = tables.ranking(study)
+    table = TABLES["ranking"](study)
     named = {
         CMA: (BY_TRIAL, FOUND, 6),
         BOTH: (BY_TRIAL, LEARNED, 6),
@@ -99,7 +99,7 @@ def test_ranking(study):
 
 def test_variants(study):
     costs = {"instances": 0, "movement_ticks": 5000, "solve_s": 0.25}
-    same(tables.variants(study), {
+    same(TABLES["variants"](study), {
         BOTH: {"method": BOTH, "runs": 6, **gap_columns(LEARNED), "trials": 1000, **costs},
         CMA: {"method": CMA, "runs": 6, **gap_columns(FOUND), "trials": 100, **costs},
         PLAN: {"method": PLAN, "runs": 2, **gap_columns(PLANNED), "trials": 0, **costs,
@@ -119,7 +119,7 @@ def test_methods(study):
         f"{TWO} {EC4}": (3, 3, -480.0, 0.0, 15 / 465, "LRLR 3", 1000, 1e6, "AT", 0, "still"),
         f"{TWO} {PLAN}": (1, 1, -500.0, NONE, 35 / 465, "LRLR", 0, 500, "KR", 0, "still"),
     }
-    same(tables.methods(study), {
+    same(TABLES["methods"](study), {
         name: dict(zip(shown, cells, strict=True)) for name, cells in expected.items()
     })  # fmt: skip
 
@@ -141,7 +141,7 @@ def test_price(study):
         CMA: (38 / 40, 10, 10, 10, 10, 10, 10, 1e4, 1e4, 1e4, 0.025, NONE, 10, 10),
         PLAN: (33 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
     }
-    table = tables.price(study)
+    table = TABLES["price"](study)
     same(table.loc[list(cells)], {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
@@ -158,7 +158,7 @@ def test_learning(study):
         f"{ONE} {CMA}": (3, -319.0, -293.0, NONE, NONE, 10.0, 10.0, 10.0),
         f"{TWO} {CMA}": (3, -675.0, -470.0, NONE, NONE, 10.0, 10.0, 10.0),
     }
-    same(tables.learning(study), {
+    same(TABLES["learning"](study), {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.claims.register import Side, is_method
-from coartic.analysis.generality.sample import signs
+from coartic.analysis.claims.register import Finding, Side, is_method
 from coartic.analysis.methods import LEARNER, PLACEBO, most_exploring
-from coartic.analysis.published import TRIALS
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import FEWEST
 from coartic.analysis.study import CellKey, Study
+from coartic.analysis.topics.families.sample import signs
+from coartic.analysis.topics.paper.published import TRIALS
 from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
 from coartic.learner.kernel import TENTHS
 from coartic.robot import Array
@@ -26,6 +28,25 @@ PLAN = "trajectory-optimisation/squared-changes"
 
 class MissingError(Exception):
     """The folder lacks what a claim needs."""
+
+
+Judge: TypeAlias = "Callable[[Data], Finding]"
+JUDGES: dict[str, Judge] = {}
+"""By the id of a claim, the function that judges it."""
+TESTS: dict[str, str] = {}
+"""By the id of a claim, how it is tested, in words; margins in braces are put in."""
+
+
+def judges(
+    claim: str, test: str
+) -> Callable[[Callable[[Data], Finding]], Callable[[Data], Finding]]:
+    """A decorator: the function judges a claim of ``claims.toml``, by a test in words."""
+
+    def register(judge: Judge) -> Judge:
+        JUDGES[claim], TESTS[claim] = judge, test
+        return judge
+
+    return register
 
 
 @dataclass

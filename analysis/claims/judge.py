@@ -26,13 +26,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from coartic.analysis.claims import rules, single, studies
-from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims import rules
+from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
 from coartic.analysis.claims.ensemble import rarely_supported
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached
+from coartic.analysis.topics import horizon, objectives, stops
+from coartic.analysis.topics.paper import claims as single
 
 RULES: dict[str, Callable[[Data, Claim], Finding]] = {
     rule.__name__: rule
@@ -41,10 +43,10 @@ RULES: dict[str, Callable[[Data, Claim], Finding]] = {
         *(single.context, single.sequences_change, single.initial_base_reverses),
         *(single.slower_hands_are_chosen,),
         *(single.corrective_ensures, single.corrective_near_shortest, single.printed_p_values),
-        *(studies.first_goal_ahead_gains_most, studies.further_goals_gain_little),
-        *(studies.most_of_the_loss_is_posture, studies.dear_joints_keep_the_horizon),
-        *(studies.learner_behind_one_goal_ahead, studies.postures_serve_after_a_stop),
-        *(studies.stop_at_equal_times, studies.less_regret),
+        *(horizon.first_goal_ahead_gains_most, horizon.further_goals_gain_little),
+        *(horizon.most_of_the_loss_is_posture, horizon.dear_joints_keep_the_horizon),
+        *(horizon.learner_behind_one_goal_ahead, stops.postures_serve_after_a_stop),
+        *(stops.stop_at_equal_times, objectives.less_regret),
     )
 }
 """The rules by their names in ``claims.toml``."""
@@ -87,7 +89,8 @@ def by_tests(finding: Finding, p: float, opposite: float) -> Verdict:
 def test_in_words(claim: Claim) -> str:
     """How a claim is judged, with its margins; a rule's own words are its docstring."""
     counts = [rules.COUNTS[how.partition(" EC")[0]] for each in claim.runs.values() for how in each]
-    words = claim.test or "; ".join(dict.fromkeys(counts)) or str(RULES[claim.rule].__doc__)
+    words = claim.test or TESTS.get(claim.id) or "; ".join(dict.fromkeys(counts))
+    words = words or str(RULES[claim.rule].__doc__)
     return " ".join(words.split()).format(**MARGINS)
 
 
@@ -139,7 +142,8 @@ def judge(study: Study, claims: Iterable[Claim]) -> list[Judged]:
 def apply_rule(claim: Claim, data: Data) -> tuple[Finding, tuple[str, ...]]:
     """What a claim's rule finds, and the ids of the runs that it read."""
     try:
-        finding = RULES[claim.rule](data, claim)
+        judge = JUDGES.get(claim.id)
+        finding = judge(data) if judge else RULES[claim.rule](data, claim)
     except MissingError as missing:
         words = f"Not judged: {missing}."
         return Finding(None, words, failed=tuple(dict.fromkeys(data.failed))), ()

@@ -24,15 +24,7 @@ from coartic.analysis.claims.register import (
     read_comparison,
     read_side,
 )
-from coartic.analysis.generality.sample import sample
 from coartic.analysis.optima import KnownOptimum
-from coartic.analysis.published import (
-    ENTRIES,
-    Number,
-    published_cell,
-    published_exhaustive,
-    published_initial,
-)
 from coartic.analysis.statistics.estimates import (
     FEWEST,
     Estimate,
@@ -43,6 +35,14 @@ from coartic.analysis.statistics.hypotheses import (
     Alternative,
     bootstrap_test,
     share_test,
+)
+from coartic.analysis.topics.families.sample import sample
+from coartic.analysis.topics.paper.published import (
+    ENTRIES,
+    Number,
+    published_cell,
+    published_exhaustive,
+    published_initial,
 )
 from coartic.analysis.words import estimate, number, tally
 from coartic.robot import Array

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from coartic import MotionModel, Task, hand_sequences
-from coartic.analysis.published import entries_of
+from coartic.analysis.topics.paper.published import entries_of
 from coartic.analysis.words import read_beside
 from coartic.learner.learning import threads_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials

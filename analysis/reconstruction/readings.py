@@ -23,7 +23,6 @@ import pandas as pd
 from scipy import stats
 
 from coartic import Task, builtin_tasks, corrective_trial, load_task
-from coartic.analysis.published import entries_of
 from coartic.analysis.reconstruction.scoring import (
     Figure,
     conditions_of,
@@ -31,6 +30,7 @@ from coartic.analysis.reconstruction.scoring import (
     learned_rewards,
     printed_tests,
 )
+from coartic.analysis.topics.paper.published import entries_of
 from coartic.learner.learning import threads_for
 from coartic.robot import Array
 from coartic.tasks.readings import (

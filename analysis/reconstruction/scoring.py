@@ -19,7 +19,7 @@ import pandas as pd
 from scipy import special, stats
 
 from coartic import CONDITIONS, PAPER, MotionModel, Task, learn_many
-from coartic.analysis.published import RUNS, entries_of
+from coartic.analysis.topics.paper.published import RUNS, entries_of
 from coartic.learner.conditions import ExplorationCondition
 from coartic.robot import Array
 

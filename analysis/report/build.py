@@ -15,19 +15,19 @@ from typing import Any, get_args
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis import tables
 from coartic.analysis.claims.register import CLAIMS, Verdict
-from coartic.analysis.figures import FIGURES, Plot
-from coartic.analysis.figures.plot import picture, svg_for_page
-from coartic.analysis.generality.sample import one_by_one
+from coartic.analysis.figures.plot import Plot, picture, svg_for_page
 from coartic.analysis.report import facts
+from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
 from coartic.analysis.report.text import answers, environment, sentence
+from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached
-from coartic.analysis.words import NONE, number, read_beside
+from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, publish
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
@@ -39,18 +39,14 @@ _MAGNIFIED = 1.3  # figures on the page
 _PHONE = 320 / 72  # inches: a phone scrolls what is wider
 
 
-SECTIONS: dict[str, dict[str, Any]] = read_beside(__file__, "sections")
-"""The sections of the page by id, in its order."""
-
-
 def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
     """The report's files by their paths within its folder.
 
     ``for_paper``: also LaTeX tables, figures as PDF, and figures that the page does not show.
     """
     files = {"report.html": page(study).encode(), "summary.md": summary(study).encode()}
-    captions = {section.get("table"): section.get("caption") for section in SECTIONS.values()}
-    for name, table in tables.TABLES.items():
+    captions = {section.table: section.caption for section in SECTIONS}
+    for name, table in TABLES.items():
         frame = table(study)
         if len(frame):
             files[f"tables/{name}.csv"] = csv_table(frame).encode()
@@ -98,48 +94,55 @@ def drawn(study: Study, name: str) -> Plot | None:
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    ids = [section["figure"] for section in shown(study).values() if "figure" in section]
+    ids = [section.figure for section in shown(study) if section.figure]
     return {name: plot for name in ids if (plot := drawn(study, name)) is not None}
 
 
-def shown(study: Study) -> dict[str, dict[str, Any]]:
+def shown(study: Study) -> list[Section]:
     """Sections but those about single tasks where these are many, and claims if none is decided."""
-    alone, claims = one_by_one(study), tables.claims(study)
+    alone, claims = one_by_one(study), TABLES["claims"](study)
     decided = ((claims.verdict != "undecided") & (claims.run_ids != "")).any()
-    return {
-        name: row
-        for name, row in SECTIONS.items()
-        if (alone or not row.get("single")) and (decided or name != "claims")
-    }
+    return [
+        section
+        for section in SECTIONS
+        if (alone or not section.single) and (decided or section.id != "claims")
+    ]
+
+
+def finding(section: Section, study: Study) -> str:
+    """The sentence of a section; empty where the runs say nothing."""
+    if section.finding is not None:
+        return section.finding(study)
+    of = getattr(facts, section.id)(study) if hasattr(facts, section.id) else None
+    return "" if of is None else sentence(section.id, of)
 
 
 @cached
 def sections(study: Study) -> list[dict[str, Any]]:
-    """Sections of ``sections.toml`` that the runs allow, as the template wants them.
+    """Sections that the runs allow, as the template wants them.
 
     With their ``finding``; figure or table is None where the runs do not allow it.
     """
     allowed = []
-    for name, section in shown(study).items():
-        plot = plots(study).get(section.get("figure", ""))
-        frame = tables.TABLES[section["table"]](study) if "table" in section else pd.DataFrame()
+    for section in shown(study):
+        plot = plots(study).get(section.figure)
+        frame = TABLES[section.table](study) if section.table else pd.DataFrame()
         if plot is None and not len(frame):
             continue
-        of = getattr(facts, name)(study) if hasattr(facts, name) else None
         table = {
-            "html": html_table(frame, section["table"], section["caption"]),
+            "html": html_table(frame, section.table, section.caption),
             "searched": len(frame) > SEARCHED,
             "long": len(frame) > LONG,
             "example": f"'{frame.index[0]}'",
         } if len(frame) else None  # fmt: skip
-        words = {"note": "", "finding": "" if of is None else sentence(name, of), **section}
         inches = plot.figure.get_figwidth() if plot else 0.0
         figure = plot and {
             **{"id": plot.id, "title": plot.title, "caption": plot.caption},
             **{"svg": svg_for_page(plot), "wide": inches > _PHONE},
             "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
         }
-        allowed.append({**words, "id": name, "figure": figure, "rows": table})
+        words = {"finding": finding(section, study), "rows": table, "figure": figure}
+        allowed.append({**vars(section), **words})
     return allowed
 
 
@@ -149,6 +152,7 @@ def page(study: Study) -> str:
     player = player_json(study)
     scripts = ["page.js", "next_goal.js", *(["player.js"] if player else []), "address.js"]
     template = environment(escape=True).get_template("page.html.jinja")
+    ids = {section.id for section in shown(study)}
     script = "\n".join(f"{{\n{(here / name).read_text(encoding='utf-8')}}}" for name in scripts)
     try:
         links = metadata("coartic").get_all("Project-URL") or []
@@ -161,7 +165,7 @@ def page(study: Study) -> str:
         next_goal=next_goal(study),
         script=script,
         player=player.replace("<", "\\u003c"),
-        answers=[answer for answer in answers(study) if answer["id"] in shown(study)],
+        answers=[answer for answer in answers(study) if answer["id"] in ids],
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
@@ -191,7 +195,7 @@ def title(study: Study) -> str:
 def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them: by verdict, and first those that count."""
     order = get_args(Verdict)
-    rows = tables.claims(study).reset_index(names="id")
+    rows = TABLES["claims"](study).reset_index(names="id")
     of = facts.claims(study)
     if of and not of["decided"]:  # most of them lack their runs
         rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]

@@ -14,15 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coartic.analysis import tables
 from coartic.analysis.claims.judge import Judged, counts, judged
-from coartic.analysis.comparisons.methods import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
-from coartic.analysis.comparisons.paper import beside_paper
-from coartic.analysis.comparisons.reached import halfway
-from coartic.analysis.comparisons.reached import price as price_by_method
-from coartic.analysis.comparisons.standings import initial_and_optimum, leaders
-from coartic.analysis.generality.sample import one_by_one, sample
-from coartic.analysis.human import judge
 from coartic.analysis.methods import (
     CONDITIONS,
     KNOWN_METHODS,
@@ -34,13 +26,21 @@ from coartic.analysis.methods import (
     most_exploring,
     name_of,
 )
-from coartic.analysis.published import RUNS, TRIALS
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import smallest_p
 from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import CellKey, Study, cached
-from coartic.analysis.tables.paper import best_condition
+from coartic.analysis.table import TABLES
+from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
+from coartic.analysis.topics.comparison.runtimes import halfway
+from coartic.analysis.topics.comparison.runtimes import price as price_by_method
+from coartic.analysis.topics.comparison.scores import initial_and_optimum, leaders
+from coartic.analysis.topics.families.sample import one_by_one, sample
+from coartic.analysis.topics.human import judge
+from coartic.analysis.topics.paper.published import RUNS, TRIALS
+from coartic.analysis.topics.paper.rewards import beside_paper
+from coartic.analysis.topics.paper.tables import best_condition
 
 Facts = dict[str, Any]
 PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
@@ -126,7 +126,7 @@ def slopes(study: Study) -> Facts | None:
 
     ``seen``: whether the whole posture surely follows; places where it does come first.
     """
-    rows = tables.slopes(study)
+    rows = TABLES["slopes"](study)
     rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
     # A method that selects its solution from trials has to exceed the placebo as well.
     chosen = [selects(study, str(label)) for label in rows.method]
@@ -242,7 +242,7 @@ def nearest(study: Study) -> Facts | None:
         "learner": {**by_trial[places[0]], "place": places[0] + 1} if places else None,
         "proven": sum(best.proven for best in optima),
         "tasks": len(optima),
-        "settings": sum(map(is_variant, tables.variants(study).method)),
+        "settings": sum(map(is_variant, TABLES["variants"](study).method)),
         "from_files": from_files(study),
         "failed": failed_compared(study),
     }
@@ -253,7 +253,7 @@ def from_files(study: Study) -> list[Any]:
     labels = {label for _, label in study.cells if label.partition(" ")[0] not in KNOWN_METHODS}
     if not labels:
         return []
-    rows = tables.ranking(study)
+    rows = TABLES["ranking"](study)
     rows = rows[rows.method.isin(labels) & rows.gap.notna()]
     beside = any(is_learner(label) for _, label in study.cells)
     return rows.assign(gap=100 * rows.gap, beside=beside).to_dict("records")
@@ -332,7 +332,7 @@ def hands(study: Study) -> Facts:
 @cached
 def learning(study: Study) -> list[Facts]:
     """Trials after which half of the gain of the learner that explores most is there, by task."""
-    half = tables.learning(study).half_gain
+    half = TABLES["learning"](study).half_gain
     rows = [(task, f"{name} {most_exploring(task)}") for name, task in study.tasks.items()]
     return [
         {"task": task.label, "hands": len(task.hands), "trials": float(half[row])}
@@ -344,7 +344,7 @@ def learning(study: Study) -> list[Facts]:
 @cached
 def signatures(study: Study) -> Facts | None:
     """In how many methods the next goal changes more of what leaves the hand in place."""
-    rows = tables.contexts(study)
+    rows = TABLES["contexts"](study)
     rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
     larger = int((rows.equivalent > rows.other).sum())
     return {"larger": larger, "methods": len(rows)} if len(rows) else {}
@@ -356,7 +356,7 @@ def families(study: Study) -> Facts | None:
     instances = sample(study)
     if instances is None:
         return None
-    rows = tables.family_gaps(study)
+    rows = TABLES["family-gaps"](study)
     rows = rows[rows.gap.notna()]
     names = [("the learner" if m == "learner" else name_of(m)) for m in rows.method]
     return {
@@ -370,7 +370,7 @@ def families(study: Study) -> Facts | None:
 @cached
 def exploration(study: Study) -> list[Facts]:
     """Contrasts of conditions over all families, in per cent of the best known reward."""
-    rows = tables.exploration(study)
+    rows = TABLES["exploration"](study)
     initial = rows.contrast.astype(str).str.endswith("the initial solution")
     rows = rows[(rows.family == "all") & ~initial]
     percent = {name: 100 * rows[name] for name in ("gain", "gain_low", "gain_high")}
@@ -383,7 +383,7 @@ def exploration(study: Study) -> list[Facts]:
 def horizon(study: Study) -> Facts | None:
     """Gaps of the planner by goals ahead over random tasks, and what goals gain on tasks that have
     them."""
-    rows = tables.TABLES["horizon"](study)
+    rows = TABLES["horizon"](study)
     rows = rows[rows.group == "all"]
     if not len(rows):
         return None
@@ -406,7 +406,7 @@ def stops(study: Study) -> list[Facts] | None:
 
     Of minimum-jerk plans on random tasks with one arm.
     """
-    rows = tables.TABLES["stops"](study)
+    rows = TABLES["stops"](study)
     jerk = rows[(rows.group == "random, one arm") & rows.method.str.endswith("/jerk")]
     both = []
     for timing, words in (("free", "free"), ("fixed", "equal")):
@@ -419,12 +419,12 @@ def stops(study: Study) -> list[Facts] | None:
 @cached
 def objectives(study: Study) -> Facts | None:
     """Regrets at the largest weight, by penalty, and where trial and error overtakes."""
-    rows = tables.TABLES["objectives"](study)
+    rows = TABLES["objectives"](study)
     if not len(rows):
         return None
     last = rows[rows.weight == rows.weight.max()]
     by_term = {term: part.set_index("who") for term, part in last.groupby("term", sort=False)}
-    crossings = tables.TABLES["crossings"](study)
+    crossings = TABLES["crossings"](study)
     return {
         "tasks": int(rows.tasks.max()),
         "weight": rows.weight.max(),

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from coartic.analysis import tables
 from coartic.analysis.methods import is_variant, main_methods, name_of
 from coartic.analysis.report import facts
+from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import Study
+from coartic.analysis.table import COLUMNS
 
 MOST = 100
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
@@ -74,25 +75,25 @@ def numbers(study: Study) -> Iterator[Number]:
         for of, label in (("Learner", price["learner"]), (price["rival"], price["rival_label"])):
             for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
                 if label:
-                    row: Any = tables.price(study).loc[label]
-                    what = tables.COLUMNS[column].header
+                    row: Any = TABLES["price"](study).loc[label]
+                    what = COLUMNS[column].header
                     comment = f"{what} of the targets: table price, row '{label}'"
                     yield from with_interval(f"{level}{letters(of)}", row, column, 0, 1, comment)
         for at in price["levels"]:
             comment = f"ratio of trials, learner over {price['rival']}: table price"
             yield f"{letters(at['level']).removeprefix('A')}Ratio", plain(at["times"], 1), comment
-    ranking = tables.ranking(study)
+    ranking = TABLES["ranking"](study)
     for label in main_methods(str(m) for m in ranking.index if not is_variant(str(m))):
         comment = f"gap to the optimum, per cent: table ranking, row '{label}'"
         row = ranking.loc[label]
         yield from with_interval(f"Gap{letters(name_of(label))}", row, "gap", 1, 100, comment)
-    for name, row in tables.published(study).iterrows():
+    for name, row in TABLES["published"](study).iterrows():
         of = letters(str(name))
         comment = f"published learned reward: table published, row '{name}'"
         yield f"Published{of}", plain(row.published, 1), comment
         comment = f"mean learned reward: table published, row '{name}'"
         yield f"Reward{of}", plain(row.ours, 1), comment
         yield f"Reward{of}SD", plain(row.ours_sd, 1), comment
-    for name, row in tables.tasks(study).iterrows():
+    for name, row in TABLES["tasks"](study).iterrows():
         comment = f"best known reward: table tasks, row '{name}'"
         yield f"Optimum{letters(str(name))}", plain(row.optimum, 0), comment

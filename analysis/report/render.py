@@ -1,6 +1,6 @@
 """Tables as text: CSV, HTML and LaTeX.
 
-:data:`~coartic.analysis.tables.COLUMNS` says how columns are called and formatted. A column that
+:data:`~coartic.analysis.COLUMNS` says how columns are called and formatted. A column that
 ends in ``_low``, ``_high`` or ``_sd`` is shown behind the one that it belongs to.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from coartic.analysis.methods import name_of
-from coartic.analysis.tables import COLUMNS, Column
+from coartic.analysis.table import COLUMNS, Column
 from coartic.analysis.words import NARROW_SPACE, NONE, in_brackets, number
 from coartic.text import one_line
 

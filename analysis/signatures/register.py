@@ -13,8 +13,6 @@ from itertools import chain, product
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.comparisons.methods import BY_TRIAL, group_of
-from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.methods import CONDITIONS, PLACEBO, main_methods
 from coartic.analysis.signatures.between import TwoContexts, between_contexts, slopes
 from coartic.analysis.signatures.context import beyond_p, context_pairs
@@ -32,6 +30,8 @@ from coartic.analysis.signatures.rows import (
 from coartic.analysis.signatures.within import measured_within
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import Study, cached
+from coartic.analysis.topics.comparison.groups import BY_TRIAL, group_of
+from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.robot import HANDS, Array, Hand
 

@@ -34,7 +34,7 @@ def draw(
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
     from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
-    from coartic.analysis.figures.tasks import draw_tasks
+    from coartic.analysis.topics.tasks import draw_tasks
 
     drawing = draw_tasks(chosen[:_PICTURED])
     if out.suffix:

@@ -99,7 +99,7 @@ def compare(
     replace: given.Replace = False,
 ) -> None:
     """Compare two results folders."""
-    from coartic.analysis.comparisons.folders import compared_cells, differences, load_pair
+    from coartic.analysis.folders import compared_cells, differences, load_pair
     from coartic.files import check_output, write_output
 
     if out is not None:

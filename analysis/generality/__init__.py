@@ -1,1 +1,0 @@
-"""What holds beyond the paper's tasks: instances of families of random tasks in a folder."""

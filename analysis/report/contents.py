@@ -1,0 +1,46 @@
+"""The sections of the page in its order, and every table and figure of the report.
+
+To add a topic, name its section here. A table that no section shows is a CSV file beside the page.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import walk_packages
+
+from coartic.analysis import topics
+from coartic.analysis.figures.plot import FIGURES
+from coartic.analysis.section import Section
+from coartic.analysis.table import TABLES
+from coartic.analysis.topics import horizon, objectives, stops, tasks
+from coartic.analysis.topics.coarticulation import sentences as coarticulation
+from coartic.analysis.topics.comparison import sentences as comparison
+from coartic.analysis.topics.families import sentences as families
+from coartic.analysis.topics.human import sentences as human
+from coartic.analysis.topics.paper import sentences as paper
+
+for _module in walk_packages(topics.__path__, f"{topics.__name__}."):
+    import_module(_module.name)  # its tables and figures
+
+__all__ = ["FIGURES", "SECTIONS", "TABLES"]
+
+SECTIONS: tuple[Section, ...] = (
+    coarticulation.COARTICULATION,
+    human.HUMAN,
+    paper.PAPER,
+    paper.CLAIMS,
+    comparison.NEAREST,
+    comparison.PRICE,
+    paper.HANDS,
+    comparison.LEARNING,
+    coarticulation.SIGNATURES,
+    coarticulation.SLOPES,
+    families.FAMILIES,
+    families.EXPLORATION,
+    horizon.HORIZON,
+    stops.STOPS,
+    objectives.OBJECTIVES,
+    families.SIGNS,
+    tasks.TASKS,
+    comparison.METHODS,
+)

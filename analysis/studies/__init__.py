@@ -1,1 +1,0 @@
-"""Studies of our own: each a suite, a few functions, a figure and claims."""

@@ -1,0 +1,1 @@
+"""Methods beside each other: gaps, running times, learning curves."""

@@ -1,0 +1,190 @@
+"""Methods beside each other: how far each ends from the optimum, what it costs to come near, and
+how rewards rise with trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from coartic import Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, missing, spoken
+from coartic.analysis.methods import in_order, is_learner, name_of
+from coartic.analysis.study import Study
+from coartic.analysis.topics.comparison import tables as comparison
+from coartic.analysis.topics.comparison.groups import GROUPS
+from coartic.analysis.topics.comparison.runtimes import WAY
+from coartic.analysis.topics.comparison.scores import ALL_TASKS, optimum_in_words, standings
+from coartic.analysis.topics.comparison.tables import price_curves
+from coartic.analysis.trajectories import initial_reward
+from coartic.analysis.words import in_brackets, number
+
+
+@figure(
+    "ranking",
+    "Gap to the optimum",
+    "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
+    f"there are several), with its {style.CONFIDENCE} bootstrap interval over runs. Methods that "
+    "are run once have no interval. Diamonds and bold names: the paper's learner.",
+)
+def ranking(study: Study) -> Parts:
+    """Gap to the optimum of every method over all tasks, or on the one that there is."""
+    data = standings(study)
+    if not len(data):
+        raise missing(study, "no method with a solution to every run and a known optimum")
+    rows = data[data.task == data.task.iloc[0]]
+    percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "low", "high")})
+    groups = [(group, percent[percent.knows == group]) for group in GROUPS]
+    groups = [(group, of_group) for group, of_group in groups if len(of_group)]
+    heights = [len(of_group) + 0.8 for _, of_group in groups]
+    size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
+    drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
+    for axes, (group, of_group) in zip(panels, groups, strict=True):
+        draw_group(axes, group, of_group, style.looks(rows.method))
+    farthest = percent[["gap", "high"]].max(axis=None)
+    panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
+    where = "" if rows.task.iloc[0] == ALL_TASKS else f" on {rows.task.iloc[0]}"
+    panels[-1].set_xlabel(f"gap to the {optimum_in_words(study)}{where} (%)")
+    alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
+    return drawing, data, alt, study.tasks.values()
+
+
+def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+    """Methods that know as much of the reward, nearest first."""
+    axes.set_title(f"{group[0].upper()}{group[1:]}")
+    for place, row in enumerate(rows.to_dict("records")):
+        color = looks[row["method"]]["color"]
+        mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
+        end = row["gap"]
+        if not math.isnan(row["low"]):
+            end = max(row["gap"], row["high"])
+            axes.plot([row["low"], row["high"]], [-place, -place], color=color, linewidth=1.4)
+        (dot,) = axes.plot(row["gap"], -place, "D" if is_learner(row["method"]) else "o", **mark)
+        words = f"{number(row['gap'], 1)} % {in_brackets(row['low'], row['high'], 1)}".strip()
+        style.tip(dot, f"{name_of(row['method'])}: {words}, {row['runs']} runs")
+        beside: Any = {"textcoords": "offset points", "va": "center"}
+        axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
+    style.name_rows(axes, [name_of(method) for method in rows.method])
+    for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
+        if is_learner(method):
+            name.set_fontweight("bold")
+    axes.axvline(0, **style.OPTIMUM)
+
+
+PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
+"""Spends that the figure has a panel of, and their axes."""
+
+
+@figure(
+    "price",
+    "What it costs to come near",
+    f"Share of {len(WAY)} reward targets reached within a budget (mean over all tasks where there "
+    "are several). Targets are evenly spaced from the initial solution to the optimum; a run "
+    "counts for each target that it has reached. a: trials; planners make none and are lines. "
+    "b: forward-kinematics evaluations, spread evenly over a run's trials.",
+)
+def price(study: Study) -> Parts:
+    """Share of targets reached, against trials and kinematics."""
+    data = price_curves(study)
+    spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
+    if not spends:
+        raise missing(study, "no method that reaches a target on a task with a known optimum")
+    drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
+    for axes, spend in zip(panels, spends, strict=True):
+        draw_shares(axes, data[data.spend == spend], style.looks(data.method))
+        axes.set_xlabel(PANELS[spend])
+    panels[0].set_ylabel("targets reached (%)")
+    style.letters(panels)
+    ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
+    ends = ends.assign(share=100 * ends.share)
+    names = dict(zip(map(name_of, ends.method), ends.share, strict=True))
+    style.label_ends(panels[-1], names, 5.5)
+    shares = spoken(ends, "{method} {share:.0f} %")
+    alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
+    return drawing, data, alt, study.tasks.values()
+
+
+def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+    """A step curve for each method."""
+    style.log_axis(axes)
+    positive = data.budget[data.budget > 0]
+    least, most = positive.min(), positive.max()
+    edge = least / 1.5
+    axes.axhline(50, color=style.GREY, linewidth=0.5)
+    for label, rows in data.groupby("method", sort=False):
+        x = np.concatenate([rows.budget.clip(lower=edge), [most]])
+        y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
+        line: Any = {**looks[str(label)], "linewidth": 1.3}
+        (drawn,) = axes.step(x, y, where="post", **line)
+        style.tip(drawn, f"{name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
+    axes.set_xlim(edge, most)
+    axes.set_ylim(-2, 102)
+
+
+@figure(
+    "learning-curves",
+    "Learning curves",
+    "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
+    f"the trials themselves (mean over runs and the last {comparison.WINDOW} trials; failed trials "
+    "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
+    "far below the initial solution are cut off.",
+)
+def learning_curves(study: Study) -> Parts:
+    """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
+    data = comparison.learning_curves(study)
+    if not len(data):
+        raise missing(study, "no run that learns by trial")
+    tasks = [study.tasks[name] for name in data.task.unique()]
+    labels = in_order(data.method.unique())
+    rows, columns = style.grid(len(tasks))
+    size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
+    drawing, panels = style.figure_of((rows, columns), size, len(tasks))
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
+        draw_curves(axes, study, task, data[data.task == task.name], labels)
+        axes.set_title(style.heading(task))
+        axes.set_ylabel("" if place % columns else "reward (ticks)")
+        axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
+    style.letters(panels)
+    handles = [
+        style.entry(name_of(label), linewidth=1.3, **look)
+        for label, look in style.looks(labels).items()
+    ]
+    handles += [style.entry("initial", **style.INITIAL)]
+    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
+    style.legend(drawing, handles, min(len(handles), 4))
+    ends = data.groupby(["task", "method"], sort=False).tail(1)
+    words = spoken(ends, "{task}, {method}: {best:.0f}")
+    alt = f"Reward against trial. Mean best reward at the end: {words}."
+    return drawing, data, alt, tasks
+
+
+def draw_curves(
+    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
+) -> None:
+    """Curves of the methods on a task, between its initial solution and its optimum."""
+    look_of = style.looks(labels)
+    for label, rows in data.groupby("method", sort=False):
+        look = look_of[str(label)]
+        axes.fill_between(
+            rows.trial, rows.best_low, rows.best_high, color=look["color"], alpha=0.22, linewidth=0
+        )
+        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+    floor, top = data.best.min(), data.best_high.max()
+    initial = initial_reward(task, study.model)
+    if not math.isnan(initial):
+        axes.axhline(initial, **style.INITIAL)
+        floor, top = initial, max(top, initial)
+    optimum = study.optima.get(task.name)
+    if optimum is not None:
+        axes.axhline(optimum.reward, **style.OPTIMUM)
+        top = max(top, optimum.reward)
+    reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
+    axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
+    style.log_axis(axes)
+    axes.set_xlim(1, max(2, data.trial.max()))

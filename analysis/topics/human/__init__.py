@@ -1,0 +1,1 @@
+"""Findings about people, put to the models."""

@@ -1,0 +1,313 @@
+"""What it costs to plan for a wrong reward: regret by penalty and weight."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic import Movement, Task, execute
+from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.register import MARGINS, Claim, Finding
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.section import Section
+from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES, mean_of, one_sentence
+from coartic.analysis.words import estimate
+from coartic.learner.rows import movements_from
+from coartic.robot import Array
+from coartic.tasks.task import address_of
+
+Solution = tuple[Movement, ...]
+TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
+"""Penalties, each by its one weight, in words."""
+WHO = {
+    "told": "the planner told of the penalty",
+    "ticks": "the planner of ticks",
+    "smooth": "the planner of smoothness",
+    "learner": "the learner",
+    "from plan": "the learner from the plan of ticks",
+    "cma-es": "CMA-ES",
+}
+"""Who makes movements, in words: planners that are told of the penalty, that believe that ticks
+count alone, that believe in smoothness; the learner, from the corrective process and from the plan
+of ticks; CMA-ES."""
+UNTOLD = ("learner", "cma-es")
+"""Who learns by trial and error, and from no plan."""
+_METHODS = {
+    "believed-reward/plan": "told",
+    "dual-process": "learner",
+    "believed-reward/EC1": "from plan",
+    "believed-reward/EC4": "from plan",
+    "cma-es/bandit": "cma-es",
+}
+_PLANNERS = {"believed-reward/plan": "ticks", "trajectory-optimisation/squared-changes": "smooth"}
+
+
+def base_of(task: str) -> str:
+    """The name of the task of which a task with a penalty is a variant."""
+    return task.partition(".")[0]
+
+
+def term_of(task: Task) -> tuple[str, float]:
+    """The one term of a task's penalty that counts, and its weight; no term and 0 without any."""
+    if task.penalty is None:
+        return "", 0.0
+    weights = {term: getattr(task.penalty, term) for term in TERMS}
+    (term,) = (term for term, weight in weights.items() if weight)
+    return term, weights[term]
+
+
+@cached
+def rewards(study: Study) -> pd.DataFrame:
+    """Mean reward under the true objective: a row for each task, term, weight and who.
+
+    Columns ``task`` (without its variant), ``family`` (missing for the paper's), ``split``,
+    ``term``, ``weight``, ``who``, ``reward``, ``regret``, in per cent of the best reward that is
+    known under this objective, and ``cell``, whose runs are behind it. A task without a penalty is
+    one of weight 0 under every term. Runs that failed are left out.
+    """
+    rows = []
+    plans = plans_without_penalty(study)
+    for name, task in study.tasks.items():
+        address = address_of(base_of(name))
+        family, split = (address.family, address.split) if address else (None, None)
+        term, weight = term_of(task)
+        seen: dict[str, tuple[float, CellRuns]] = {}
+        best = -np.inf
+        for (run_on, label), cell in study.cells.items():
+            method = label.partition(" ")[0]
+            who = _METHODS.get(method) or _METHODS.get(method.partition("/")[0])
+            if run_on == name and who is not None and len(cell.good):
+                seen[who] = float(cell.rewards.mean()), cell
+                best = max(best, float(cell.rewards.max()))
+        for who, (movements, cell) in plans.get(base_of(name), {}).items():
+            scored = execute(task, movements, model=study.model)
+            if scored.reward is not None:
+                seen[who] = float(scored.reward), cell
+                best = max(best, float(scored.reward))
+        for one in TERMS if weight == 0 else (term,):
+            for who, (reward, cell) in seen.items():
+                regret = 100 * (best - reward) / abs(best)
+                row = (base_of(name), family, split, one, weight, who, reward, regret, cell)
+                rows.append(row)
+    columns = ["task", "family", "split", "term", "weight", "who", "reward", "regret", "cell"]
+    return pd.DataFrame(rows, columns=columns).astype({"family": "string", "split": "string"})
+
+
+@cached
+def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Solution, CellRuns]]]:
+    """Plans of those that know of no penalty, and their runs, by task without a penalty."""
+    movements, waypoints = study.movements
+    plans: dict[str, dict[str, tuple[Solution, CellRuns]]] = {}
+    for (name, label), cell in study.cells.items():
+        who = _PLANNERS.get(label.partition(" ")[0])
+        if who and study.tasks[name].penalty is None and len(cell.good):
+            run = str(cell.good.run_id.iloc[0])
+            task = study.tasks[name]
+            solution = movements_from(task, movements[run], waypoints.get(run))
+            plans.setdefault(name, {})[who] = solution, cell
+    return plans
+
+
+def on_random_tasks(study: Study) -> pd.DataFrame:
+    """Rows of :func:`rewards` on random tasks; development instances where there are no others."""
+    frame = rewards(study)
+    frame = frame[frame.family.notna()]
+    reported = frame[frame.split != "development"]
+    return reported if len(reported) else frame
+
+
+def advantage(study: Study, first: str, second: str, term: str) -> pd.DataFrame:
+    """Regret of ``second`` less that of ``first``, in per cent of the best known reward.
+
+    A row for each random task that both solved under every weight of a term, a column for each
+    weight, 0 first; indexed by family and task.
+    """
+    frame = on_random_tasks(study)
+    frame = frame[frame.term == term]
+    second_regret, first_regret = (
+        frame[frame.who == who].pivot_table("regret", index=["family", "task"], columns="weight")
+        for who in (second, first)
+    )
+    return (second_regret - first_regret).dropna()
+
+
+def crossing(weights: Array, means: Array) -> float:
+    """The weight from which a mean advantage, shape ``(weights,)``, is above 0 to the last weight.
+
+    Linear between weights; 0 where it always is, infinite where it is not at the last one.
+    """
+    if means[-1] <= 0:
+        return np.inf
+    below = np.flatnonzero(means <= 0)
+    if not len(below):
+        return 0.0
+    k = int(below[-1])
+    share = -means[k] / (means[k + 1] - means[k])
+    return float(weights[k] + share * (weights[k + 1] - weights[k]))
+
+
+def crossing_weights(study: Study) -> pd.DataFrame:
+    """Where trial and error overtakes the planner of ticks, by term: the weight, with its interval.
+
+    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %, which are
+    not widened as means over tasks are: a crossing can be infinite. An infinite end: beyond the
+    largest weight, if at all.
+    """
+    rows = []
+    for term, who in itertools.product(TERMS, UNTOLD):
+        table = advantage(study, who, "ticks", term)
+        if len(table) < FEWEST:
+            continue
+        weights = np.array(table.columns, dtype=np.float64)
+        rng = np.random.default_rng(SEED)
+        by_family = [part.to_numpy() for _, part in table.groupby(level="family")]
+        drawn = [
+            part[rng.integers(len(part), size=(RESAMPLES, len(part)))].mean(axis=1)
+            for part in by_family
+        ]
+        each = [crossing(weights, resample) for resample in np.mean(drawn, axis=0)]
+        low, high = np.quantile(each, [0.025, 0.975], method="inverted_cdf")
+        centre = np.mean([part.mean(axis=0) for part in by_family], axis=0)
+        rows.append((term, who, len(table), crossing(weights, centre), low, high))
+    columns = ["term", "who", "tasks", "crossing", "crossing_low", "crossing_high"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+@table("term, weight, who, tasks, regret[], helps[]")
+def objectives(study: Study) -> Rows:
+    """Regret under the true reward by penalty, its weight and who, means over random tasks.
+
+    In per cent of the best known reward. ``helps``: by how much less the learner from the plan of
+    ticks regrets than the learner from the corrective process.
+    """
+    frame = on_random_tasks(study)
+    if not (frame.weight > 0).any():
+        return
+    for term in TERMS:
+        helped = advantage(study, "from plan", "learner", term)
+        for (weight, who), rows in sorted(
+            frame[frame.term == term].groupby(["weight", "who"]),
+            key=lambda part: (part[0][0], list(WHO).index(str(part[0][1]))),
+        ):
+            row: Row = {"term": term, "weight": weight, "who": who, "tasks": len(rows)}
+            row |= mean_of("regret", rows.regret)
+            if who == "from plan" and weight in helped.columns:
+                row |= mean_of("helps", helped[weight])
+            yield f"{term} {weight:g} {who}", row | runs_of(*rows.cell)
+
+
+@table("term, who, tasks, crossing[]")
+def crossings(study: Study) -> Rows:
+    """The weight from which trial and error regrets less than the planner that believes in ticks.
+
+    Infinite: beyond the largest weight, if at all.
+    """
+    frame = on_random_tasks(study)
+    for at in crossing_weights(study).to_dict("records"):
+        row: Row = {str(name): value for name, value in at.items()}
+        of_both = frame[(frame.term == row["term"]) & frame.who.isin([row["who"], "ticks"])]
+        cells = {id(cell): cell for cell in of_both.cell}
+        yield f"{row['term']} {row['who']}", row | runs_of(*cells.values())
+
+
+WHO_LOOKS: dict[str, tuple[str, Any]] = {
+    "told": (style.INK, style.SOLID),
+    "ticks": (style.VERMILLION, style.SOLID),
+    "smooth": (style.ORANGE, style.DASHED),
+    "learner": (style.BLUE, style.SOLID),
+    "from plan": (style.SKY, style.DASHED),
+    "cma-es": (style.GREEN, style.SOLID),
+}
+"""Colour and dash of each line."""
+
+
+@figure(
+    "objectives",
+    "Regret by how wrong a planner's objective is",
+    "Regret under the true reward, which loses a penalty of this weight beside 1 a tick: mean over "
+    f"random tasks with its {style.CONFIDENCE} interval (bootstrap over tasks), in per cent of the "
+    "best known reward. Bands: the interval of the weight at which the learner (blue) and CMA-ES "
+    "(green), which are told nothing, overtake the planner of ticks. Horizontally by the square "
+    "root.",
+)
+def draw_objectives(study: Study) -> Parts:
+    """A panel for each penalty, a line for each who."""
+    data = objectives(study)
+    if not len(data):
+        raise missing(study, "no random tasks with a penalty")
+    drawing, panels = style.figure_of((1, len(TERMS)), (style.TWO, 2.8), sharey=True)
+    weights = sorted(data.weight.unique())
+    edge = 1.05 * weights[-1]
+    weights_of_crossings = crossings(study)
+    for axes, (term, title) in zip(panels, TERMS.items(), strict=True):
+        axes.set_title(title)
+        axes.set_xscale("function", functions=(np.sqrt, np.square))
+        axes.set_xticks(weights, [f"{weight:g}" for weight in weights])
+        axes.set_xlim(0, edge)
+        axes.set_xlabel("weight (ticks)")
+        for at in weights_of_crossings[weights_of_crossings.term == term].to_dict("records"):
+            band: Any = {"color": WHO_LOOKS[at["who"]][0], "alpha": 0.15, "linewidth": 0}
+            axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
+        for who, (color, dash) in WHO_LOOKS.items():
+            rows = data[(data.term == term) & (data.who == who)]
+            line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
+            axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
+            axes.plot(rows.weight, rows.regret, **line, label=WHO[who].removeprefix("the "))
+        axes.set_ylim(bottom=0)
+    panels[0].set_ylabel("regret (%)")
+    style.letters(panels)
+    style.legend(drawing, panels[0].get_legend_handles_labels()[0], 3)
+    each = (f"{name}: {value:.1f} %" for name, value in data.regret.items())
+    return drawing, data, f"Regret by penalty, weight and who. {'; '.join(each)}.", ()
+
+
+def less_regret(data: Data, claim: Claim) -> Finding:
+    """one-tailed bootstrap tests over random tasks that the first regrets less than the second by \
+more than {regret:g} % of the best known reward"""
+    tests = []
+    by_pair: dict[str, list[str]] = {}
+    for where, (first, second) in claim.cells.items():
+        terms, _, weight = where.partition(" ")
+        for term in TERMS if terms == "every" else (terms,):
+            table = advantage(data.study, first, second, term)
+            if len(table) < FEWEST or float(weight) not in table.columns:
+                raise MissingError(f"this folder has too few tasks with {term} {weight}")
+            values = np.array(table[float(weight)], dtype=np.float64)
+            test = bootstrap_test(values, MARGINS["regret"], resamples=RESAMPLES_OF_STUDIES)
+            tests.append(test)
+            at = f"at weight {weight} ({TERMS[term]})" if float(weight) else "without a penalty"
+            by_pair.setdefault(f"{WHO[first]} regrets less than {WHO[second]}", []).append(
+                f"{estimate(mean(values), 1)} points {at} on {len(values)} random tasks"
+            )
+    data.run_ids.extend(data.study.runs.run_id)
+    seen = one_sentence([f"{pair}: {', '.join(parts)}" for pair, parts in by_pair.items()])
+    seen += " Points are per cent of the best known reward."
+    return Finding(all(test.value > 0 for test in tests), seen, tuple(tests))
+
+
+OBJECTIVES = Section(
+    "objectives",
+    short="Wrong objectives",
+    title="What does it cost to plan for a wrong reward?",
+    caption=(
+        "Regret under the true reward, in per cent of the best known: means over random tasks"
+    ),
+    figure="objectives",
+    table="objectives",
+    note=(
+        "The true reward loses a penalty beside 1 a tick: joints cost their way, a disc costs the"
+        " elbow that is in it, postures at neighbouring goals cost being alike. Its weight says "
+        "how wrong a planner is that believes in ticks alone, or in smoothness. Told: a planner "
+        "that knows the penalty. From plan: the learner that starts from the plan of ticks, and "
+        "so never ends worse than it. Table crossings has the weights at which trial and error "
+        "overtakes the planner of ticks."
+    ),
+)

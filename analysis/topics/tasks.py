@@ -1,0 +1,93 @@
+"""The tasks: start configurations and goals (paper, Figure 4)."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from coartic import Task
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
+from coartic.analysis.section import Section
+from coartic.analysis.study import Study
+from coartic.analysis.topics.families.sample import one_by_one
+
+
+@figure(
+    "tasks",
+    "Tasks",
+    "Start configuration and goals of each task. Open squares mark the left arm, closed circles "
+    "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
+    "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
+)
+def tasks(study: Study) -> Parts:
+    """Start configuration and goals of each task, one panel for each."""
+    shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
+    if not shown:
+        raise missing(study, "only random tasks, too many to show each")
+    rows: list[dict[str, object]] = []
+    for task in shown:
+        start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))
+        rows.append({"task": task.name, "goal": 0, **start})
+        rows += [
+            {"task": task.name, "goal": index, "x": x, "y": y, "radius": task.radius}
+            for index, (x, y) in enumerate(task.goals, 1)
+        ]
+    names = ", ".join(task.name for task in shown)
+    alt = f"The robot in its start configuration with the goals of the tasks {names}."
+    return draw_tasks(shown), pd.DataFrame(rows), alt, ()
+
+
+@style.styled
+def draw_tasks(tasks: Sequence[Task]) -> Figure:
+    """Start configuration and goals of some tasks in one panel each."""
+    boxes = [box(task, [task.q0]) for task in tasks]
+    width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
+    rows, columns = style.grid(len(tasks))
+    above, around = 0.62, 0.55  # inches of a panel for title and axes
+    scale = min(
+        (style.TWO / columns - around) / width,
+        (style.TALLEST - 0.3 - rows * above) / rows / height,
+        0.42,
+    )
+    size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
+    drawing, panels = style.figure_of(
+        (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
+    )
+    drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
+    for axes, task, corners in zip(panels, tasks, boxes, strict=True):
+        draw_robot(axes, task, task.q0)
+        draw_goals(axes, task)
+        remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
+        remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
+        variants = [other.label for other in tasks].count(task.label) > 1
+        name = task.name if variants else task.label
+        fits = int(13 * drawing.get_figwidth() / columns)  # letters
+        axes.set_title("\n".join([*textwrap.wrap(name, fits), "; ".join(remarks)]).strip())
+        x, y = (corners[0] + corners[1]) / 2
+        axes.set_xlim(x - width / 2, x + width / 2)
+        axes.set_ylim(y - height / 2, y + height / 2)
+        axes.set_aspect("equal")
+        axes.set_xlabel("x (length unit)")
+        axes.set_ylabel("y (length unit)")
+    style.legend(drawing, legend_entries(hand for task in tasks for hand in task.hands), 3)
+    return drawing
+
+
+TASKS = Section(
+    "tasks",
+    short="Tasks",
+    title="What are the tasks?",
+    caption="Tasks with their initial, learned and best possible rewards (ticks)",
+    figure="tasks",
+    table="tasks",
+    note=(
+        "Initial: the corrective process alone. Learned: the learner's best condition. Proven "
+        "bound: a reward that no solution can exceed."
+    ),
+    single=True,
+)
