@@ -96,6 +96,16 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def plural(count: float, thing: str) -> str:
+    """``1 run``, ``20 runs``."""
+    return f"{number(count)} {thing}{'' if count == 1 else 's'}"
+
+
+def capital(text: str) -> str:
+    """A text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
 def slugs(names: Iterable[str]) -> dict[str, str]:
     """A slug for every name (small letters, digits, dashes), no two the same."""
     taken: dict[str, str] = {}

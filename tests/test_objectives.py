@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from coartic.analysis.claims.studies import less_regret
 
 from coartic import execute, load_task
 from coartic.analysis.claims.data import Data, MissingError
@@ -17,7 +16,7 @@ from coartic.analysis.report.text import sentence
 from coartic.analysis.study import load
 from coartic.analysis.topics import objectives
 from coartic.analysis.topics.families.sample import one_by_one
-from coartic.analysis.topics.objectives import advantage, crossing, crossings, rewards
+from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.learner.rows import movements_from

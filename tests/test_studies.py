@@ -10,15 +10,15 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from coartic.analysis.claims.studies import HORIZONS, gaps_by_horizon
 
 from coartic import load_task
-from coartic.analysis.claims import studies
 from coartic.analysis.claims.judge import judged
 from coartic.analysis.report import build, facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
 from coartic.analysis.signatures.signs import Sign
+from coartic.analysis.topics import horizon, random_tasks, stops
+from coartic.analysis.topics.horizon import HORIZONS, gaps_by_horizon
 from coartic.motion.costs import joint_costs
 from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.suites import run_and_write, suite_of
@@ -72,7 +72,7 @@ def planted(
             rows.append(row(method, reward, run_id=f"{name} {method} {variant}", **words))
 
         curves = {("planned", "none"): plain, ("optimal", "none"): given}
-        curves |= {("planned", costs): dear for costs in studies.DEAR}
+        curves |= {("planned", costs): dear for costs in horizon.DEAR}
         for (hands, costs), curve in curves.items():
             horizons = (0, 1, 2, 3, 4, last)
             if short:
@@ -99,7 +99,7 @@ def planted(
 
 @pytest.fixture(autouse=True)
 def fewer_resamples(monkeypatch):
-    monkeypatch.setattr(studies, "RESAMPLES_OF_STUDIES", 9_999)
+    monkeypatch.setattr(random_tasks, "RESAMPLES_OF_STUDIES", 9_999)
 
 
 def verdicts(study):
@@ -237,9 +237,9 @@ def test_claims_on_stops(passing, stopping, expected, monkeypatch):
                 variant = f"timing={timing}, stop={stop}"
                 parameters = json.dumps({"timing": timing, "stop": stop, "stop_every": 1})
                 words = {"variant": variant, "parameters": parameters, "task": task.name}
-                rows.append(row(studies.STOPPING, -500, run_id=f"{task.name} {variant}", **words))
-                values[task.name, f"{studies.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
-    monkeypatch.setattr(studies, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
+                rows.append(row(stops.STOPPING, -500, run_id=f"{task.name} {variant}", **words))
+                values[task.name, f"{stops.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
+    monkeypatch.setattr(stops, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
     study = study_of(pd.DataFrame(rows), tasks, suite="stops")
     assert list(verdicts(MadeUp(study, trajectories=made(values))).values()) == expected
 

@@ -1,0 +1,29 @@
+"""How many of the runs behind an answer failed, as a sentence that follows it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from coartic.analysis.methods import name_of
+from coartic.analysis.study import CellKey, Study
+from coartic.analysis.words import number
+
+
+def failed_runs(study: Study, cells: Iterable[CellKey], consequence: str) -> str:
+    """A sentence with a leading space; empty where none of the cells' runs failed.
+
+    It counts all runs of the methods of which some failed, and ends with the ``consequence``:
+    `` 3 of 40 runs of hill climbing failed and are not counted.``
+    """
+    runs, failed = Counter[str](), Counter[str]()
+    for task, label in dict.fromkeys(cells):
+        cell = study.cells[task, label]
+        runs[label] += len(cell.runs)
+        failed[label] += len(cell.runs) - len(cell.good)
+    who = [label for label in failed if failed[label]]
+    if not who:
+        return ""
+    names = " and ".join(map(name_of, who)) if len(who) < 3 else f"{len(who)} methods"
+    total = sum(runs[label] for label in who)
+    return f" {number(failed.total())} of {number(total)} runs of {names} failed{consequence}."
