@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Execution, Movement, Task, execute
-from coartic.baselines.posture_graph import Start, cheapest_chains
+from coartic.baselines.posture_graph import Chain, cheapest_chains
 from coartic.baselines.shortest_paths import TOLD, ShortestPlans, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.baselines.whole_ticks import movements
@@ -115,7 +115,7 @@ def shortest(
 
 
 def cheapest(
-    session: Session, believed: Task, search: BeliefParameters, known: Sequence[Start]
+    session: Session, believed: Task, search: BeliefParameters, known: Sequence[Chain]
 ) -> ShortestPlans:
     """The plans of least path length and penalty, from ``known`` starts and from chains."""
     penalty = believed.penalty
@@ -159,7 +159,7 @@ def with_belief(task: Task, belief: float) -> Task:
     return task.model_copy(update={"penalty": penalty})
 
 
-def cost_of(believed: Task, start: Start) -> float:
+def cost_of(believed: Task, start: Chain) -> float:
     """What a start would cost as it is by the believed reward, ticks."""
     hands, configurations = start
     steps = np.diff(np.vstack([believed.q0, configurations]), axis=0)

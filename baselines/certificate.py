@@ -35,7 +35,7 @@ from functools import lru_cache
 import numpy as np
 
 from coartic import MotionModel, Task
-from coartic.baselines.relaxation import Hands, Lagrangian, Relaxation
+from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import too_many_sequences
 from coartic.robot import HANDS, Array, Hand
@@ -100,7 +100,7 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
 class Part:
     """Solutions with these hands, these goals hit without a movement, angles in a box."""
 
-    hands: Hands
+    hands: PartialSequence
     merged: tuple[int, ...]
     """Goals (0-based) that are hit without a movement."""
     open: tuple[int, ...]
@@ -165,7 +165,7 @@ class ProofSearch:
         self._robot_hands = tuple(hand for hand in HANDS if hand in task.hands)
 
         @lru_cache(maxsize=1024)
-        def relaxation(hands: Hands, merged: tuple[int, ...]) -> Relaxation:
+        def relaxation(hands: PartialSequence, merged: tuple[int, ...]) -> Relaxation:
             return Relaxation(task, hands, merged, still)
 
         self.relaxation = relaxation
@@ -179,7 +179,7 @@ class ProofSearch:
         if not self._ticks:
             return
         goals = len(self._task.goals)
-        sequences: list[Hands] = [(None,) * goals]
+        sequences: list[PartialSequence] = [(None,) * goals]
         if len(self._robot_hands) ** goals <= _APART:
             sequences = list(itertools.product(self._robot_hands, repeat=goals))
         for hands in sequences:

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
-from coartic.baselines.posture_graph import Start, cheapest_chains
+from coartic.baselines.posture_graph import Chain, cheapest_chains
 from coartic.baselines.shortest_paths import TOLD, check_ticks, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
@@ -78,7 +78,7 @@ class Optimum(Method):
     stochastic = False
 
     @abstractmethod
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """Hand sequences with a configuration per goal to start from."""
 
     def solve(self, session: Session) -> Result:
@@ -126,7 +126,7 @@ class DynamicProgramming(Optimum):
     Parameters = GraphParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The chain of every sequence; with a free other arm also with that arm spread out."""
         parameters: GraphParameters = self.parameters
         return cheapest_chains(
@@ -194,7 +194,7 @@ class Multistart(Optimum):
         """More hand sequences than can be planned one by one."""
         return too_many_sequences(task, len(task.hands))
 
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""
         rng = np.random.default_rng(self.parameters.sampling_seed)
         for letters in hand_sequences(task):

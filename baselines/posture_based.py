@@ -41,7 +41,7 @@ from coartic.robot import BASE_DOF, Array, Hand, chain
 from coartic.tasks.task import hands_of
 
 Mask = NDArray[np.bool_]
-Hands = tuple[Hand, ...]
+HandSequence = tuple[Hand, ...]
 Layers = dict[tuple[int, Hand], Array]
 
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
@@ -112,7 +112,7 @@ class PostureBased(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""
-        options: list[list[Hands]] = [[session.hands] * session.goals_count]
+        options: list[list[HandSequence]] = [[session.hands] * session.goals_count]
         if self.parameters.hands == "given":
             options = [[(hand,) for hand in hands_of(session.initial_hands)]]
         elif self.parameters.hands == "every":
@@ -189,7 +189,7 @@ def reach_kernel(
 class GrowingPlan:
     """A plan in the making, with hands to choose from for each goal."""
 
-    options: list[Hands]
+    options: list[HandSequence]
     noise: list[Array]
     """Of the goals to come, where it was drawn beforehand."""
     store: Array
@@ -205,14 +205,14 @@ class Search(NamedTuple):
     """What postures for successive goals are generated from."""
 
     q: Array
-    hands: Hands
+    hands: HandSequence
     promising: Array
     """Shape ``(goals, dof)``."""
     noise: Array
     """Shape ``(rounds, batch, goals, dof)``."""
 
 
-PostureChain = tuple[float, Hands, Array]
+PostureChain = tuple[float, HandSequence, Array]
 """Postures for successive goals ``(goals, dof)`` after what they cost, the joint-space distance
 through all of them, and their hands."""
 
@@ -243,7 +243,7 @@ class Planner:
         # Of the better postures, best first: logarithmic in the rank.
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
-    def plans(self, options: list[list[Hands]]) -> list[GrowingPlan]:
+    def plans(self, options: list[list[HandSequence]]) -> list[GrowingPlan]:
         """The plans that hit every goal; ``options``: hands per goal, of each plan.
 
         Raises MethodError where there is none, for a goal that no posture hits.
@@ -259,7 +259,9 @@ class Planner:
             raise failure
         return plans
 
-    def plan_together(self, options: list[list[Hands]], beforehand: bool) -> list[GrowingPlan]:
+    def plan_together(
+        self, options: list[list[HandSequence]], beforehand: bool
+    ) -> list[GrowingPlan]:
         """Plans side by side; noise is drawn ``beforehand``, plan after plan, or as needed."""
         goals = range(len(self.goals))
         plans = [
@@ -348,7 +350,7 @@ class Planner:
             f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
         )
 
-    def most_promising(self, q: Array, hands: Hands, layers: list[Array]) -> Array:
+    def most_promising(self, q: Array, hands: HandSequence, layers: list[Array]) -> Array:
         """Second aspect: of the retrieved postures those that are cheapest, one a goal."""
         first = layers[0]
         cost = np.linalg.norm(first - q, axis=1)
@@ -395,7 +397,7 @@ class Planner:
         ]
 
     def correct_generated(
-        self, start: Array, postures: Array, hands: list[Hands], goals: range
+        self, start: Array, postures: Array, hands: list[HandSequence], goals: range
     ) -> Mask:
         """Correct generated postures in place; which have all hands there.
 

@@ -23,8 +23,8 @@ from coartic.motion.penalty import disc_centre
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Penalty, Task
 
-Hands = tuple[Hand, ...]
-Start = tuple[Hands, Array]
+HandSequence = tuple[Hand, ...]
+Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
@@ -126,7 +126,7 @@ class PostureGraph:
 
     def chains(
         self, only: tuple[Hand, ...] | None = None, most: int | None = None
-    ) -> Iterator[Start]:
+    ) -> Iterator[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
         ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
@@ -209,7 +209,7 @@ class PostureGraph:
             by_arm += penalty.distinct * np.maximum(1.0 - way / penalty.apart, 0.0)
         return by_base * PAPER.step, by_arm * PAPER.step
 
-    def chain_of(self, complete: Beginning) -> Start:
+    def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
         hands, cost, back = complete.hands, complete.cost, complete.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
@@ -238,10 +238,10 @@ def cheapest_chains(
     chains: int,
     most: int,
     spread: bool = False,
-    only: Hands | None = None,
+    only: HandSequence | None = None,
     costs: Array | float = 1.0,
     penalty: Penalty | None = None,
-) -> Iterator[Start]:
+) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
     :meth:`PostureGraph.chains`, ``costs`` of joints and ``penalty`` as in
@@ -266,7 +266,7 @@ def cheapest_chains(
             return
 
 
-def spread_out(task: Task, hands: Hands, chain: Array) -> Array:
+def spread_out(task: Task, hands: HandSequence, chain: Array) -> Array:
     """A chain's configurations with each arm moving steadily between the goals it hits."""
     configurations = chain.copy()
     for hand in task.hands:

@@ -37,7 +37,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task, execute
-from coartic.baselines.posture_graph import Hands, Start, cheapest_chains
+from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
 from coartic.baselines.shortest_paths import (
     TOLD,
     PlanInTicks,
@@ -51,8 +51,7 @@ from coartic.baselines.whole_ticks import movements
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.motion.costs import CostlyJoints, joint_costs, segment_lengths
 from coartic.robot import BASE_DOF, HANDS, Array
-from coartic.tasks.task import MOST_GOALS, hands_of
-from coartic.tasks.task import Start as Posture
+from coartic.tasks.task import MOST_GOALS, Start, hands_of
 
 
 class RecedingHorizonParameters(Parameters):
@@ -118,7 +117,7 @@ class Planner:
     def solve(self) -> Result:
         """A window after another, until one reaches the last goal."""
         goals, ahead = len(self.task.goals), self.parameters.horizon + 1
-        hands: Hands | None = None
+        hands: HandSequence | None = None
         if self.parameters.hands == "optimal":
             hands = hands_of(self.plan(self.task, None).execution.hands)
         solution: list[Movement] = []
@@ -144,7 +143,7 @@ class Planner:
         }
         return Result(tuple(solution), details)
 
-    def plan(self, task: Task, only: Hands | None) -> PlanInTicks:
+    def plan(self, task: Task, only: HandSequence | None) -> PlanInTicks:
         """The shortest movements through all goals of a task, or of what remains of one."""
         weighted = self.parameters.costs != "none"
         costs = tuple(self.costs.tolist()) if weighted else None
@@ -168,7 +167,7 @@ class Planner:
                 return shortest_as_it_is(self.session, task, plans)
             return fewest_ticks(self.session, task, problem, plans)
 
-    def shortest_starts(self, task: Task, only: Hands | None) -> list[Start]:
+    def shortest_starts(self, task: Task, only: HandSequence | None) -> list[Chain]:
         """The starts that are polished."""
         starts = cheapest_chains(
             self.session,
@@ -185,7 +184,7 @@ class Planner:
         ranked = sorted(starts, key=lambda start: self.length_from(task, start))
         return ranked[: self.parameters.starts]
 
-    def length_from(self, task: Task, start: Start) -> float:
+    def length_from(self, task: Task, start: Chain) -> float:
         """Weighted path length of a start as it is."""
         _, configurations = start
         return float(segment_lengths(np.vstack([task.q0, configurations]), self.costs).sum())
@@ -194,7 +193,7 @@ class Planner:
 def remaining(task: Task, q: Array, first: int, end: int) -> Task:
     """The goals from ``first`` (0-based) up to ``end``, from a configuration ``q``, ``(dof,)``."""
     angles = {hand: tuple(q[task.robot.joints(hand)].tolist()) for hand in HANDS}
-    start = Posture(base=tuple(q[:BASE_DOF].tolist()), **angles)
+    start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
     goals = task.goals[first:end]
     return task.model_copy(update={"goals": goals, "start": start})
 

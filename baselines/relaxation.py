@@ -39,7 +39,7 @@ from scipy import sparse
 from coartic import Task
 from coartic.robot import BASE_DOF, HANDS, Arm, Array, Hand, directions
 
-Hands = tuple[Hand | None, ...]
+PartialSequence = tuple[Hand | None, ...]
 """A hand per goal, None where it is undecided."""
 
 _TURN = 2.0 * math.pi
@@ -55,7 +55,9 @@ class Relaxation:
     rad, of the chosen arms at the goals whose hand is decided, goal by goal.
     """
 
-    def __init__(self, task: Task, hands: Hands, merged: tuple[int, ...], still: bool) -> None:
+    def __init__(
+        self, task: Task, hands: PartialSequence, merged: tuple[int, ...], still: bool
+    ) -> None:
         dof, goals = task.robot.dof, len(hands)
         chosen = [None if hand is None else task.robot.arm(hand) for hand in hands]
         arms = {g: arm for g, arm in enumerate(chosen) if arm is not None}

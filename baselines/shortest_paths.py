@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from coartic import Execution, MotionModel, Movement, Task, execute
-from coartic.baselines.posture_graph import Hands, Start
+from coartic.baselines.posture_graph import Chain, HandSequence
 from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
@@ -33,7 +33,7 @@ TOLD = frozenset(
 class ShortestPlans(NamedTuple):
     """What polishing many starts came to."""
 
-    by_hands: dict[Hands, tuple[Instance, Plan]]
+    by_hands: dict[HandSequence, tuple[Instance, Plan]]
     """The shortest plan of each hand sequence that has one."""
     solves: int
     failed: int
@@ -64,7 +64,7 @@ def shortest_plans(
     session: Session,
     task: Task,
     problem: TrajectoryProblem,
-    starts: Iterable[Start],
+    starts: Iterable[Chain],
     *,
     still: bool,
     radius: float,
@@ -75,7 +75,7 @@ def shortest_plans(
     Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
     penalised problem. Raises MethodError where no solve finds a path.
     """
-    best: dict[Hands, tuple[Instance, Plan]] = {}
+    best: dict[HandSequence, tuple[Instance, Plan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
