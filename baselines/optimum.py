@@ -20,7 +20,7 @@ from pydantic import Field
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import Chain, cheapest_chains
-from coartic.baselines.shortest_paths import TOLD, check_ticks, fewest_ticks, shortest_plans
+from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.corrective import correct
@@ -29,7 +29,6 @@ from coartic.robot import Array, Hand
 from coartic.tasks.task import hands_of, letters_of
 
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
-CITATION = "This package; docs/model.md derives the bound on reward."
 
 
 class OptimumParameters(Parameters):
@@ -39,7 +38,6 @@ class OptimumParameters(Parameters):
     """Whether the arm that is not chosen may move."""
     base: Literal["task", "y", "xy"] = "task"
     """Base coordinates that are locked: those of the task, or these in addition."""
-    sampling_seed: Annotated[int, Field(ge=0)] = 0
 
 
 class GraphParameters(OptimumParameters):
@@ -52,9 +50,6 @@ class GraphParameters(OptimumParameters):
     chains: Annotated[int, Field(ge=1)] = 100
     """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
     three, the best path known was missed on 9 of 40 random tasks for one arm."""
-    most_sequences: Annotated[int, Field(ge=1)] = 64
-    """Hand sequences that are planned for each graph: all where there are no more, with two
-    hands up to six goals; else those that a beam of this width over the goals ends with."""
 
 
 class BoundParameters(GraphParameters):
@@ -75,6 +70,7 @@ class MultistartParameters(OptimumParameters):
 class Optimum(Method):
     """The shortest path over all hand sequences, in whole ticks."""
 
+    citation = "This package; docs/model.md derives the bound on reward."
     stochastic = False
 
     @abstractmethod
@@ -121,8 +117,7 @@ class DynamicProgramming(Optimum):
 
     name = "optimum/dynamic-programming"
     title = "Optimum: dynamic programming over postures and hands, polished"
-    citation = CITATION
-    told = TOLD
+    told = KNOWS_REWARD
     Parameters = GraphParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
@@ -132,11 +127,10 @@ class DynamicProgramming(Optimum):
         return cheapest_chains(
             session,
             task,
-            np.random.default_rng(parameters.sampling_seed),
+            np.random.default_rng(0),
             nodes=parameters.nodes,
             graphs=parameters.graphs,
             chains=parameters.chains,
-            most=parameters.most_sequences,
             spread=parameters.other_arm == "free",
         )
 
@@ -178,7 +172,6 @@ class Multistart(Optimum):
 
     name = "optimum/multistart"
     title = "Optimum: random starts for every hand sequence"
-    citation = CITATION
     told = frozenset(
         {
             Information.GOALS,
@@ -196,16 +189,16 @@ class Multistart(Optimum):
 
     def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""
-        rng = np.random.default_rng(self.parameters.sampling_seed)
+        rng = np.random.default_rng(0)
         for letters in hand_sequences(task):
             hands = hands_of(letters)
-            start = corrected(session, task, hands)
+            start = correct_each_goal(session, task, hands)
             for number in range(self.parameters.starts):
                 spread = 0.0 if number == 0 else 0.05 * 30.0 ** rng.random()
                 yield hands, start + spread * rng.standard_normal(start.shape)
 
 
-def corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
+def correct_each_goal(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):

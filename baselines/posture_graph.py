@@ -26,6 +26,9 @@ from coartic.tasks.task import Penalty, Task
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+BEAM_WIDTH = 64
+"""Hand sequences that are planned for each graph: all where there are no more, with two hands up to
+six goals; else those that a beam of this width over the goals ends with."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
@@ -236,7 +239,7 @@ def cheapest_chains(
     nodes: int,
     graphs: int,
     chains: int,
-    most: int,
+    most: int = BEAM_WIDTH,
     spread: bool = False,
     only: HandSequence | None = None,
     costs: Array | float = 1.0,
@@ -261,12 +264,12 @@ def cheapest_chains(
             yielded += 1
             yield hands, configurations
             if spread and len(task.hands) > 1:
-                yield hands, spread_out(task, hands, configurations)
+                yield hands, move_other_arm(task, hands, configurations)
         if number >= graphs and yielded >= chains:
             return
 
 
-def spread_out(task: Task, hands: HandSequence, chain: Array) -> Array:
+def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """A chain's configurations with each arm moving steadily between the goals it hits."""
     configurations = chain.copy()
     for hand in task.hands:

@@ -21,11 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
+from coartic.method import Information
 from coartic.model import PAPER
 from coartic.motion.costs import joint_costs as costs_of
 from coartic.motion.penalty import disc_centre
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Penalty, Task
+
+MODEL_BASED = frozenset(
+    {
+        Information.GOALS,
+        Information.FORWARD_KINEMATICS,
+        Information.JACOBIAN,
+        Information.KINEMATIC_MODEL,
+    }
+)
+"""Information of a planner with a model of the kinematics, besides its cost."""
 
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
 
@@ -84,7 +95,7 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PathPlan:
     """What a solve came to."""
 
     converged: bool
@@ -193,14 +204,14 @@ class TrajectoryProblem:
         most_rates: Array | None = None,
         deep: Sequence[int] | None = None,
         penalty: Penalty | None = None,
-    ) -> Plan:
+    ) -> PathPlan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
 
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
         segments' durations vary at a constant total (smoothness costs only). No rate exceeds
-        ``most_rates``, shape as :attr:`Plan.rates`, in size. ``penalty`` is that of a penalised
+        ``most_rates``, shape as :attr:`PathPlan.rates`, in size. ``penalty`` is that of a penalised
         problem. A solve that fails is a plan that has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -286,7 +297,7 @@ class TrajectoryProblem:
         parameters = [*(weights * PAPER.step), *centre, penalty.radius, penalty.apart, *costly]
         return paid.ravel(), least.ravel(), most.ravel(), np.array(parameters, dtype=np.float64)
 
-    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> Plan:
+    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
         """What IPOPT gave; its word is checked: every limit it was given holds."""
         goals, dof = self.goals, self.robot.dof
         x = np.asarray(solution["x"]).ravel()
@@ -294,7 +305,7 @@ class TrajectoryProblem:
         statistics = self._solver.stats()
         end = goals * dof
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
-        return Plan(
+        return PathPlan(
             converged=statistics["return_status"] in _CONVERGED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
@@ -405,7 +416,7 @@ def trajectory_problem(
     return TrajectoryProblem(robot, hands, goals, cost, joint_costs, penalised=penalised)
 
 
-def spline(plan: Plan, q0: Array, samples: int) -> list[Array]:
+def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:
     """Configurations along a smooth plan, one piece ``(samples, dof)`` per goal.
 
     Hermite cubics (one rate) or quintics (two) between start and goals.

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coartic import Movement, Task
-from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic.baselines.trajectory_problem import Instance, PathPlan, TrajectoryProblem
 from coartic.method import Session
 from coartic.motion.movement import move
 from coartic.robot import Array, Hand
@@ -53,7 +53,7 @@ class Rounding:
         self._session, self._problem, self._instance = session, problem, instance
         self._step = session.model.step
 
-    def nearest(self, plan: Plan) -> TickPlan | None:
+    def nearest(self, plan: PathPlan) -> TickPlan | None:
         """Every segment but the last rounded to the nearest step, the last one up.
 
         At a shortest path the total does not change with the division to first order, so
@@ -62,7 +62,7 @@ class Rounding:
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
         return self.divided(plan, [round(length) for length in exact], ())
 
-    def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
+    def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Roundings up and down of all but the last segment, the nearest first.
 
         All of them with up to seven goals, else the nearest ``MOST_ROUNDINGS``.
@@ -78,15 +78,15 @@ class Rounding:
             if rounded is not None:
                 yield rounded
 
-    def least(self, plan: Plan, merged: tuple[int, ...] = ()) -> int:
+    def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
         """Ticks that no rounding of a plan as long as this one can go below."""
         length = float(plan.lengths(self._instance.q0).sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
 
     def plans(
-        self, plan: Plan, task: Task, worth: Callable[[int], bool]
-    ) -> Iterator[tuple[tuple[int, ...], Plan]]:
+        self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
+    ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """The plan itself, and shortest plans in which some goals are hit as their turn comes.
 
         Worth it where the path grows by less than the ticks it saves. It only grows with
@@ -95,7 +95,7 @@ class Rounding:
         """
         goals = len(self._instance.hands)
         able = mergeable(task, self._instance.hands)
-        waiting: deque[tuple[tuple[int, ...], Plan]] = deque([((), plan)])
+        waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
         while waiting:
             merged, shortest = waiting.popleft()
             yield merged, shortest
@@ -108,7 +108,7 @@ class Rounding:
                 if merger.converged:
                     waiting.append((more, merger))
 
-    def divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
+    def divided(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
         """The plan with these steps to all goals but the last, and as few as can be to that."""
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
@@ -133,7 +133,7 @@ class Rounding:
         merged: tuple[int, ...],
         *,
         deep: Sequence[int] | None = None,
-    ) -> Plan:
+    ) -> PathPlan:
         """The shortest plan near another one, with these lengths and mergers."""
         instance = self._instance
         if merged:

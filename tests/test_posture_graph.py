@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import PostureGraph, sample_postures, spread_out
+from coartic.baselines.posture_graph import PostureGraph, move_other_arm, sample_postures
 from tests.support.strategies import changed
 
 TASKS = {
@@ -80,7 +80,7 @@ def test_a_free_arm_is_spread_over_its_way():
     task = TASKS["two-armed-2"]
     graph = PostureGraph.sampled(task, 10, np.random.default_rng(6))
     ((hands, chain),) = graph.chains(("left", "right", "right", "left"))
-    spread = spread_out(task, hands, chain)
+    spread = move_other_arm(task, hands, chain)
     left = task.robot.joints("left")
     first, last = chain[0, left], chain[3, left]
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
