@@ -124,5 +124,5 @@ def fewest_ticks(
 
 
 def fewer(one: Execution, other: Execution) -> bool:
-    """Whether an execution takes fewer ticks than another one, or as many with fewer corrections."""
+    """Whether one takes fewer ticks than the other, or as many and fewer corrections."""
     return (one.ticks, one.corrections) < (other.ticks, other.corrections)
