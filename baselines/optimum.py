@@ -184,7 +184,7 @@ class Multistart(Optimum):
     quick: ClassVar[dict[str, Any]] = {"starts": 2}
 
     def why_not(self, task: Task) -> str | None:
-        """More hand sequences than can be planned one by one."""
+        """The reason why there are too many hand sequences to plan one by one, if there are."""
         return too_many_sequences(task, len(task.hands))
 
     def starts(self, session: Session, task: Task) -> Iterator[Chain]:

@@ -14,7 +14,7 @@ from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
 
-METHODS = (*random_search.METHODS, *cma_es.METHODS)
+METHODS = (random_search.Pure, random_search.Climbing, *cma_es.METHODS)
 ONE_GOAL = tiny_task(
     hands=["right"],
     goals=[[-3.0, 0.0]],
