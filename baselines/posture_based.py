@@ -53,8 +53,8 @@ _RETRIEVED = 40  # steps for a stored posture, which may be far off
 _GENERATED = 3  # steps for a generated one, which is close by
 _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _SPREAD = 1.0  # largest SD of stored postures about the starting posture, rad
-_WIDEST = 0.3  # first SD of the diffusion, length unit (base) or rad (joints)
-_FINEST = 0.01  # last SD of the diffusion, as a part of the first
+_FIRST_SD = 0.3  # first SD of the diffusion, length unit (base) or rad (joints)
+_LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
 _PLANS_AT_ONCE = 16  # more take memory, and no less time
 
 
@@ -157,7 +157,7 @@ class GrowingPlan:
     """Expected ticks of each movement."""
 
 
-class Seed(NamedTuple):
+class Neighbourhood(NamedTuple):
     """The postures for successive goals around which others are generated."""
 
     q: Array
@@ -278,15 +278,15 @@ class PosturePlanner:
                 retrieved[i][goal, hand] = candidates[reached]
         return retrieved
 
-    def seeds(self, plan: GrowingPlan, retrieved: Layers, goals: range) -> list[Seed]:
-        """A seed for each choice of hands that all have a posture."""
+    def seeds(self, plan: GrowingPlan, retrieved: Layers, goals: range) -> list[Neighbourhood]:
+        """A neighbourhood for each choice of hands that all have a posture."""
         seeds = []
         for hands in itertools.product(*(plan.options[goal] for goal in goals)):
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
                 promising = self.most_promising(plan.q, hands, layers)
                 noise = plan.noise.pop(0) if plan.noise else self.draw_noise(goals)
-                seeds.append(Seed(plan.q, hands, promising, noise))
+                seeds.append(Neighbourhood(plan.q, hands, promising, noise))
         return seeds
 
     def out_of_reach(self, plan: GrowingPlan, retrieved: Layers) -> MethodError:
@@ -317,13 +317,15 @@ class PosturePlanner:
         i = near[i]
         return np.stack([first[i], np.where(used, second[j], first[i])])
 
-    def generate(self, seeds: list[Seed], goals: range) -> list[tuple[float, HandSequence, Array]]:
+    def generate(
+        self, seeds: list[Neighbourhood], goals: range
+    ) -> list[tuple[float, HandSequence, Array]]:
         """The cheapest postures ``(goals, dof)`` found around each seed by the deadline, after
         their cost and their hands."""
         start = np.stack([seed.q for seed in seeds])[:, None]
         centre = best = np.stack([seed.promising for seed in seeds])
         costs = path_length(start[:, 0], best)
-        for number, sd in enumerate(_WIDEST * np.geomspace(1.0, _FINEST, self.rounds)):
+        for number, sd in enumerate(_FIRST_SD * np.geomspace(1.0, _LAST_SD, self.rounds)):
             noise = sd * np.stack([seed.noise[number] for seed in seeds])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
@@ -342,7 +344,7 @@ class PosturePlanner:
         return list(zip(costs.tolist(), (seed.hands for seed in seeds), best, strict=True))
 
     def correct_generated(
-        self, start: Array, postures: Array, seeds: list[Seed], goals: range
+        self, start: Array, postures: Array, seeds: list[Neighbourhood], goals: range
     ) -> Mask:
         """Correct generated postures ``(seeds, BATCH, goals, dof)`` in place; True, shape
         ``(seeds, BATCH)``, where all hands are there. ``start`` has shape ``(seeds, 1, dof)``."""
