@@ -39,7 +39,7 @@ _PLANS_EXECUTED = 8  # one for each hand sequence, in the planner's mind
 
 
 class BeliefParameters(Parameters):
-    """What is believed, and how long is searched."""
+    """The belief, and the effort of the search."""
 
     belief: Annotated[float, Field(ge=0, le=10)] = 1.0
     """Share of the penalty that the planner takes into account."""
@@ -52,12 +52,12 @@ class BeliefParameters(Parameters):
 
 
 class LearnerParameters(BeliefParameters, DualProcessParameters):
-    """Those of the plan and those of the learner."""
+    """Parameters of the plan and of the learner."""
 
     belief: Annotated[float, Field(ge=0, le=10)] = 0.0
 
 
-def planned(
+def best_plan(
     session: Session, task: Task, parameters: BeliefParameters
 ) -> tuple[tuple[Movement, ...], dict[str, Any]]:
     """The plan that is best by the believed reward, and details of it."""
@@ -97,7 +97,7 @@ def planned(
 def shortest(
     task_json: str, search: BeliefParameters, model: MotionModel
 ) -> tuple[ShortestPlans, dict[str, int]]:
-    """The shortest plans of a task without a penalty, given as JSON, and what they took.
+    """The shortest plans of a task without a penalty, given as JSON, and the solver's counters.
 
     Every belief starts from them, and all variants of a task have the same: they are found once.
     """
@@ -152,7 +152,7 @@ def with_belief(task: Task, belief: float) -> Task:
 
 
 def cost_of(believed: Task, start: Chain) -> float:
-    """What a start would cost as it is by the believed reward, ticks."""
+    """Cost of a start by the believed reward, without polishing, ticks."""
     hands, configurations = start
     steps = np.diff(np.vstack([believed.q0, configurations]), axis=0)
     lost = penalties(believed, [hands], configurations[None]).sum()
@@ -172,7 +172,7 @@ class BelievedReward(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan, and hand over the best plan."""
-        return Result(*planned(session, session.hand_over(*self.told), self.parameters))
+        return Result(*best_plan(session, session.hand_over(*self.told), self.parameters))
 
 
 class FromPlanEC1(DualProcess):
@@ -187,7 +187,7 @@ class FromPlanEC1(DualProcess):
 
     def first_trial(self, sessions: Sequence[Session], task: Task) -> tuple[Movement, ...]:
         """The plan: one for all sessions, since each would find the same."""
-        plan, _ = planned(sessions[0], task, self.parameters)
+        plan, _ = best_plan(sessions[0], task, self.parameters)
         spent = {name: getattr(sessions[0].meter, name) for name in Meter.SOLVER}
         for session in sessions[1:]:
             session.spend(**spent)

@@ -124,7 +124,7 @@ class Node:
     """Bound on the path."""
     problem: Subproblem = field(compare=False)
     point: Array = field(compare=False)
-    """Where the relaxation has its minimum."""
+    """The relaxation's minimiser."""
     lagrangian: Lagrangian = field(compare=False)
 
 
@@ -201,12 +201,12 @@ class ProofSearch:
         else:
             root = self.relaxation(problem.hands, problem.merged)
             for box in root.split(problem.box, node.point):
-                # What is known of the whole may rule a half out, without a programme.
+                # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
 
     def goal_to_decide(self, node: Node, bounded: bool) -> int | None:
-        """The goal whose undecided hand is farthest off, if that is what comes first."""
+        """The goal whose undecided hand is farthest off; None if an angle is to be split first."""
         unknown = [g for g, hand in enumerate(node.problem.hands) if hand is None]
         if not unknown:
             return None
@@ -243,7 +243,7 @@ class ProofSearch:
             self.add(Subproblem(hands, problem.merged, still_open, box), node.length)
 
     def add(self, problem: Subproblem, parent: float) -> None:
-        """Bound a subproblem, and keep what is left of it."""
+        """Bound a subproblem; add it to the open ones if its bound is too low."""
         if problem.moves >= self._ticks:
             return
         root = self.relaxation(problem.hands, problem.merged)

@@ -2,8 +2,8 @@
 
 Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) over the
 targets of all its explored joints, which sees the total reward of each trial and nothing
-else. Its first mean is what the corrective process **A** alone makes of the sequence, which
-takes one trial; its first step size is the learner's noise; where it stops by its own
+else. Its first mean are the configurations of the corrective process **A** alone, which takes
+one trial; its first step size is the learner's noise; where it stops by its own
 criteria it begins anew there with twice the population (IPOP, Auger & Hansen 2005). A
 failed trial ranks last. Two forms differ in which strategy makes the next generation of trials:
 
@@ -63,7 +63,7 @@ class Strategy:
         self._restarts = -1
 
     def generation(self) -> None:
-        """One generation of trials, or what is left of the trials."""
+        """Make one generation of trials, or the trials that are left."""
         if self._restarts < 0 or self._evolution.stop():
             self._restart()
         values = np.array(self._evolution.ask())[: self._practice.left]

@@ -259,8 +259,7 @@ class Controller:
         return changes
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """How changes of the joints bring a hand within each face of a goal, ``(FACES, joints)``,
-        and how far it is outside of each, ``(FACES,)``, length unit."""
+        """A, ``(FACES, joints)``, and b, ``(FACES,)``, of the module's docstring, length unit."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
         error = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)

@@ -2,8 +2,8 @@
 
 Reward is lost in proportion to the joint-space path, so the shortest path that touches
 every disc is sought over all hand sequences: once from the chains of a posture graph
-(layered dynamic programming), once from many random starts around what the corrective
-process finds. Either way every plan is then rounded to whole control ticks in every way,
+(layered dynamic programming), once from many random starts around the configurations of the
+corrective process. Either way every plan is then rounded to whole control ticks in every way,
 with and without goals that are hit as their turn comes because the other hand is already
 there. A reference for the gaps of all other methods, not a competitor.
 """
@@ -53,7 +53,7 @@ class GraphParameters(OptimumParameters):
 
 
 class BoundParameters(GraphParameters):
-    """Those of the posture graph, and how long the proof may take."""
+    """Parameters of the posture graph, and the budget of the proof."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
     """Cone programmes that may be solved for it, some 500 a second with five goals. The search
@@ -168,7 +168,7 @@ class BranchAndBound(DynamicProgramming):
 
 
 class Multistart(Optimum):
-    """From random starts around what the corrective process finds."""
+    """From random starts around the configurations of the corrective process."""
 
     name = "optimum/multistart"
     title = "Optimum: random starts for every hand sequence"

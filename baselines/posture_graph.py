@@ -78,7 +78,7 @@ class Beginning:
 
     hands: tuple[Hand, ...]
     nodes: dict[Hand, Array]
-    """Of each hand, where it may be."""
+    """Nodes of the layer in which each hand was last used."""
     cost: Array
     """``cost[i, j]``: the cheapest way to node i of the hand used last and j of the other."""
     back: tuple[NDArray[np.int32], ...]
@@ -95,12 +95,12 @@ class PostureGraph:
     spent: Counter[str] = field(default_factory=Counter)
     """Kinematics evaluated while sampling."""
     costs: Array | float = 1.0
-    """What the movement of each joint costs, shape ``(dof,)``, or of all of them."""
+    """Cost of the movement of each joint, shape ``(dof,)``, or of all joints."""
     penalty: Penalty | None = None
-    """What goals cost beside the length of the path."""
+    """A penalty beside the length of the path."""
 
     @classmethod
-    def sampled(
+    def sample(
         cls,
         task: Task,
         count: int,
@@ -148,7 +148,7 @@ class PostureGraph:
             yield self.chain_of(complete)
 
     def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
-        """Why there is no chain: the first goal without a posture; empty where there is one."""
+        """The reason why there is no chain, a goal without a posture; empty if there is a chain."""
         for goal in range(len(self.task.goals)):
             hands = self.task.hands if only is None else (only[goal],)
             if not any(len(self.layers[goal, hand]) for hand in hands):
@@ -190,10 +190,10 @@ class PostureGraph:
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
     def penalties(self, goal: int, hand: Hand, bases: Array, arms: Array) -> tuple[Array, Array]:
-        """What hitting a goal (0-based) in each of its nodes costs beside the way, as a length.
+        """The penalty of hitting a goal (0-based) in each of its nodes, as a length.
 
         In two parts, by the node that the base comes from and by the one that the arm comes from,
-        with what the posture alone costs: shape ``(before, after)`` each.
+        with the penalty of the posture itself: shape ``(before, after)`` each.
         """
         layer, robot, penalty = self.layers[goal, hand], self.task.robot, self.penalty
         by_base, by_arm = np.zeros((len(bases), len(layer))), np.zeros((len(arms), len(layer)))
@@ -248,14 +248,14 @@ def cheapest_chains(
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
     :meth:`PostureGraph.chains`, ``costs`` of joints and ``penalty`` as in
-    :class:`PostureGraph`. The session spends what it takes.
+    :class:`PostureGraph`. The session counts the effort.
 
     With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
     MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sampled(task, nodes, rng, costs, penalty)
+        graph = PostureGraph.sample(task, nodes, rng, costs, penalty)
         session.spend(**graph.spent)
         missing = graph.why_none(only)
         if missing:

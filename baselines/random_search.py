@@ -145,12 +145,12 @@ class RandomSearch:
             if hands not in self.centres:
                 self._begin(hands)
                 continue
-            # What comes next is known until a centre moves, which is rare.
+            # The next draws are known until a centre moves, which is rare.
             state = self._rng.bit_generator.state
             drawn, following = self._ahead(hands, best, min(ahead, self._practice.left))
             tried, moved = self._around(drawn)
             ahead = min(2 * ahead, _MOST_DRAWN)
-            if moved:  # then what was drawn beyond that was not to come
+            if moved:  # then the draws beyond that one are not valid
                 self._rng.bit_generator.state = state
                 self._ahead(hands, best, tried)
                 following, ahead = None, tried
@@ -179,7 +179,7 @@ class RandomSearch:
         return drawn, hands
 
     def _around(self, drawn: list[tuple[str, Array]]) -> tuple[int, bool]:
-        """Make trials up to the first that moves its centre; how many, and whether one did."""
+        """Make trials up to the first that moves its centre: their number, and whether one did."""
         centres = [self.centres[hands] for hands, _ in drawn]
         values = [centre.values + noise for centre, (_, noise) in zip(centres, drawn, strict=True)]
         than = np.array([centre.reward for centre in centres])

@@ -17,7 +17,7 @@ at every goal with a horizon of 0. ``path_length`` in the details has no such lo
 plans as they were before the rounding, from where the robot stood.
 
 The horizon limits choice of hand and posture alike. With ``hands`` ``optimal`` it limits postures
-alone: the hands are those of the plan with all goals. What the hands alone lose, followed by the
+alone: the hands are those of the plan with all goals. The loss by the hands alone, with the
 best postures, is in the details of the searches for the optimum, ``path_lengths`` by hand
 sequence.
 
@@ -55,7 +55,7 @@ from coartic.tasks.task import MOST_GOALS, Start, hands_of
 
 
 class RecedingHorizonParameters(Parameters):
-    """How far it looks ahead, what it minimises, and how long it searches."""
+    """The horizon, the cost, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Goals in view beyond the one to be hit; all where there are no more."""

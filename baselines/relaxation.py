@@ -172,7 +172,7 @@ class Relaxation:
         return multipliers, np.nan_to_num(np.array(solution.x)), solution.iterations
 
     def lagrangian(self, multipliers: Multipliers, longest: float) -> Lagrangian:
-        """What multipliers say of the paths that are no longer than ``longest``."""
+        """The Lagrangian of multipliers, for paths that are no longer than ``longest``."""
         weights = multipliers.pulls.copy()
         weights[:-1] -= multipliers.pulls[1:]
         turns = weights.ravel()[self._joint_columns]
@@ -192,7 +192,7 @@ class Relaxation:
         return Lagrangian(constant, slopes, sizes, towards)
 
     def wrong(self, point: Array) -> Array:
-        """How far each link's end is from where its angle puts it, ``(links,)``, length unit."""
+        """Error of each link's end against its angle, shape ``(links,)``, length unit."""
         relaxed = np.stack([point[self._directions], point[self._directions + 1]], axis=1)
         error = np.linalg.norm(relaxed - directions(self._angles @ point), axis=1)
         return np.asarray(error * self._lengths)
@@ -200,7 +200,7 @@ class Relaxation:
     def split(self, box: Array, point: Array) -> tuple[Array, Array]:
         """Two halves, across the angle whose direction the relaxation has most wrong.
 
-        Weighting what is wrong by the forces, or by what it costs the Lagrangian, took up to
+        Weighting the errors by the forces, or by their cost in the Lagrangian, took up to
         fifty times as many nodes.
         """
         wrong, width = self.wrong(point), box[:, 1] - box[:, 0]
@@ -214,11 +214,11 @@ class Relaxation:
         return below, above
 
     def configurations(self, point: Array) -> Array:
-        """Those of a minimiser, shape ``(G, dof)``."""
+        """The configurations of a minimiser, shape ``(G, dof)``."""
         return point[: self._stiff.size].reshape(self._stiff.shape)
 
     def lay_out(self, fixed: Array) -> None:
-        """Where the entries of the half-spaces stand, below the rows that are fixed."""
+        """Store the places of the half-spaces' entries, below the rows that are fixed."""
         links = len(self._directions)
         turned, angle_columns = np.nonzero(self._angles)  # of each link, its angle's joints
         self._turned = turned
@@ -257,12 +257,12 @@ class Relaxation:
 
 
 class Multipliers(NamedTuple):
-    """What the relaxation's constraints are weighted with."""
+    """Weights of the relaxation's constraints."""
 
     pulls: Array
-    """Of the movements, shape ``(G, dof)``, each of norm at most 1 over what may move."""
+    """p of the movements, shape ``(G, dof)``, of norm at most 1 over the joints that may move."""
     forces: Array
-    """Of the hands at their goals, shape ``(G, 2)``."""
+    """λ of the hands at their goals, shape ``(G, 2)``."""
 
 
 @dataclass(frozen=True)
@@ -318,7 +318,7 @@ class Lagrangian:
 
 
 def disc_of(task: Task, arm: Arm | None) -> tuple[Array, float]:
-    """Where the shoulder is from the base, and the radius of the goal for that arm's hand.
+    """Position of the shoulder from the base, and the radius of the goal for that arm's hand.
 
     For an undecided hand (None): the middle of the shoulders, and how far it may be from the
     goal while either hand is within the goal.

@@ -1,6 +1,6 @@
 """The shortest path over all hand sequences, in whole control ticks.
 
-What the searches for the optimum and the planner with a receding horizon share: each start is
+Shared by the searches for the optimum and the planner with a receding horizon: each start is
 polished by IPOPT, the shortest plan of each hand sequence is kept, and every plan that may be
 the best one is rounded to whole ticks in every way, with and without goals that are hit as their
 turn comes because the other hand is already there.
@@ -23,7 +23,7 @@ KNOWS_REWARD = MODEL_BASED | {Information.REWARD_FORMULA}
 
 
 class ShortestPlans(NamedTuple):
-    """What polishing many starts came to."""
+    """The plans that many starts led to."""
 
     by_hands: dict[HandSequence, tuple[Instance, PathPlan]]
     """The shortest plan of each hand sequence that has one."""

@@ -72,11 +72,11 @@ class SmoothParameters(TrajectoryParameters):
     """Times at which the goals are hit: free at a constant total, or equal intervals."""
     stop: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     """From passing through a goal (0) to a full stop at it (1): velocities there, for jerk
-    accelerations too, are at most 1 - ``stop`` of what they are in the cheapest plan of the
+    accelerations too, are at most 1 - ``stop`` of those in the cheapest plan of the
     same hands that passes through, joint by joint. The model is kinematic. Its plans have no
     torques, inertia, delays, feedback or limit of speed, its score counts steps along the
     path whatever their times, and it cannot say when a person stops, or why: a stop here is
-    given, and shows only what is left to a plan that makes it."""
+    given, and shows only the effect on a plan that makes it."""
     stop_every: Annotated[int, Field(ge=1)] = 1
     """The plan stops at each goal whose number is a multiple of this; it passes the others."""
 
@@ -197,7 +197,7 @@ class TrajectoryOptimisation(Method):
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         return movements(session, task, instance, plan.configurations)
 
 
@@ -223,7 +223,7 @@ class PathLength(TrajectoryOptimisation):
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         if not self.parameters.whole_ticks:
             return super().movements_of(session, task, instance, plan)
         problem = self.problem(task)
@@ -288,7 +288,7 @@ class Acceleration(TrajectoryOptimisation):
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
 
 

@@ -61,7 +61,7 @@ def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms, monkey
     search = BelievedReward.Parameters(**QUICK)
     plans = cheapest(Session(task, 0, BelievedReward.told, trusted=True), task, search, [])
     seen = [(plan.cost, i.hands, plan.configurations) for i, plan in plans.ranked]
-    graph = PostureGraph.sampled(task, 30, np.random.default_rng(0), penalty=task.penalty)
+    graph = PostureGraph.sample(task, 30, np.random.default_rng(0), penalty=task.penalty)
     costs, chain_of = [], PostureGraph.chain_of
 
     def noted(self, complete):

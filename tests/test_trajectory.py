@@ -87,7 +87,7 @@ def test_a_goal_in_line_with_a_straight_arm_is_reached_by_the_base_alone():
 def test_plans_agree_with_another_optimiser(cost, hands, still):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
-    graph = PostureGraph.sampled(task, 60, np.random.default_rng(0))
+    graph = PostureGraph.sample(task, 60, np.random.default_rng(0))
     ((_, chain),) = graph.chains(hands)
     problem = trajectory_problem(task.robot, task.hands, 2, cost)
     plan = problem.solve(instance, chain)
