@@ -19,13 +19,13 @@ from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
-from coartic.baselines.posture_graph import Chain, cheapest_chains
+from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
 from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.corrective import correct
 from coartic.motion.initial import hand_sequences, too_many_sequences
-from coartic.robot import Array, Hand
+from coartic.robot import Array
 from coartic.tasks.task import hands_of, letters_of
 
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
@@ -198,7 +198,7 @@ class Multistart(Optimum):
                 yield hands, start + spread * rng.standard_normal(start.shape)
 
 
-def correct_each_goal(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
+def correct_each_goal(session: Session, task: Task, hands: HandSequence) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):

@@ -76,7 +76,7 @@ def sample_postures(
 class Beginning:
     """The cheapest chains of nodes for the beginning of a hand sequence."""
 
-    hands: tuple[Hand, ...]
+    hands: HandSequence
     nodes: dict[Hand, Array]
     """Nodes of the layer in which each hand was last used."""
     cost: Array
@@ -127,27 +127,29 @@ class PostureGraph:
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
         return cls(task, layers, spent, costs, penalty)
 
-    def chains(
-        self, only: tuple[Hand, ...] | None = None, most: int | None = None
-    ) -> Iterator[Chain]:
+    def chains(self, only: HandSequence | None = None, most: int | None = None) -> list[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
-        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
-        sequences, goal by goal, as many are kept as are cheapest; none is lost while there
-        are no more than that.
+        ``only`` and ``most`` as in :meth:`sequences`.
         """
-        begun = Beginning(
-            (), dict.fromkeys(HANDS, np.array(self.task.q0)[None, :]), np.zeros((1, 1)), ()
-        )
-        kept = [begun]
+        return [self.chain_of(complete) for complete in self.sequences(only, most)]
+
+    def sequences(self, only: HandSequence | None, most: int | None) -> list[Beginning]:
+        """The cheapest chains of whole hand sequences, with their costs.
+
+        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
+        sequences, goal by goal, the cheapest are kept; none is lost while there are no more
+        than that.
+        """
+        start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
+        kept = [Beginning((), start, np.zeros((1, 1)), ())]
         for _ in range(len(self.task.goals)):
             longer = [more for beginning in kept for more in self.longer(beginning, only)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        for complete in kept:
-            yield self.chain_of(complete)
+        return kept
 
-    def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
+    def why_none(self, only: HandSequence | None = None) -> str:
         """The reason why there is no chain, a goal without a posture; empty if there is a chain."""
         for goal in range(len(self.task.goals)):
             hands = self.task.hands if only is None else (only[goal],)
@@ -158,7 +160,7 @@ class PostureGraph:
                 )
         return ""
 
-    def longer(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Beginning]:
+    def longer(self, begun: Beginning, only: HandSequence | None) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
         goal = len(hands)
