@@ -23,7 +23,6 @@ _LIBRARIES = (
     "casadi",
     "clarabel",
     "cma",
-    "cvxpy",
     "daqp",
     "llvmlite",
     "numba",

@@ -35,7 +35,7 @@ def planned(cost, name=TASK.name, **parameters):
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
     hands = hands_of(task.initial_hands)
     instance = Instance.of(task, hands, still=False, radius=task.radius - PAPER.arrival_tolerance)
-    plan = method.cheapest(session, problem, instance, method.starts(session, task, hands)[hands])
+    plan = method.cheapest(session, problem, instance, method.starts(session, task)[hands])
     assert plan.converged
     return plan
 
@@ -121,7 +121,7 @@ def test_full_stops_at_equal_times_are_the_plan_of_squared_changes(cost, name):
 def test_what_is_handed_over_is_executed_without_corrections(cost):
     method = BY_COST[cost]
     for stops in ({}, {"stop_every": 2}):
-        parameters = method.Parameters(**QUICK, hands="given", stop=1.0, **stops)
+        parameters = method.Parameters(**QUICK, most_sequences=1, stop=1.0, **stops)
         result = method(parameters).solve(Session(TASK, 0, method.told, trusted=True))
         execution = execute(TASK, result.solution)
         assert (execution.completed, execution.corrections) == (True, 0)
