@@ -63,7 +63,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.cascade import solve_cascade
+from coartic.baselines.cascade import solve_cascade, state_cascade
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.initial import changes_of_hand, too_many_sequences
@@ -125,6 +125,8 @@ class Controller:
     """Ticks from one control step to the next."""
     inertia: float = 0.0
     """Share of the rates of the step before in those preferred now."""
+    modelling: Literal["none", "cvxpy"] = "none"
+    """Whether cvxpy states the programmes, or their matrices go to the solver as they are."""
     solves: int = 0
     """Quadratic programmes solved so far."""
 
@@ -253,7 +255,8 @@ class Controller:
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
         """The cascade's changes of the joints; the session counts the iterations."""
-        changes, iterations = solve_cascade(rows, least, preferred)
+        solve = solve_cascade if self.modelling == "none" else state_cascade
+        changes, iterations = solve(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=iterations)
         return changes
@@ -286,6 +289,8 @@ class NullspaceParameters(Parameters):
     objective (the other one where it does not get there)."""
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
+    modelling: Literal["none", "cvxpy"] = "none"
+    """``cvxpy``: the programmes as cvxpy states them, for readers; the same, and slower."""
 
 
 class NullspaceQP(Method):
@@ -324,7 +329,9 @@ class NullspaceQP(Method):
     def solve(self, session: Session) -> Result:
         """Simulate the candidate hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
-        controller = Controller(session, task, self.parameters.period, self.inertia)
+        controller = Controller(
+            session, task, self.parameters.period, self.inertia, self.parameters.modelling
+        )
         with session.solving():
             ordered = [hand for hand in HANDS if hand in task.hands]
             candidates = (

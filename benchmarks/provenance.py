@@ -23,6 +23,7 @@ _LIBRARIES = (
     "casadi",
     "clarabel",
     "cma",
+    "cvxpy",
     "daqp",
     "llvmlite",
     "numba",

@@ -110,7 +110,7 @@ assert not ours, f"imported with the package: {sorted(ours)}"
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
 from coartic.benchmarks.worker import _method
 assert _method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
-assert not {"casadi", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
+assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
 from pkgutil import iter_modules

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, execute, load_task
-from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade
+from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade, state_cascade
 from coartic.baselines.nullspace_qp import FACES, METHODS, Aim, Controller, NextGoal, NullspaceQP
 from coartic.method import MethodError, Session
 from coartic.robot import directions
@@ -83,6 +83,7 @@ def test_both_levels_of_a_disc_are_as_near_as_a_general_solver_finds(far, prefer
         assert np.abs(changes).max() <= LIMIT + 1e-9
         assert (demand - rows @ changes).max() < 1e-4
         np.testing.assert_allclose(changes, nearest, atol=2e-3)
+        np.testing.assert_allclose(state_cascade(rows, least, wanted)[0], changes, atol=1e-5)
         moved += np.linalg.norm(changes - wanted) > 1e-3
         bound += np.abs(changes).max() > LIMIT - 1e-6
     assert moved > 3
