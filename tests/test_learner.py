@@ -346,7 +346,7 @@ def test_a_subtask_is_credited_with_its_return(discount):
         {"discount": 0.5},
         {"discount": 1.0},
         {"discount": 0.9, "state": "goal", "ties": "previous"},
-        {"discount": 0.3, "update": "not-less", "first_trial": "forgotten"},
+        {"discount": 0.3, "first_trial": "forgotten"},
     ],
 )
 def test_credit_of_subtasks_equals_the_slow_learner(fields):

@@ -33,7 +33,6 @@ Ties = Literal["left", "right", "random", "nearest", "previous"]
 EqualDistance = Literal["random", "computed"]
 FirstTrial = Literal["learns", "forgotten"]
 UnknownTarget = Literal["corrects", "explores"]
-Update = Literal["greater", "not-less"]
 Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
 State = Literal["previous-hand", "goal"]
@@ -76,8 +75,6 @@ class ExplorationCondition:
     unknown_target: UnknownTarget = "corrects"
     """Of a pair (s, a) without a stored target: **A** acts at once, or first the noise, from
     where the robot stands."""
-    update: Update = "greater"
-    """Whether a trial replaces what is stored where R > Q, or where R >= Q."""
     state: State = "previous-hand"
     """What Q and q* are learned for: a goal and the hand before it, or a goal alone."""
     learned: Learned = "best"

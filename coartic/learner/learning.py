@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -40,6 +39,7 @@ from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
 from coartic.text import short_repr
+from coartic.threads import threads_for
 
 TRIALS = 10_000  # trials of one run (printed)
 METHOD_PREFIX = "dual-process/"
@@ -312,15 +312,6 @@ def learn_many(
 
 _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
-
-
-def threads_for(jobs: int) -> int:
-    """A number of threads or processes as it is asked for: -1 for one a core."""
-    if jobs > 0:
-        return jobs
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def learn_together(

@@ -235,7 +235,7 @@ def move_lanes(
                 between = q[j] + fraction * (target[j] - q[j])
                 q[j] = target[j] if at_end else between
             run.hit = at.fate[lane] == _HIT
-            run.ticks = int(at.step[lane]) + model.arrival_tick
+            run.ticks = int(at.step[lane]) + 1
             run.evaluations += evaluations
             count -= 1
             fill(lanes.moved, lane, count)
@@ -345,7 +345,7 @@ def follow(
     if model.first_step and last:
         inside = inside[inside > 0]
     k = int(inside[0]) if inside.size else last
-    return MoveResult(np.array(points[k]), k + model.arrival_tick, bool(inside.size), k + 1)
+    return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:

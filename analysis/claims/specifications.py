@@ -17,18 +17,15 @@ from dataclasses import replace
 from itertools import repeat
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
-from coartic.learner.learning import threads_for
 from coartic.runs.plan import variant_of
-from coartic.tasks.catalogue import task_of, with_members
+from coartic.tasks.catalogue import is_admitted, task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
-from coartic.threads import begin_worker, one_thread_each
+from coartic.threads import begin_worker, one_thread_each, threads_for
 
 COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
@@ -41,7 +38,7 @@ spaces between them; the task whose goals are of a member, and the member, both 
 goals are the default ones."""
 
 
-def judged_specifications(
+def judge_specifications(
     studies: Iterable[Study],
     *,
     claims: Iterable[Claim] = PAPERS,
@@ -91,15 +88,12 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
 
 
 def admitted_members(study: Study, task: str) -> list[str]:
-    """Members in a folder that meet every constraint, the first of those with the same goals."""
+    """Members in a folder that are admitted, the first of those with the same goals."""
     goals: dict[Any, str] = {}
     for name in study.plan.tasks:
-        if task_of(name) == task:
+        if task_of(name) == task and is_admitted(name):
             goals.setdefault(study.tasks[name].goals, name)
-    if not goals:
-        return []
-    fits = search_for(task, jobs=1).meets_all(np.array(list(goals)))
-    return [name for name, fit in zip(goals.values(), fits, strict=True) if fit]
+    return list(goals.values())
 
 
 def study_as(study: Study, names: Mapping[str, str]) -> Study:
