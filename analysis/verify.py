@@ -107,7 +107,7 @@ def stored_task(definition: str, model: str) -> Any:
     return task
 
 
-class Move(NamedTuple):
+class MoveRow(NamedTuple):
     """A movement as it is stored."""
 
     order: int  # from 0
@@ -146,7 +146,7 @@ def path(q: Floats, waypoints: list[Floats], model: Any) -> Floats:
     return points
 
 
-def make(task: Any, q: Floats, movement: Move) -> tuple[Floats, int, bool]:
+def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     """Make a movement from q: where it stops, after how many ticks, and whether that is a hit."""
     _, goal, hand, kind, _, target, waypoints = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
@@ -165,7 +165,7 @@ def make(task: Any, q: Floats, movement: Move) -> tuple[Floats, int, bool]:
     return points[:, k], k + 1, bool(hits[k])
 
 
-def recompute(task: Any, movements: list[Move]) -> tuple[int, str, int, float]:
+def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Reward, hands, corrections made, and travel of the arms not chosen, from hit to hit, in rad.
     Raises ValueError where a movement breaks a rule or takes other ticks than are stored."""
     check_rules(task, movements)
@@ -213,7 +213,7 @@ def penalty(task: Any, goal: int, hand: str, before: Floats, q: Floats) -> int:
     return math.floor(lost + 0.5)
 
 
-def check_rules(task: Any, movements: list[Move]) -> None:
+def check_rules(task: Any, movements: list[MoveRow]) -> None:
     """Raises ValueError where movements break a rule, whatever comes of them."""
     goals = [movement.goal for movement in movements]
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
@@ -281,7 +281,7 @@ def check_all(db: sqlite3.Connection) -> Report:
     return Report(runs, movements, wrong, [*UNCHECKED, f"Runs without a solution: {unsolved}."])
 
 
-def fingerprint(row: Any, parts: dict[str, list[Move]]) -> str:
+def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
     """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
     rewards = np.frombuffer(zlib.decompressobj().decompress(row["rewards"] or b""), "<i4").tolist()
     content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
@@ -291,9 +291,9 @@ def fingerprint(row: Any, parts: dict[str, list[Move]]) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
-def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[Move]]:
+def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[MoveRow]]:
     """The movements of a run, by the solution that they belong to."""
-    parts: dict[str, list[Move]] = {part: [] for part in STATED}
+    parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     waypoints = defaultdict[int, list[Floats]](list)
     where = 'WHERE result_id = ? ORDER BY "order"'
     query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
@@ -303,7 +303,7 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
     query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
     for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
         points = waypoints.pop(order, []) if part == "solution" else []
-        parts[part].append(Move(order, goal, hand, kind, ticks, np.array(q, float), points))
+        parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.array(q, float), points))
     need(not waypoints, "it has waypoints of no movement")
     return parts
 

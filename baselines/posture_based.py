@@ -35,9 +35,9 @@ from pydantic import Field
 
 from coartic import Movement, Task
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.compiled import entry, inner, joint_lever
+from coartic.motion.compiled import chain_by, entry, joint_lever
 from coartic.motion.initial import too_many_sequences
-from coartic.robot import BASE_DOF, Array, Hand, chain
+from coartic.robot import BASE_DOF, Array, Hand
 from coartic.tasks.task import hands_of
 
 Mask = NDArray[np.bool_]
@@ -144,9 +144,6 @@ class TwoGoals(PostureBased):
     horizon = 2
 
 
-_chain = inner(chain)
-
-
 @entry
 def reach_kernel(
     postures: Any,
@@ -168,7 +165,7 @@ def reach_kernel(
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
-        _chain(postures[row], arm, xs, ys, math.cos, math.sin)
+        chain_by(postures[row], arm, xs, ys, math.cos, math.sin)
         miss_x = x - xs[tip]
         miss_y = y - ys[tip]
         distance = math.hypot(miss_x, miss_y)

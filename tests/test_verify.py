@@ -212,7 +212,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     else:
         stops = {"stop_on_arrival": kind == "learned" or model.corrective_arrival}
         due = move(robot, q, target, hand, goal, judge.radius, model=model, **stops)
-    movement = checker.Move(0, 1, hand, kind, 0, target, [middle, target])
+    movement = checker.MoveRow(0, 1, hand, kind, 0, target, [middle, target])
     stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 

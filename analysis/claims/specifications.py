@@ -27,7 +27,7 @@ from coartic.tasks.catalogue import is_admitted, task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
 from coartic.threads import begin_worker, one_thread_each, threads_for
 
-COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+ROW = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
 VERDICTS = ("supported", "not supported", "undecided")
 
@@ -66,7 +66,7 @@ def judge_specifications(
             judgeable |= {(task, name) for name in claims_judged}
             progress(", ".join(filter(None, (member, *readings.split()))) or "default")
     kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
-    return pd.DataFrame(kept, columns=list(COLUMNS))
+    return pd.DataFrame(kept, columns=list(ROW))
 
 
 def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
@@ -143,9 +143,9 @@ def judge_view(
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
             claims_judged.append(claim.id)
-        row: dict[str, Any] = dict(zip(COLUMNS, (*specification, claim.id), strict=False))
+        row: dict[str, Any] = dict.fromkeys(ROW, math.nan)
+        row |= zip(ROW, (*specification, claim.id), strict=False)
         row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
-        row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
         if finding.tests:
             first = finding.tests[0]
             row |= {"effect": first.estimate, "low": first.low, "high": first.high, "p": first.p}

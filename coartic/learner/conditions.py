@@ -25,6 +25,8 @@ from coartic.text import short_repr, unknown
 if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
+METHOD_PREFIX = "dual-process/"
+"""A condition or variant as a method has this before its id."""
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
@@ -159,7 +161,7 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
             "name of one, such as 'EC4'"
         )
     try:
-        return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
+        return (CONDITIONS | VARIANTS)[condition.removeprefix(METHOD_PREFIX)]
     except KeyError:
         ids = CONDITIONS | VARIANTS
         raise CoarticError(unknown("exploration condition", condition, ids)) from None

@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from coartic.learner.conditions import (
     CONDITIONS,
+    METHOD_PREFIX,
     MOST_NOISE,
     VARIANTS,
     EqualDistance,
@@ -25,7 +26,8 @@ from coartic.learner.conditions import (
     Ties,
     UnknownTarget,
 )
-from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
+from coartic.learner.learning import TRIALS, learn_many
+from coartic.learner.run import CORRECTIONS, LearningRun
 from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.motion.lanes import LANES
 from coartic.motion.solution import Movement
@@ -147,7 +149,8 @@ def _told(condition: ExplorationCondition) -> frozenset[Information]:
     return frozenset(told)
 
 
-def _method(condition: ExplorationCondition) -> type[DualProcess]:
+def method_for(condition: ExplorationCondition) -> type[DualProcess]:
+    """The learner under a condition as a method."""
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
     if condition.credit == "subtask":
@@ -176,5 +179,5 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
 
 
 METHODS: tuple[type[DualProcess], ...] = tuple(
-    map(_method, chain(CONDITIONS.values(), VARIANTS.values()))
+    map(method_for, chain(CONDITIONS.values(), VARIANTS.values()))
 )

@@ -31,7 +31,7 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
-_LONGEST_COMPILATION_S, _LOOK_S = 120.0, 0.05
+_LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -163,12 +163,12 @@ class MachineCode(FunctionCache):
             import fcntl
 
             file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "w")  # noqa: SIM115
-            for _ in range(round(_LONGEST_COMPILATION_S / _LOOK_S)):
+            for _ in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     self.lock = file
                     return True
-                time.sleep(_LOOK_S)
+                time.sleep(_RETRY_S)
             file.close()
         return False
 
@@ -251,11 +251,11 @@ def fill_row(row: Any, values: Any) -> None:
         row[j] = values[j]
 
 
-_chain = inner(chain)
+chain_by = inner(chain)
 joint_lever = inner(lever)
 
 
 @inner
 def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
     """:func:`coartic.robot.chain` with the kernels' cosine and sine."""
-    _chain(q, arm, xs, ys, cosine, sine)
+    chain_by(q, arm, xs, ys, cosine, sine)

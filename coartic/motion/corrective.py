@@ -31,7 +31,7 @@ from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 from coartic.text import short_repr
 
-_CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
+_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 
 
 class Corrector(NamedTuple):
@@ -66,7 +66,7 @@ def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
         error_y = goal.y - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
         fate = GOING if error < math.inf else _FAILED
-        at.fate[i] = _CONVERGED if error <= square else fate
+        at.fate[i] = _AT_GOAL if error <= square else fate
 
 
 @inlined
@@ -120,7 +120,7 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
                     continue
                 run = runs[at.run[lane]]
                 leave(at, lane, run.target)
-                run.converged = at.fate[lane] == _CONVERGED
+                run.converged = at.fate[lane] == _AT_GOAL
                 run.iterations = iteration + (at.fate[lane] == _STUCK)
                 run.evaluations += run.iterations + 1
                 count -= 1

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.compiled import inlined, inner, lanewise, record_type
+from coartic.motion.compiled import chain_by, inlined, inner, lanewise, record_type
 from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
-from coartic.robot import BASE_DOF, Arm, Robot, chain
+from coartic.robot import BASE_DOF, Arm, Robot
 
 LANES = 72
 """Most lanes at once: they and their rows stay in the innermost cache."""
@@ -184,9 +184,6 @@ def padded(count: int) -> int:
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
-_chain = inner(chain)
-
-
 @lanewise
 def near(at: Any, count: int) -> bool:
     """Whether all angles are surely small enough for the kernels' own cosine: by a bound."""
@@ -212,7 +209,7 @@ def chains_by(cos: Any, sin: Any) -> Any:
     def chains(at: Any, count: int) -> None:
         for i in range(count):
             arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
-            _chain(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
+            chain_by(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
 
     return chains
 

@@ -47,8 +47,8 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_HIT, _MISSED = 1.0, 2.0  # fates of a lane
-LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
+_IN_GOAL, _MISSED = 1.0, 2.0  # fates of a lane
+LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
 class Goal(NamedTuple):
@@ -182,7 +182,7 @@ def look(
             rim = model.arrival_tolerance + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
-        fate = _HIT if to_goal <= hit else fate
+        fate = _IN_GOAL if to_goal <= hit else fate
         early = (at.step[i] == 0.0) & (at.last[i] > 0.0)
         fate = GOING if model.first_step & early else fate
         # Every step up to step + clear is clear of both discs.
@@ -234,7 +234,7 @@ def move_lanes(
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
                 q[j] = target[j] if at_end else between
-            run.hit = at.fate[lane] == _HIT
+            run.hit = at.fate[lane] == _IN_GOAL
             run.ticks = int(at.step[lane]) + 1
             run.evaluations += evaluations
             count -= 1
@@ -373,17 +373,21 @@ def configuration(robot: Robot, q: Any) -> Array:
     array = np.array(q, dtype=np.float64)
     if array.shape != (robot.dof,):
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
-    if not (np.abs(array) <= LARGEST).all():
-        what = f"has a figure beyond {LARGEST:g}" if np.isfinite(array).all() else "is not finite"
+    if not (np.abs(array) <= LARGEST_ENTRY).all():
+        what = (
+            f"has a figure beyond {LARGEST_ENTRY:g}"
+            if np.isfinite(array).all()
+            else "is not finite"
+        )
         raise ValueError(f"configuration {array.tolist()} {what}")
     return array
 
 
 def checked_goal(centre: Any, radius: float = 0.0) -> Goal:
-    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST``."""
+    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
     x, y = float(centre[0]), float(centre[1])
-    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
-        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST:g}")
-    if not 0.0 <= radius <= LARGEST:
-        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST:g}")
+    if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
+        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
+    if not 0.0 <= radius <= LARGEST_ENTRY:
+        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST_ENTRY:g}")
     return Goal(x, y, float(radius))
