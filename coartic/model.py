@@ -68,7 +68,7 @@ def stored_model(fields: Mapping[str, Any]) -> MotionModel:
     return MotionModel(**{name: fields[name] for name in MotionModel._fields})
 
 
-def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
+def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """The model itself; ValueError for constants no movement can be made with.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a

@@ -25,7 +25,7 @@ from coartic.learner.kernel import (
 )
 from coartic.learner.run import LearningRun
 from coartic.method import Meter
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
@@ -152,7 +152,7 @@ def learn_many(
         raise NotApplicableError(reason)
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
-    checked_model(model, radius=task.radius)
+    check_model(model, radius=task.radius)
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(seeds)
     threads = threads_for(jobs)

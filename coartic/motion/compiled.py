@@ -112,8 +112,7 @@ def lanewise(function: F) -> F:
 
 
 def for_any_number(dispatcher: Any) -> Any:
-    """Compile it once, not once more for a number whose value the compiler knows: ``count = 0``
-    before a loop is one."""
+    """The function, not compiled again for literal integers such as ``count = 0``."""
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda given, names: template(
         tuple(map(types.unliteral, given)), names
@@ -194,7 +193,7 @@ def entry(function: F) -> F:
     return kernel
 
 
-def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+def mangling_args(record: types.Record) -> tuple[str, tuple[int, ...]]:
     """A name of a record by what is in it."""
     return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
@@ -202,7 +201,7 @@ def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
 # Machine code on disk calls functions by names that say their types. Numba names a record by its
 # number in the process that compiles, so a process that loads code of two such processes may call
 # one's function with the other's record. What is in the record is a name that holds everywhere.
-types.Record.mangling_args = property(mangled)
+types.Record.mangling_args = property(mangling_args)
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:

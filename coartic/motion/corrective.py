@@ -12,7 +12,7 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, inlined, inner, joint_lever, lanewise
 from coartic.motion.lanes import (
     GOING,
@@ -21,12 +21,12 @@ from coartic.motion.lanes import (
     lanes_for,
     leave,
     near,
-    padded,
+    padded_count,
     place,
     runs_for,
     winding,
 )
-from coartic.motion.movement import checked_goal, configuration, largest_square
+from coartic.motion.movement import check_goal, configuration, largest_square
 from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 from coartic.text import short_repr
@@ -61,7 +61,7 @@ class Correction(NamedTuple):
 def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
@@ -75,7 +75,7 @@ def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, 
     ended = 0
     far = 0
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         going = at.fate[i] == GOING
@@ -189,9 +189,9 @@ def correct(
     run["target"][figures] = configuration(robot, q)
     correct_kernel(
         robot.arm(hand),
-        checked_goal(goal),
+        check_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base),
-        checked_model(model),
+        check_model(model),
         lanes_for(robot),
         runs,
     )

@@ -176,7 +176,7 @@ def fill(rows: Any, lane: int, last: int) -> None:
 
 
 @inner
-def padded(count: int) -> int:
+def padded_count(count: int) -> int:
     """Lanes in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
 
     A loop over whole vectors leaves no lanes over that would be worked on one by one.
@@ -186,9 +186,9 @@ def padded(count: int) -> int:
 
 @lanewise
 def near(at: Any, count: int) -> bool:
-    """Whether all angles are surely small enough for the kernels' own cosine: by a bound."""
+    """Whether a bound shows that all angles are in the range of the fast cosine."""
     far = 0
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
     return far == 0
 
@@ -222,6 +222,6 @@ _far_chains = chains_by(cosine, sine)
 def place(at: Any, count: int, is_near: bool) -> None:
     """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
-        _near_chains(at, padded(count))
+        _near_chains(at, padded_count(count))
     else:
-        _far_chains(at, padded(count))
+        _far_chains(at, padded_count(count))

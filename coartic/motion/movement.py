@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.compiled import entry, fill_row, inner, lanewise
 from coartic.motion.lanes import (
@@ -32,7 +32,7 @@ from coartic.motion.lanes import (
     depart,
     fill,
     lanes_for,
-    padded,
+    padded_count,
     place,
     runs_for,
     winding,
@@ -110,9 +110,12 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @lanewise
 def set_off(at: Any, count: int, model: Any) -> bool:
-    """Rates, bounds and number of steps of every lane; whether all surely stay near."""
+    """Set rates, bounds and number of steps of every lane.
+
+    Returns True if all angles stay in the range of the fast cosine (:func:`near`).
+    """
     far = 0
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
         per_step = model.step / distance if distance > 0.0 else 0.0
         base_x = (at.target[0, i] - at.start[0, i]) * per_step
@@ -143,7 +146,7 @@ def set_off(at: Any, count: int, model: Any) -> bool:
 @lanewise
 def place_between(at: Any, count: int, model: Any) -> None:
     """The point at which each lane is now."""
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         fraction = at.step[i] * model.step / at.distance[i]
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
@@ -162,7 +165,7 @@ def look(
     """
     ended = 0
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         velocity_x = at.base_rate[0, i]
         velocity_y = at.base_rate[1, i]
         for k in range(tip):
@@ -308,9 +311,9 @@ def move(
     )
     move_kernel(
         robot.arm(hand),
-        checked_goal(goal, radius),
+        check_goal(goal, radius),
         stop_on_arrival,
-        checked_model(model),
+        check_model(model),
         lanes_for(robot),
         runs,
     )
@@ -337,7 +340,7 @@ def follow(
     for :func:`move`, whose readings of the first and the last step hold here too
     (:class:`coartic.model.MotionModel`). Raises ValueError for a wrong shape.
     """
-    checked_goal(goal, radius), checked_model(model)
+    check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
@@ -383,7 +386,7 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
-def checked_goal(centre: Any, radius: float = 0.0) -> Goal:
+def check_goal(centre: Any, radius: float = 0.0) -> Goal:
     """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
     x, y = float(centre[0]), float(centre[1])
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import LARGEST_ENTRY, configuration
 from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
@@ -40,7 +40,7 @@ def corrective_trials(
     ValueError for a wrong shape, for figures that are not finite or beyond ``LARGEST_ENTRY``, and
     for hands the robot does not have.
     """
-    checked_model(model, radius=task.radius)
+    check_model(model, radius=task.radius)
     places = np.array(goals, dtype=np.float64)
     if places.ndim != 3 or places.shape[2] != 2:
         raise ValueError(f"goals have shape {places.shape}; needed are (N, G, 2)")

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.movement import LARGEST_ENTRY, checked_goal, configuration
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import reach_in_turn
 from coartic.motion.solution import Movement
@@ -63,12 +63,12 @@ def make_trials(
     Raises ValueError for a wrong shape, for targets that are infinite or beyond
     ``LARGEST_ENTRY``, for ones that move a locked base, and for hands the robot does not have.
     """
-    checked_model(model, radius=task.radius)
-    given = _checked_targets(task, targets)
+    check_model(model, radius=task.radius)
+    given = check_targets(task, targets)
     count = len(given)
     starts = np.empty((count, task.robot.dof))
     starts[:] = configuration(task.robot, task.q0)
-    goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
+    goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
     codes = hand_codes(task, hands, count)
     reached = reach_in_turn(
         task.robot,
@@ -135,7 +135,7 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> NDArray[np.int64
     return rows
 
 
-def _checked_targets(task: Task, targets: Array) -> Array:
+def check_targets(task: Task, targets: Array) -> Array:
     """A copy of the targets; ValueError where they do not fit the task."""
     copy = np.array(targets, dtype=np.float64)
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
