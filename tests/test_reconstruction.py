@@ -9,6 +9,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import calibrate
 import numpy as np
 import pandas as pd
 import pytest
@@ -226,3 +227,14 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
     assert [test.p_below for test in tests if isinstance(test, scoring.Order)] == [0.01, 0.01]
     with pytest.raises(CoarticError, match="prints the goals of task 'ascending'"):
         search_for("ascending")
+
+
+def test_procedures_are_calibrated_on_samples_with_a_known_truth() -> None:
+    """One sample of each kind; of an interval around 5 instead of -300 nothing holds."""
+    rng, draw = np.random.default_rng(0), calibrate.POPULATIONS["ticks"]
+    seen = calibrate.of_rewards(rng, draw, 20, -300.0)
+    assert seen["interval of a mean (Student)"]
+    assert not calibrate.of_rewards(rng, draw, 20, 5.0)["interval of a mean (Student)"]
+    seen |= calibrate.of_counts(rng, 20) | calibrate.of_postures(rng, 20)
+    seen |= calibrate.of_instances(rng, 20)
+    assert len(seen) == 13
