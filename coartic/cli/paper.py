@@ -6,18 +6,18 @@ import typer
 
 from coartic.cli.terminal import say_pairs
 
-app = typer.Typer(
+group = typer.Typer(
     no_args_is_help=True,
     help="Study what the paper leaves open.",
 )
 
 
-@app.callback()
+@group.callback()
 def _group() -> None:
     pass
 
 
-@app.command("readings")
+@group.command("readings")
 def list_readings() -> None:
     """List how the paper can be read."""
     from coartic.tasks.readings import readings
