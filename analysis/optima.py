@@ -1,9 +1,9 @@
 """The optimum of each task: the best reward known, and what is proven about it.
 
 ``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids and the
-solutions; ``python -m coartic.analysis.renew_optima FOLDER`` makes it from the results folder of
-that suite. Searches for the optimum in a results folder of the user's own count as well, so a
-table for the user's own task has gaps as soon as the task's optimum is among its runs.
+solutions; ``docs/scripts/renew_optima.py`` makes it from the results folder of that suite. Searches
+for the optimum in a results folder of the user's own count as well, so a table for the user's own
+task has gaps as soon as the task's optimum is among its runs.
 """
 
 from __future__ import annotations

@@ -36,9 +36,9 @@ from pydantic import Field
 from coartic import Movement, Task
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.compiled import entry, inner, joint_lever
+from coartic.motion.compiled import chain_by, entry, joint_lever
 from coartic.motion.initial import too_many_sequences
-from coartic.robot import BASE_DOF, Array, Hand, chain
+from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]
 Layers = dict[tuple[int, Hand], Array]
@@ -395,9 +395,6 @@ class PosturePlanner:
         return line[k], k + 1
 
 
-exact_chain = inner(chain)
-
-
 @entry
 def linearise_far(
     postures: Any,
@@ -419,7 +416,7 @@ def linearise_far(
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
-        exact_chain(postures[row], arm, xs, ys, math.cos, math.sin)
+        chain_by(postures[row], arm, xs, ys, math.cos, math.sin)
         miss_x = x - xs[tip]
         miss_y = y - ys[tip]
         distance = math.hypot(miss_x, miss_y)

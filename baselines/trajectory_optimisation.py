@@ -339,6 +339,6 @@ def path_movements(
         paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
         steps = np.diff(np.vstack([here, ahead]), axis=0)
         ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
-        steps_made = followed.ticks - session.model.arrival_tick
+        steps_made = followed.ticks - 1
         here, rest = followed.q, ahead[ends > steps_made * session.model.step]
     return tuple(paths)

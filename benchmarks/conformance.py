@@ -26,7 +26,7 @@ from coartic.benchmarks.reproduce import differences, performed
 from coartic.benchmarks.worker import Job, job_of
 from coartic.method import METERED
 from coartic.runs.store import Run
-from coartic.tasks.task import checked_task
+from coartic.tasks.task import check_task
 from coartic.text import counted
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
@@ -243,7 +243,7 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
 def solvable(task: Task) -> Law:
     """The corrective process alone completes it."""
     try:
-        hands = initial_hands(checked_task(task))
+        hands = initial_hands(check_task(task))
     except (NotApplicableError, TaskError) as error:
         return Law("solvable", False, str(error))
     execution = corrective_trial(task, hands)

@@ -15,7 +15,7 @@ from coartic.benchmarks.provenance import environment, now
 from coartic.benchmarks.worker import Answer, Outcome
 from coartic.errors import SolutionError
 from coartic.learner.kernel import TENTHS
-from coartic.learner.learning import CORRECTIONS
+from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel

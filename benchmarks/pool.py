@@ -30,9 +30,8 @@ from pebble import ProcessExpired, ProcessPool
 
 from coartic.benchmarks.worker import Answer, Job, failed, learns, perform, prepare
 from coartic.errors import CoarticError
-from coartic.learner.learning import threads_for
 from coartic.text import plain
-from coartic.threads import begin_worker, one_thread_each
+from coartic.threads import begin_worker, one_thread_each, threads_for
 
 _LOOK_S = 1.0  # between looks at the pool
 _AHEAD = 2  # jobs a worker that wait for it

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import coartic
-from coartic.learner.learning import threads_for
 from coartic.motion.compiled import PACKAGE, source_fingerprint
 from coartic.text import LONGEST_LINE, plain
-from coartic.threads import ONE_THREAD
+from coartic.threads import ONE_THREAD, threads_for
 
 _LIBRARIES = (
     "casadi",

@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from coartic.benchmarks.code_identity import code_of
 from coartic.errors import CoarticError
 from coartic.inputs import problems_inline
-from coartic.learner.learning import METHOD_PREFIX
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information, Method
 from coartic.runs.plan import BUILT_IN, SEARCH, DeclaredMethod
 from coartic.tasks.task import Task

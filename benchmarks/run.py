@@ -23,8 +23,8 @@ from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.runs.plan import Plan, PlannedCell, hash_of, run_id, run_seed, trials_in, variant_of
 from coartic.runs.store import Run, Store, writing
-from coartic.tasks.readings import condition_under, load_readings, model_under, task_under
-from coartic.tasks.task import checked_task
+from coartic.tasks.readings import condition_under, load_readings, model_under
+from coartic.tasks.task import check_task
 from coartic.text import counted
 
 LEAST_TOGETHER = 8
@@ -322,7 +322,7 @@ def plan_suite(
         entry = entries.setdefault(cell.method, cell.entry)
         name = cell.task.name
         if name not in tasks:
-            tasks[name] = checked_task(task_under(chosen, cell.task), model)
+            tasks[name] = check_task(cell.task, model)
         # What is asked for of all cells goes before what the suite says of one.
         count = runs or cell.runs or suite.runs
         wanted = planned_cell(cell, entry, read, trials, count)

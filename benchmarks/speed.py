@@ -17,7 +17,8 @@ import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
 from coartic.baselines.cma_es import Every
 from coartic.benchmarks.run import plan_suite
-from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
+from coartic.learner.conditions import METHOD_PREFIX
+from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Session
 from coartic.motion.lanes import LANES
 from coartic.motion.trials import movements_of

@@ -27,7 +27,7 @@ from coartic.inputs import (
     read_toml,
     sentence,
 )
-from coartic.learner.learning import METHOD_PREFIX
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import label_of, variant_of
 from coartic.tasks.catalogue import members, task_of

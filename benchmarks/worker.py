@@ -18,7 +18,8 @@ import numpy as np
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.benchmarks.registry import Entry, error_line, method_at
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.learner.learning import METHOD_PREFIX, warm_up
+from coartic.learner.conditions import METHOD_PREFIX
+from coartic.learner.learning import warm_up
 from coartic.method import (
     BudgetError,
     Information,

@@ -17,7 +17,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.model import PAPER, MotionModel
-from coartic.robot import HANDS, LARGEST, Array, Hand
+from coartic.robot import HANDS, LARGEST_FIGURE, Array, Hand
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,7 +83,7 @@ class Arms:
         self.two_hands = len(self.task.hands) == 2
         self.action_space = Box(-1.0, 1.0, (self.two_hands + len(self.free),), np.float32)
         seen = np.ones(goals + 2 + (dof + 2 * goals) * self.sees_posture, dtype=np.float32)
-        seen[goals + 2 :] = LARGEST
+        seen[goals + 2 :] = LARGEST_FIGURE
         low = np.where(np.arange(len(seen)) < goals + 2, 0.0, -seen).astype(np.float32)
         self.observation_space = Box(low, seen, dtype=np.float32)
         self.q = np.empty((count, dof))
@@ -127,7 +127,7 @@ class Arms:
         targets[:, self.free] += self.scale * joints
         without = np.isnan(joints).all(axis=1)
         no_hand = self.two_hands and np.isnan(chosen[:, 0]).any()
-        if no_hand or not (np.abs(targets[~without]) <= LARGEST).all():
+        if no_hand or not (np.abs(targets[~without]) <= LARGEST_FIGURE).all():
             raise ValueError(
                 "an action is not finite, or far beyond the box; NaN is for all joints, not for "
                 "some, and not for the hand"

@@ -25,7 +25,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands
 from coartic.motion.solution import Execution, Movement, execute
-from coartic.motion.trials import Hands, Trials, hand_codes, make_trials
+from coartic.motion.trials import HandSequences, Trials, hand_codes, make_trials
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
@@ -297,7 +297,7 @@ class Session:
             execution, movements=tuple(solution), configurations=execution.configurations[:0]
         )
 
-    def trials(self, hands: Hands, targets: Any, *, until: Any = None) -> Trials:
+    def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
         """Make N physical trials at once, which takes a fraction of the time of N :meth:`trial`.
 
         ``hands`` is one hand sequence for all (``"RRLR"``), one each, or an array of shape

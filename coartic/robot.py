@@ -27,10 +27,12 @@ from coartic.text import short_repr
 Hand = Literal["left", "right"]
 """Which hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
-LARGEST = 1e4  # of any figure: far beyond use, and exact in all that follows
+LARGEST_FIGURE = 1e4  # of any figure: far beyond use, and exact in all that follows
 MOST_LINKS = 100  # of an arm
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST)]
+Finite = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
+]
+Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST_FIGURE)]
 _Links = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
 
 HANDS: tuple[Hand, Hand] = ("left", "right")  # A, in the order that breaks ties

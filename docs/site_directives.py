@@ -16,9 +16,9 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
-from coartic.tasks.families import Parts
+from coartic.tasks.families import Thousandths
 
-_IN_PARTS = get_args(Parts)[1]  # what reads a figure of a file into thousandths
+_IN_PARTS = get_args(Thousandths)[1]  # what reads a figure of a file into thousandths
 _SIMPLE = {bool: "`true` or `false`", int: "integer", float: "number", str: "text"}
 _LONGEST = 60  # characters of a default that is shown in a table
 

@@ -1,6 +1,7 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,7 +34,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.topics.paper import claims as single
 from coartic.analysis.topics.paper.claims import shortest_reach
 from coartic.analysis.trajectories import Trajectories
-from coartic.analysis.words import read_beside
 from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import as_released, changed
@@ -883,7 +883,8 @@ def test_the_chosen_arm_serves_the_next_goal(part, placebo, verdict):
 
 
 def test_every_sentence_is_accounted_for():
-    sentences = read_beside(judge.__file__, "sentences")["sentence"]
+    path = Path(__file__).parent.parent / "docs" / "sentences.toml"
+    sentences = tomllib.loads(path.read_text(encoding="utf-8"))["sentence"]
     for each in sentences:
         assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
         assert set(each.get("claims", ())) <= set(CLAIMS), each["quote"]

@@ -13,7 +13,7 @@ from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.topics.families.sample import one_by_one, sample, signs
-from coartic.tasks.families import names_in
+from coartic.tasks.families import instances_in
 from tests.support.made_up import MadeUp, made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -44,7 +44,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
     """Rewards of conditions by label: a number, or a function of the instance's number."""
     rows, tasks, best = [], [], {}
     for family in families:
-        for number, name in enumerate(names_in(f"{family}/{split}000..{split}{count - 1:03d}")):
+        for number, name in enumerate(instances_in(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():

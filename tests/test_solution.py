@@ -84,7 +84,7 @@ MODELS = [
     MotionModel(max_iterations=100),
     MotionModel(corrective_arrival=True, arrival_tolerance=0.09),
     MotionModel(whole_last_step=True),
-    MotionModel(first_step=True, arrival_tick=0),
+    MotionModel(first_step=True),
 ]
 
 

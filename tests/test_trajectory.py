@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
+from coartic import Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.baselines.trajectory_optimisation import METHODS, path_movements
 from coartic.baselines.trajectory_problem import (
@@ -229,8 +229,7 @@ def test_goals_out_of_reach_are_infeasible():
     assert failure.value.outcome == "infeasible"
 
 
-@pytest.mark.parametrize("tick", [0, 1])
-def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
+def test_the_rest_of_a_piece_lies_ahead():
     """The base moves along x by waypoints closer than a step, past the first goal's rim."""
     task = small_task(goals=((2.6, 1.0), (3.2, 1.0)))
     instance = Instance.of(task, ("right", "right"), still=True, radius=task.radius)
@@ -240,11 +239,10 @@ def test_the_rest_of_a_piece_lies_ahead_whether_arrival_costs_a_tick(tick):
         goals=task.goals, start={"base": tuple(start[:2]), "left": (1.5,), "right": (0.4, 0.3)}
     )
     line = start + np.arange(1, 221)[:, None] * 0.004 * np.eye(len(start))[0]
-    model = PAPER._replace(arrival_tick=tick)
-    session = Session(task, 0, set(Information), model=model, trusted=True)
+    session = Session(task, 0, set(Information), trusted=True)
     first, second = path_movements(session, task, instance, [line[:80], line[80:]])
-    execution = execute(task, (first, second), model=model)
-    assert (execution.completed, execution.corrections, execution.ticks) == (True, 0, 80 + 2 * tick)
+    execution = execute(task, (first, second))
+    assert (execution.completed, execution.corrections, execution.ticks) == (True, 0, 82)
     hit = execution.configurations[0]
     np.testing.assert_allclose(second.waypoints, line[line[:, 0] > hit[0]])
 

@@ -13,8 +13,6 @@ from typing import Any
 
 import pandas as pd
 
-DATA = Path(__file__).with_name("ensemble.csv")
-
 
 @cache
 def held_by(claim: str) -> tuple[Any, ...]:
@@ -22,7 +20,7 @@ def held_by(claim: str) -> tuple[Any, ...]:
 
     ``task`` whose goals are the members'; how often ``supported``, ``refuted``, of ``members``.
     """
-    table = pd.read_csv(DATA)
+    table = pd.read_csv(Path(__file__).with_suffix(".csv"))
     return tuple(table[table.claim == claim].itertuples())
 
 

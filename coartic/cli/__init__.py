@@ -48,7 +48,7 @@ for module in (run, read, draw):
     for command in module.COMMANDS:
         name = command.__name__.removesuffix("_")
         app.command(name=name)(command)
-app.add_typer(paper.app, name="paper")
+app.add_typer(paper.group, name="paper")
 
 
 def main() -> None:

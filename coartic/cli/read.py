@@ -129,11 +129,11 @@ def verify(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""
-    from coartic.analysis.verify import verify
+    from coartic.analysis.verify import check_runs
     from coartic.runs.store import open_store
 
     with open_store(folder):  # or it says what is the matter
-        report = verify(folder)
+        report = check_runs(folder)
     say(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
         *(report.wrong or ["Nothing differs."]),

@@ -98,10 +98,10 @@ def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
     from coartic import builtin_tasks
     from coartic.benchmarks.suites import suites
-    from coartic.tasks.families import families
+    from coartic.tasks.families import shipped_families
 
     yield "Tasks", ", ".join(builtin_tasks())
-    yield "Families", ", ".join(families())
+    yield "Families", ", ".join(shipped_families())
     yield "Suites", ""
     for name, suite in suites().items():
         yield f"  {name}", suite.title
@@ -122,7 +122,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     """
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import methods_named, suites
-    from coartic.tasks.families import families
+    from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
     if name in suites():
@@ -141,8 +141,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         source = "reconstructed" if task.reconstructed else "printed in the paper"
         yield "Goals are", "drawn at random" if task.family else source
-    elif name in families() or f"{name}/v1" in families():
-        family = families().get(name) or families()[f"{name}/v1"]
+    elif name in shipped_families() or f"{name}/v1" in shipped_families():
+        family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
         yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
         yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
@@ -150,7 +150,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         try:
             methods = methods_named(name, registered)
         except CoarticError as error:
-            names = [*suites(), *builtin_tasks(), *families(), *registered]
+            names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
             raise CoarticError(unknown("task, suite, method or family", name, names)) from error
         for method in methods:
             yield from describe_method(registered[method])

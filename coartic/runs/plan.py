@@ -102,7 +102,7 @@ class Plan:
                     "task": self.tasks[cell.task],
                     "method": cell.method,
                     "parameters": cell.complete,
-                    "model": self.model._asdict(),
+                    "model": self.model._asdict() | {"arrival_tick": 1},  # a field of version 1.0
                     "trial_budget": self.trial_budget,
                 }
             )

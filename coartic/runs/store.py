@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from coartic.errors import CoarticError
 from coartic.learner.rows import movements_from
 from coartic.method import Meter
-from coartic.model import MotionModel
+from coartic.model import MotionModel, stored_model
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell, hash_of
@@ -374,7 +374,7 @@ class Store:
             task,
             setting["method"],
             json.loads(setting["parameters"]),
-            MotionModel(**json.loads(setting["model"])),
+            stored_model(json.loads(setting["model"])),
             setting["trial_budget"],
             setting["code"],
         )

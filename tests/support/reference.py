@@ -65,7 +65,7 @@ def move(
         if k == 0 < last and model.first_step:
             continue
         if hit or arrived or k == last:
-            return MoveResult(np.array(point), k + model.arrival_tick, hit, k + 2)
+            return MoveResult(np.array(point), k + 1, hit, k + 2)
     raise AssertionError("a movement ends at its target at the latest")
 
 
@@ -178,7 +178,7 @@ def learn(
                     for reward in reversed(subtasks[number:]):
                         credit = reward + condition.discount * credit
                 value = values.get((state, hand), -math.inf)
-                if credit > value or (credit == value and condition.update == "not-less"):
+                if credit > value:
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(

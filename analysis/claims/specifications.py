@@ -17,20 +17,17 @@ from dataclasses import replace
 from itertools import repeat
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
-from coartic.learner.learning import threads_for
 from coartic.runs.plan import variant_of
-from coartic.tasks.catalogue import task_of, with_members
+from coartic.tasks.catalogue import is_admitted, task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
-from coartic.threads import begin_worker, one_thread_each
+from coartic.threads import begin_worker, one_thread_each, threads_for
 
-COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+ROW = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
 PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
 VERDICTS = ("supported", "not supported", "undecided")
 
@@ -41,7 +38,7 @@ spaces between them; the task whose goals are of a member, and the member, both 
 goals are the default ones."""
 
 
-def judged_specifications(
+def judge_specifications(
     studies: Iterable[Study],
     *,
     claims: Iterable[Claim] = PAPERS,
@@ -69,7 +66,7 @@ def judged_specifications(
             judgeable |= {(task, name) for name in claims_judged}
             progress(", ".join(filter(None, (member, *readings.split()))) or "default")
     kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
-    return pd.DataFrame(kept, columns=list(COLUMNS))
+    return pd.DataFrame(kept, columns=list(ROW))
 
 
 def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
@@ -91,15 +88,12 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
 
 
 def admitted_members(study: Study, task: str) -> list[str]:
-    """Members in a folder that meet every constraint, the first of those with the same goals."""
+    """Members in a folder that are admitted, the first of those with the same goals."""
     goals: dict[Any, str] = {}
     for name in study.plan.tasks:
-        if task_of(name) == task:
+        if task_of(name) == task and is_admitted(name):
             goals.setdefault(study.tasks[name].goals, name)
-    if not goals:
-        return []
-    fits = search_for(task, jobs=1).meets_all(np.array(list(goals)))
-    return [name for name, fit in zip(goals.values(), fits, strict=True) if fit]
+    return list(goals.values())
 
 
 def study_as(study: Study, names: Mapping[str, str]) -> Study:
@@ -149,9 +143,9 @@ def judge_view(
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
             claims_judged.append(claim.id)
-        row: dict[str, Any] = dict(zip(COLUMNS, (*specification, claim.id), strict=False))
+        row: dict[str, Any] = dict.fromkeys(ROW, math.nan)
+        row |= zip(ROW, (*specification, claim.id), strict=False)
         row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
-        row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
         if finding.tests:
             first = finding.tests[0]
             row |= {"effect": first.value, "low": first.low, "high": first.high, "p": first.p}
