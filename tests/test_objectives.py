@@ -20,7 +20,7 @@ from coartic.analysis.studies.objectives import advantage, crossing, crossings, 
 from coartic.analysis.study import load
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.learner.rows import movements_from
+from coartic.runs.run import movements_from
 from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
 from tests.support.made_up import MadeUp, row, study_of

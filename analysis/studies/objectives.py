@@ -16,8 +16,8 @@ import pandas as pd
 from coartic import Movement, Task, execute
 from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED
 from coartic.analysis.study import CellRuns, Study, cached
-from coartic.learner.rows import movements_from
 from coartic.robot import Array
+from coartic.runs.run import movements_from
 from coartic.tasks.task import address_of
 
 Solution = tuple[Movement, ...]
