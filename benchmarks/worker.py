@@ -72,25 +72,9 @@ def fail(
     cpu_s: float | None = None,
 ) -> list[Outcome]:
     """The outcomes of a job whose worker gave none: ``timeout`` or ``crashed``."""
-    return [Outcome(status, reason, times=share_times(job, wall_s, cpu_s)) for _ in job.keys]
-
-
-def share_times(
-    job: Job,
-    wall_s: float | None,
-    cpu_s: float | None,
-    warm: bool | None = None,
-    peak_mb: float | None = None,
-) -> Times:
-    """The times of each run of a job: equal shares."""
     runs = len(job.keys)
-    return Times(
-        wall_s=None if wall_s is None else wall_s / runs,
-        cpu_s=None if cpu_s is None else cpu_s / runs,
-        warm=warm,
-        together=runs,
-        process_peak_mb=peak_mb,
-    )
+    times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
+    return [Outcome(status, reason, times=times) for _ in job.keys]
 
 
 def perform_job(job: Job) -> list[Outcome]:
@@ -115,7 +99,8 @@ def perform_job(job: Job) -> list[Outcome]:
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    times = share_times(job, wall, cpu, warm, process_peak_mb())
+    runs = len(sessions)
+    times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
     return [outcome_of(setting.method, result, session, times) for result, session in pairs]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Literal
@@ -453,23 +453,22 @@ class Session(TaskView):
                 raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:_} at most")
         self._meter.add(**counts)
 
-    @contextmanager
-    def building(self) -> Iterator[None]:
+    def building(self) -> AbstractContextManager[None]:
         """Count the wall time of the block as set-up."""
-        clock = time.perf_counter()
-        try:
-            yield
-        finally:
-            self._meter.build_s += time.perf_counter() - clock
+        return self._timing("build_s")
+
+    def solving(self) -> AbstractContextManager[None]:
+        """Count the wall time of the block as solving."""
+        return self._timing("solve_s")
 
     @contextmanager
-    def solving(self) -> Iterator[None]:
-        """Count the wall time of the block as solving."""
+    def _timing(self, counter: str) -> Iterator[None]:
         clock = time.perf_counter()
         try:
             yield
         finally:
-            self._meter.solve_s += time.perf_counter() - clock
+            spent = getattr(self._meter, counter) + time.perf_counter() - clock
+            setattr(self._meter, counter, spent)
 
     # The back door of this project's compiled methods.
 

@@ -24,7 +24,7 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import Selection, perform, plan_suite
 from coartic.benchmarks.scoring import score, too_long
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
-from coartic.benchmarks.worker import Job, Outcome
+from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.method import Information, Session
 from coartic.motion.initial import ranked_sequences
@@ -95,14 +95,6 @@ def test_rewards_by_trial(results):
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
-
-
-def test_a_cell_does_not_depend_on_its_company(results, tmp_path):
-    cells = paper_cells(tasks=["two-armed-2"], methods=["dual-process/EC4"])
-    alone = run_and_write(tmp_path, cells).runs
-    chosen = results.runs[results.runs.run_id.isin(alone.run_id)].reset_index(drop=True)
-    pd.testing.assert_series_equal(alone.reward, chosen.reward)
-    assert len(chosen) == 2
 
 
 def test_seeds_are_paired_by_task_and_run(results):
@@ -216,6 +208,8 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
         plan_suite(tmp_path / "own.toml")
     assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
+    once = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
+    assert planned(once, runs=20).size == 1
     task, select = tmp_path / "mine.toml", Selection(task_files=[tmp_path / "mine.toml"])
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
@@ -286,7 +280,8 @@ def test_the_runs_of_a_batch_are_scored():
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
     ]  # fmt: skip
-    runs = score(Job(setting, card, keys, 60.0), outcomes)
+    job = Job(setting, card, keys, 60.0)
+    runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
     columns = ["run_id", "run", "seed", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
                "replay_reward", "proven_bound", "together", "wall_s", "cpu_s"]  # fmt: skip
@@ -296,8 +291,9 @@ def test_the_runs_of_a_batch_are_scored():
         ["run-1", 1, 11, "ok", -319, "RRR", None, None, None, 3, 0.0, None, None, 4, 2.0, 1.0],
         ["run-2", 2, 12, "solver-failed", *nothing, 4, 2.0, 1.0],
         ["run-3", 3, 13, "solver-failed", *nothing, 1, None, None],
+        ["run-0", 0, 10, "timeout", *nothing, 4, 2.0, None],
     ]
-    assert runs[0].reason == ""
+    assert (runs[0].reason, runs[4].reason) == ("", "too slow")
     assert runs[2].reason == "it reported ok, but returned no solution"
     assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].reason
     assert runs[3].scores == {}
@@ -307,12 +303,6 @@ def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000, PAPER) is None
     assert "10001 movements" in str(too_long(task, [move] * 10_001, PAPER))
-
-
-def test_deterministic_methods_run_once():
-    cells = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
-    assert [cell.method.name for cell in cells] == ["corrective-alone/every"]
-    assert planned(cells, runs=20).size == 1
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):

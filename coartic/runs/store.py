@@ -98,6 +98,7 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     ORDER BY cells.position, results.run, "order", waypoint;
 """
 
+_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
 _METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
 _WAYPOINT = ("result_id", "order", "waypoint")
@@ -135,21 +136,13 @@ class Store:
         with self._writing():
             for table in ("suite", "tasks", "methods", "cells"):
                 self._db.execute(f"DELETE FROM {table}")
-            self._insert(
-                "suite",
-                {
-                    "name": plan.suite,
-                    "seed": plan.seed,
-                    "runs": plan.runs,
-                    "trials": plan.trials,
-                    "readings": plan.readings,
-                    "time_limit_s": plan.time_limit_s,
-                    "trial_budget": plan.trial_budget,
-                    "command": command,
-                    "date": date,
-                    "environment": self._environment(environment),
-                },
-            )
+            self._insert("suite", {
+                "name": plan.suite,
+                **{key: getattr(plan, key) for key in (*_SUITE, "readings")},
+                "command": command,
+                "date": date,
+                "environment": self._environment(environment),
+            })  # fmt: skip
             for method in plan.methods.values():
                 self._insert("methods", {name: getattr(method, name) for name in _METHOD})
             for position, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
@@ -189,7 +182,7 @@ class Store:
         )
         return Plan(
             suite=row["name"],
-            **{key: row[key] for key in ("seed", "runs", "trials", "time_limit_s", "trial_budget")},
+            **{key: row[key] for key in _SUITE},
             readings=tuple(json.loads(row["readings"])),
             cells=tuple(
                 Cell(
