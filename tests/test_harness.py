@@ -6,7 +6,6 @@ from dataclasses import replace
 from fnmatch import fnmatch
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from coartic import (

@@ -188,7 +188,8 @@ def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
                 )  # fmt: skip
     frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
     monkeypatch.setattr(objectives, "rewards", lambda study: frame)
-    study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
+    rows = pd.DataFrame([row("dual-process/EC1", -100, task="ascending")])
+    study = study_of(rows, [load_task("ascending")])
     table = tables.TABLES["objectives"](study)
     assert table.regret["region 300 ticks"] == pytest.approx(50)
     assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]
