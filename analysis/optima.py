@@ -49,7 +49,7 @@ class ShippedOptimum(FileData):
     searches: Mapping[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.learner.rows.movements_from` reads them, in full precision."""
+    """Movements as :func:`coartic.runs.run.movements_from` reads them, in full precision."""
     infeasible: str = ""
     """Why no search has a solution."""
 

@@ -35,7 +35,7 @@ _LIBRARIES = (
 
 
 @cache
-def environment() -> dict[str, Any]:
+def current_environment() -> dict[str, Any]:
     """With what this process makes results: versions, platform, commit."""
     return {
         "coartic": coartic.__version__,

@@ -33,6 +33,11 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
+def error_line(error: BaseException) -> str:
+    """An exception in one line."""
+    return plain(f"{type(error).__name__}: {error}")
+
+
 def one_line(text: str) -> str:
     """Text as one printable line, whole; one that is so already stays as it is.
 

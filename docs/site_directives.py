@@ -153,8 +153,8 @@ def parameters() -> Iterator[str]:
         if reading.part == "condition"
     }
     shared: dict[Any, list[str]] = {}
-    for name, entry in built_in().items():
-        shared.setdefault(entry.method.Parameters, []).append(f"`{name}`")
+    for name, card in built_in().items():
+        shared.setdefault(card.load().Parameters, []).append(f"`{name}`")
     for kind, names in shared.items():
         meanings = meanings_of(kind)
         if issubclass(kind, DualProcessParameters):

@@ -108,8 +108,9 @@ import coartic
 ours = {name for name in sys.modules if name.startswith("coartic.")}
 assert not ours, f"imported with the package: {sorted(ours)}"
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
-from coartic.benchmarks.worker import _method
-assert _method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
+from coartic.runs.card import load_method
+import coartic.benchmarks.pool
+assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
@@ -200,15 +201,15 @@ def without_posix(out):
     everything()
 
     from coartic.analysis.study import load
-    from coartic.benchmarks.run import Selection, plan_suite
+    from coartic.benchmarks.run import Selection, perform, plan_suite
     from tests.support.suites import InProcess
 
     methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
     select = Selection(tasks=["ascending"], methods=methods)
-    suite = plan_suite("quick", runs=2, trials=5, select=select)
-    assert suite.perform(out, executor=InProcess()).progress.failed == 0
+    plan = plan_suite("quick", runs=2, trials=5, select=select)
+    assert perform(plan, out, executor=InProcess()).progress.failed == 0
     runs = load(out).runs
-    assert len(runs) == suite.plan.size
+    assert len(runs) == plan.size
     assert runs.process_peak_mb.isna().all()
 
 

@@ -35,6 +35,7 @@ from coartic.analysis.topics.paper import claims as single
 from coartic.analysis.topics.paper.claims import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.benchmarks.suites import Cell
+from coartic.benchmarks.worker import perform_job
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import as_released, changed
 from tests.support.suites import KNOWN, InProcess, run_and_write
@@ -718,10 +719,10 @@ class FewStarts(InProcess):
 
     def perform(self, jobs):
         few = {"graphs": 1, "chains": 1, "noisy_starts": 0, "nodes": 60}
-        return super().perform(
-            replace(job, parameters=job.parameters | (few if "graphs" in job.parameters else {}))
-            for job in jobs
-        )
+        for number, job in enumerate(jobs):
+            asked = job.setting.parameters
+            quick = asked | (few if "graphs" in asked else {})
+            yield number, perform_job(replace(job, setting=replace(job.setting, parameters=quick)))
 
 
 @pytest.fixture(scope="module")
@@ -773,7 +774,7 @@ def test_the_register_on_runs(study):
 def test_what_else_was_run_changes_no_verdict_on_the_papers_cells(study):
     """The same runs alone, and with other methods beside them, one of them tested against."""
     learned = study.runs[study.runs.method.str.startswith("dual-process/")]
-    cells = [cell for cell in study.plan.cells if cell.method.startswith("dual-process/")]
+    cells = [cell for cell in study.plan.cells if cell.method.name.startswith("dual-process/")]
     alone = replace(study, runs=learned, plan=replace(study.plan, cells=tuple(cells)))
     changed_ones = []
     for one, other in zip(judge.judged(alone), judge.judged(study), strict=True):

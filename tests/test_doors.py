@@ -21,10 +21,10 @@ from coartic import (
 from coartic.analysis.optima import entries
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
-from coartic.learner.rows import movements_from
 from coartic.method import BudgetError, Information, Meter, MethodError, Session, UndeclaredError
 from coartic.motion.trials import hand_codes, movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
+from coartic.runs.run import movements_from
 from tests.support.strategies import tiny_task
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -317,8 +317,8 @@ def test_the_examples_are_methods(path, in_this_process):
     entry = registry([path])[name]
     laws = check_method(entry, tasks=[load_task("ascending")])
     assert [law for law in laws if not law.passed] == []
-    session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
-    solution = entry.with_parameters({}).solve(session).solution
+    session = Session(load_task("ascending"), 0, entry.load().told, trial_budget=300)
+    solution = entry.configure({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute(load_task("ascending"), solution).reward
     if "coartic.agents" in text:  # what was learned, in the last trial

@@ -324,12 +324,12 @@ def test_a_small_suite(tmp_path):
 def test_an_instance_beside_a_suites_tasks():
     select = Selection(tasks=["two-armed/v1/i003..i004", "two-armed-1"], methods=["EC4"])
     plan = plan_suite("paper", runs=1, select=select)
-    assert [cell.task for cell in plan.plan.cells] == [
+    assert [cell.task.name for cell in plan.cells] == [
         "two-armed-1", "two-armed/v1/i003", "two-armed/v1/i004",
     ]  # fmt: skip
     # The paper's EC1 is for one arm, and comes to the right hand by itself.
     alone = plan_suite("paper", runs=1, select=Selection(tasks=["one-armed/v1/i000"]))
-    assert [cell.method for cell in alone.plan.cells] == ["dual-process/EC1"]
+    assert [cell.method.name for cell in alone.cells] == ["dual-process/EC1"]
 
 
 def test_command_draws_and_writes_instances(monkeypatch, capsys, tmp_path):

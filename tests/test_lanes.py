@@ -7,12 +7,12 @@ import numpy.testing as npt
 import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
+from coartic.benchmarks.run import Batch, split
 from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import failed
+from coartic.benchmarks.worker import fail
 from coartic.motion.compiled import entry
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.trigonometry import LARGEST
-from coartic.runs.plan import run_seed
 from tests.support.strategies import UNEVEN
 from tests.support.suites import KNOWN, InProcess, planned, run_and_write
 
@@ -100,8 +100,8 @@ def test_lanes_do_not_mix(count, far):
 class Watched(InProcess):
     """An executor that keeps what it was asked."""
 
-    def __init__(self, workers=1):
-        self.workers, self.jobs = workers, []
+    def __init__(self):
+        self.jobs = []
 
     def perform(self, jobs):
         self.jobs += jobs
@@ -109,17 +109,17 @@ class Watched(InProcess):
 
     @property
     def sizes(self):
-        return [len(job.seeds) for job in self.jobs]
+        return [len(job.keys) for job in self.jobs]
 
 
 class Nobody(Watched):
     """Its processes end wherever runs are performed side by side."""
 
     def perform(self, jobs):
-        for number, answer in super().perform(jobs):
+        for number, outcomes in super().perform(jobs):
             job = jobs[number]
-            lost = len(job.seeds) > 1
-            yield number, failed(job, "crashed", "exit code 9", 1.0) if lost else answer
+            lost = len(job.keys) > 1
+            yield number, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
 
 
 LEARNER = Cell(load_task("ascending"), KNOWN["dual-process/EC1"])
@@ -148,24 +148,28 @@ def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
         ([LEARNER, ALONE], 20, 2, [11, 9, 1]),
     ],
 )
-def test_runs_are_divided_among_workers(cells, runs, workers, sizes, tmp_path):
-    executor, plan = Watched(workers), planned(cells, runs=runs, trials=3)
-    plan.perform(tmp_path, executor=executor)
-    assert executor.sizes == sizes
-    seeds = [run_seed(0, "ascending", n) for cell in plan.plan.cells for n in range(cell.runs)]
-    assert [seed for job in executor.jobs for seed in job.seeds] == seeds
+def test_runs_are_divided_among_workers(cells, runs, workers, sizes):
+    plan = planned(cells, runs=runs, trials=3)
+    every = [
+        Batch(position, [plan.key(position, number) for number in range(cell.runs)])
+        for position, cell in enumerate(plan.cells)
+    ]
+    batches = list(split(plan, every, workers))
+    assert [len(batch.keys) for batch in batches] == sizes
+    kept = [(batch.position, key) for batch in batches for key in batch.keys]
+    assert kept == [(batch.position, key) for batch in every for key in batch.keys]
 
 
 class Forges(InProcess):
     """Has two of many runs state what is no solution."""
 
     def perform(self, jobs):
-        for number, answer in super().perform(jobs):
-            if len(answer.outcomes) == LANES:
-                fifth, seventh = (answer.outcomes[run].parts["solution"] for run in (5, 7))
+        for number, outcomes in super().perform(jobs):
+            if len(outcomes) == LANES:
+                fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
                 fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
-            yield number, answer
+            yield number, outcomes
 
 
 def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):

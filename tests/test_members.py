@@ -17,7 +17,6 @@ from coartic.analysis.claims.specifications import (
     specifications,
 )
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.runs.plan import DeclaredMethod
 from coartic.tasks.catalogue import MEMBERS_FOLDER, is_admitted, members, task_of, with_members
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN
@@ -72,13 +71,12 @@ def study_with(tasks, means, **plan):
                     replay_reward=int(r), initial_reward=-675)
                 for k, r in enumerate(rewards)
             ]  # fmt: skip
-    method = DeclaredMethod(
-        title="t", citation="", told=(), secondary=(), stochastic=True,
-        defaults={"ties": "left", "trials": 10_000}, origin="", code="",
-    )  # fmt: skip
-    names = ("dual-process/EC3", "dual-process/EC4")
-    methods = dict.fromkeys(names, method)
-    return study_of(pd.DataFrame(rows), list(map(load_task, tasks)), methods=methods, **plan)
+    study = study_of(pd.DataFrame(rows), list(map(load_task, tasks)), **plan)
+    defaults = {"ties": "left", "trials": 10_000}
+    cells = tuple(
+        replace(cell, method=replace(cell.method, defaults=defaults)) for cell in study.plan.cells
+    )
+    return replace(study, plan=replace(study.plan, cells=cells))
 
 
 def test_claims_are_judged_for_each_member():
@@ -101,10 +99,7 @@ def test_claims_are_judged_for_each_member():
 
 def test_parameters_of_a_reading_are_no_variant():
     study = study_with(["two-armed-1"], (20.0,), readings=("ties=right",))
-    cells = tuple(
-        replace(cell, variant="ties=right", parameters={"ties": "right"})
-        for cell in study.plan.cells
-    )
+    cells = tuple(replace(cell, parameters={"ties": "right"}) for cell in study.plan.cells)
     runs = study.runs.assign(variant="ties=right")
     changed = replace(study, plan=replace(study.plan, cells=cells), runs=runs)
     ((specification, view),) = specifications(changed)

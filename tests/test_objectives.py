@@ -19,7 +19,7 @@ from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.learner.rows import movements_from
+from coartic.runs.run import movements_from
 from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
 from tests.support.made_up import MadeUp, row, study_of
@@ -187,7 +187,8 @@ def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
                 )  # fmt: skip
     frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
     monkeypatch.setattr(objectives, "rewards", lambda study: frame)
-    study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
+    rows = pd.DataFrame([row("dual-process/EC1", -100, task="ascending")])
+    study = study_of(rows, [load_task("ascending")])
     table = TABLES["objectives"](study)
     assert table.regret["region 300 ticks"] == pytest.approx(50)
     assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]

@@ -12,9 +12,9 @@ from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.benchmarks.suites import Cell
-from coartic.learner.rows import movements_from
 from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
+from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed
 from tests.support.suites import KNOWN, run_and_write
@@ -100,7 +100,7 @@ def test_a_hand_that_is_there_already_saves_a_tick():
 def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     task, few = load_task("ascending"), {"graphs": 1, "chains": 1, "nodes": 60}
     names = ("optimum/branch-and-bound", "optimum/dynamic-programming")
-    cells = [Cell(task, KNOWN[name], tuple(few.items())) for name in names]
+    cells = [Cell(task, KNOWN[name], few) for name in names]
     study = run_and_write(tmp_path / "results", cells, runs=1)
     (entry,) = renew_optima.collect(study)
     assert (entry.reward, entry.bound) == (-292, -292)

@@ -168,9 +168,9 @@ def test_the_suite_has_test_instances_of_all_families():
     assert {task.split for task in tasks.values()} == {"test"}
     assert {len(task.goals) for task in tasks.values()} == set(range(2, 9))
     planned = [
-        (cell.task.name, cell.entry.complete(dict(cell.parameters)))
+        (cell.task.name, cell.method.complete(cell.parameters))
         for cell in cells
-        if cell.method == RecedingHorizon.name
+        if cell.method.name == RecedingHorizon.name
     ]
     plain = {"hands": "planned", "costs": "none"}
     curve = [(name, given) for name, given in planned if plain.items() <= given.items()]

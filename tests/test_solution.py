@@ -19,7 +19,7 @@ from coartic import (
     load_task,
     move,
 )
-from coartic.benchmarks.outcome import MOST_STEPS, scored
+from coartic.benchmarks.scoring import MOST_STEPS, execute_all
 from coartic.errors import SolutionError
 from coartic.learner.conditions import load_condition
 from coartic.motion.movement import follow
@@ -166,7 +166,7 @@ def test_no_way_is_followed_without_end():
     far = 0.9 * MOST_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
     out, back = planned(posture(far), posture(far)), planned(posture(far), posture(0.0))
-    first, second = scored(task, [out, back], PAPER)
+    first, second = execute_all(task, [out, back], PAPER)
     assert first.reward == -192  # on the way
     assert "1800000 steps; at most 1000000 are allowed" in str(second)
 

@@ -22,7 +22,6 @@ import pandas as pd
 from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
 from coartic.analysis.claims.register import CLAIMS, Claim
 from coartic.analysis.study import Study
-from coartic.runs.plan import variant_of
 from coartic.tasks.catalogue import is_admitted, task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
 from coartic.threads import begin_worker, one_thread_each, threads_for
@@ -105,21 +104,20 @@ def study_as(study: Study, names: Mapping[str, str]) -> Study:
     fields = condition_under(load_readings(plan.readings))
     cells, variants = [], {}
     for cell in plan.cells:
-        if cell.task not in names:
+        if cell.task.name not in names:
             continue
         parameters = {
             key: value for key, value in cell.parameters.items() if fields.get(key) != value
         }
-        variant = variant_of(parameters, plan.methods[cell.method].defaults)
-        variants[cell.task, cell.method, cell.variant] = variant
-        task = names[cell.task]
-        cells.append(replace(cell, task=task, variant=variant, parameters=parameters))
+        task = cell.task.model_copy(update={"name": names[cell.task.name]})
+        view_cell = replace(cell, task=task, parameters=parameters)
+        variants[cell.task.name, cell.method.name, cell.variant] = view_cell.variant
+        cells.append(view_cell)
     runs = study.runs[study.runs.task.isin(list(names))].copy()
     keys = zip(runs.task, runs.method, runs.variant, strict=True)
     runs["variant"] = pd.Series([variants[key] for key in keys], runs.index, "string")
     runs["task"] = runs.task.map(names).astype(runs.task.dtype)
-    tasks = {new: {**plan.tasks[name], "name": new} for name, new in names.items()}
-    view = replace(plan, tasks=tasks, cells=tuple(cells))
+    view = replace(plan, cells=tuple(cells))
     return Study(study.folder, view, study.made_with, runs)
 
 

@@ -20,8 +20,8 @@ from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES, mean_of, one_sentence
 from coartic.analysis.words import estimate
-from coartic.learner.rows import movements_from
 from coartic.robot import Array
+from coartic.runs.run import movements_from
 from coartic.tasks.task import address_of
 
 Solution = tuple[Movement, ...]

@@ -143,10 +143,10 @@ def verify(
     different = bool(report.wrong)
     if again:
         from coartic.benchmarks.registry import registry
-        from coartic.benchmarks.reproduce import some_again
+        from coartic.benchmarks.reproduce import perform_some_again
 
         registered, count = registry(method_file or []), 0
-        for run_id, changes in some_again(folder, again, registered):
+        for run_id, changes in perform_some_again(folder, again, registered):
             count += 1
             for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
@@ -173,7 +173,7 @@ def cite(
     from coartic.runs.store import open_store
 
     made_with = None
-    declared = {name: entry.declared for name, entry in built_in().items()}
+    declared = built_in()
     if folder is not None:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
