@@ -31,7 +31,6 @@ RESERVED = (METHOD_PREFIX, SEARCH)
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
-    "coartic.baselines.placebo",
     "coartic.baselines.random_search",
     "coartic.baselines.cma_es",
     "coartic.baselines.nullspace_qp",

@@ -7,7 +7,7 @@ from fnmatch import fnmatch
 
 import numpy as np
 import pytest
-from coartic.analysis.comparisons.paper import beside_paper
+from coartic.analysis.topics.paper.rewards import beside_paper
 
 from coartic import (
     PAPER,
