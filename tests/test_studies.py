@@ -13,11 +13,10 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.claims.judge import judged
-from coartic.analysis.report import build, facts
+from coartic.analysis.report import build
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.report.text import sentence
-from coartic.analysis.signatures.signs import Sign
-from coartic.analysis.topics import horizon, random_tasks, stops
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.topics import horizon, stops
 from coartic.analysis.topics.horizon import HORIZONS, gaps_by_horizon
 from coartic.motion.costs import joint_costs
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -97,32 +96,25 @@ def planted(
     return MadeUp(study_of(frame, tasks, suite="horizon"), trajectories=made(trajectories))
 
 
-@pytest.fixture(autouse=True)
-def fewer_resamples(monkeypatch):
-    monkeypatch.setattr(random_tasks, "RESAMPLES_OF_STUDIES", 9_999)
-
-
 def verdicts(study):
     entries = judged(study)
     assert {entry.claim.suite for entry in entries} == {study.suite}
     return {entry.claim.id: entry.verdict for entry in entries if not entry.claim.uncounted}
 
 
-def test_gaps_are_those_that_were_planted():
-    gaps = gaps_by_horizon(planted(given=(20.0, *FALLING[1:])))
-    assert tuple(gaps.columns) == HORIZONS
-    means = gaps.groupby(["hands", "costs"]).mean()
-    for (hands, _), curve in means.iterrows():
-        expected = (20.0 if hands == "optimal" else 30.0, *FALLING[1:])
-        assert curve.to_numpy() == pytest.approx(expected, abs=0.01)
-    assert len(means) == 4
+def found(study):
+    """What is seen of each claim."""
+    return {entry.claim.id: entry.finding for entry in judged(study)}
 
 
 def test_claims_hold_where_they_were_planted():
     study = planted()
     assert set(verdicts(study).values()) == {"supported"}
+    seen = found(study)
     sentence = r"The first goal ahead gains [\d.]+ \[.*\] points more than all others together \("
-    assert re.match(sentence, found(study)[CLAIMS["first"]].evidence)
+    assert re.match(sentence, seen[CLAIMS["first"]].evidence)
+    for flawed, corrected in FLAWED.items():  # all tasks have all goals
+        assert seen[flawed].evidence == seen[corrected].evidence
 
 
 @pytest.mark.parametrize(
@@ -143,17 +135,6 @@ def test_a_claim_fails_alone_where_its_contrary_was_planted(claim, other):
     assert set(result.values()) == {"supported"}
 
 
-def found(study):
-    """What is seen of each claim."""
-    return {entry.claim.id: entry.finding for entry in judged(study)}
-
-
-def test_where_tasks_have_all_goals_flawed_claims_are_the_corrected_ones():
-    seen = found(planted())
-    for flawed, corrected in FLAWED.items():
-        assert seen[flawed].evidence == seen[corrected].evidence
-
-
 def test_a_goal_ahead_is_judged_on_tasks_that_have_it():
     """Eight tasks with five goals ahead or more, and some with one, three and four.
 
@@ -171,7 +152,7 @@ def test_a_goal_ahead_is_judged_on_tasks_that_have_it():
 
     study = planted(short=others, gaps=gaps)
     frame = gaps_by_horizon(study).xs(("planned", "none"), level=("hands", "costs"))
-    few = frame.loc[next(task.name for task in others if len(task.goals) == 2)]
+    few = frame[[*HORIZONS]].loc[next(t.name for t in others if len(t.goals) == 2)]
     assert few.notna().tolist() == [True, True, False, False, False, True]
     table = HORIZON(study)
     tasks = {h: table.tasks[f"all all h={h}"] for h in ("0", "1", "2", "3", "4", "5+", "all")}
@@ -208,8 +189,14 @@ def test_development_instances_are_not_judged():
     assert set(verdicts(planted(stream="d")).values()) == {"undecided"}
 
 
-def test_the_table_of_horizons_has_means_and_gains():
+def test_the_table_of_horizons_has_what_was_planted():
     study = planted(given=(20.0, *FALLING[1:]))
+    gaps = gaps_by_horizon(study)
+    means = gaps[[*HORIZONS]].groupby(["hands", "costs"]).mean()
+    for (hands, _), curve in means.iterrows():
+        expected = (20.0 if hands == "optimal" else 30.0, *FALLING[1:])
+        assert curve.to_numpy() == pytest.approx(expected, abs=0.01)
+    assert len(means) == 4
     table = HORIZON(study)
     assert 100 * table.gap["all all h=0"] == pytest.approx(30, abs=0.01)
     assert 100 * table.gain["all all h=1"] == pytest.approx(22, abs=0.01)
@@ -218,30 +205,51 @@ def test_the_table_of_horizons_has_means_and_gains():
     assert 0.24 < low < 0.3 < high < 0.36  # 24 % to 36 % are the tasks' own
     by_goals = table[(table.group == "goals") & (table.h == "0")]
     assert by_goals.tasks.sum() == len(tasks_of("i"))
+    runs = f"{tasks_of('i')[0].name} receding-horizon hands=planned, costs=none, horizon=2"
+    assert runs in table.run_ids["all all h=2"]
+    sentence = horizon.finding_of_horizon(study)
+    assert re.match(r"On 8 random tasks .* no goal ahead ends 30.0 % \[2", sentence)
+    assert "the second gains 6.0 % [" in sentence
+    assert "the others together gain 0.5 % [0.5, 0.5] (8 tasks)." in sentence
+
+
+def stopping(passing, stopped):
+    """A study of stops, with ticks in the place of solutions; only random ones are judged."""
+    tasks = [*tasks_of("i"), *tasks_of("d"), load_task("ascending")]
+    rows = [
+        {
+            **dict(zip(stops.KEYS, (group, method, timing, stop, every), strict=True)),
+            "task": task.name,
+            "cell": SimpleNamespace(good=pd.DataFrame({"run_id": [f"{task.name} {stop}"]})),
+            "nearer": ticks * (0.8 + number / 17.5) if clean else 1e4 * stop,
+        }
+        for number, task in enumerate(tasks)
+        for timing in ("free", "fixed")
+        for stop, ticks in ((0.0, passing), (1.0, stopped))
+        for method in (stops.STOPPING, "trajectory-optimisation/acceleration")
+        for every in (1, 2)
+        for clean in (number < 8 and method == stops.STOPPING and every == 1,)
+        for group in ("random, one arm",)
+    ]
+    study = study_of(pd.DataFrame([row(stops.STOPPING, -500)]), tasks, suite="stops")
+    return study, pd.DataFrame(rows)
 
 
 @pytest.mark.parametrize(
-    ("passing", "stopping", "expected"),
+    ("passing", "stopped", "expected"),
     [
         (50.0, 30.0, ["supported", "supported"]),
         (50.0, 0.5, ["not supported", "supported"]),
         (30.0, 50.0, ["supported", "not supported"]),
     ],
 )
-def test_claims_on_stops(passing, stopping, expected, monkeypatch):
-    """Ticks that are planted in the place of solutions."""
-    rows, values, tasks = [], {}, tasks_of("i")
-    for number, task in enumerate(tasks):
-        for timing in ("free", "fixed"):
-            for stop, ticks in ((0, passing), (1, stopping)):
-                variant = f"timing={timing}, stop={stop}"
-                parameters = json.dumps({"timing": timing, "stop": stop, "stop_every": 1})
-                words = {"variant": variant, "parameters": parameters, "task": task.name}
-                rows.append(row(stops.STOPPING, -500, run_id=f"{task.name} {variant}", **words))
-                values[task.name, f"{stops.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
-    monkeypatch.setattr(stops, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
-    study = study_of(pd.DataFrame(rows), tasks, suite="stops")
-    assert list(verdicts(MadeUp(study, trajectories=made(values))).values()) == expected
+def test_claims_on_stops(passing, stopped, expected, monkeypatch):
+    study, values = stopping(passing, stopped)
+    monkeypatch.setattr(stops, "stop_values", lambda study: values)
+    assert list(verdicts(study).values()) == expected
+    assert {run for entry in judged(study) for run in entry.run_ids} == {
+        f"{task.name} {stop}" for task in tasks_of("i") for stop in (0.0, 1.0)
+    }
 
 
 @pytest.fixture(scope="module")
@@ -283,7 +291,6 @@ def test_a_small_study_of_horizons(small):
     signs = TABLES["horizon-signs"](study)
     assert signs["mean"]["whole h=all"] > signs["mean"]["whole h=0"]
     assert build.drawn(study, "horizon")
-    assert "looks no goal ahead ends" in sentence("horizon", facts.horizon(study))
 
 
 def test_a_small_study_of_stops(small):
@@ -293,6 +300,18 @@ def test_a_small_study_of_stops(small):
         for timing in ("free", "fixed"):
             of = table[(table.group == group) & (table.timing == timing)].set_index("stop")
             assert of.turn[0] < of.turn[1] / 3  # passing is smooth, a stop leaves a corner
+            assert of.less[1] == pytest.approx(of.nearer[0] - of.nearer[1])
+            assert math.isnan(of.less[0])
     assert table.apart.dropna().gt(0.1).all()  # postures depend on the next goal at any stop
+    full = table.loc["random, one arm trajectory-optimisation/jerk free stop=1"]
+    cells = [cell for cell in study.cells.values() if cell.runs.run_id.iloc[0] in full.run_ids]
+    assert len(cells) == full.tasks == 3
+    for sign, column in (("arm", "nearer"), ("first", "first")):
+        ticks = [SIGNS[sign].of(study.trajectories(cell.task, cell.label)) for cell in cells]
+        assert full[column] == pytest.approx(np.mean(ticks))
     assert build.drawn(study, "stops")
-    assert sentence("stops", facts.stops(study)).startswith("At free times")
+    passing = table.loc["random, one arm trajectory-optimisation/jerk free stop=0"]
+    assert stops.finding_of_stops(study).startswith(
+        "At free times postures of minimum-jerk plans leave the next goal nearer by "
+        f"{passing.nearer:.1f} ticks [{passing.nearer_low:.1f}, "
+    )
