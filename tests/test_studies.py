@@ -71,7 +71,7 @@ def planted(
             rows.append(row(method, reward, run_id=f"{name} {method} {variant}", **words))
 
         curves = {("planned", "none"): plain, ("optimal", "none"): given}
-        curves |= {("planned", costs): dear for costs in horizon.DEAR}
+        curves |= {("planned", costs): dear for costs in ("base", "right-arm")}
         for (hands, costs), curve in curves.items():
             horizons = (0, 1, 2, 3, 4, last)
             if short:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,6 @@ from coartic.tasks.task import MOST_GOALS
 
 ALL_GOALS = "all"
 HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
-DEAR = ("base", "right-arm")
-"""Joints that cost more than the others, where the claim on them is tested."""
 BASES = ("free", "on a rail", "fixed")
 """How the base can move, by the number of directions in which it is locked."""
 KINDS: dict[str, Callable[[Task], str]] = {
@@ -229,26 +228,18 @@ def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -
     axes.plot(places, 100 * rows.gap, **line, label=name)
 
 
-FURTHER = {
-    "2": "the second gains",
-    "3": "the third gains",
-    "4": "the fourth gains",
-    BEYOND: "the others together gain",
-}
-"""Goals ahead beyond the first in words."""
-
-
 def finding_of_horizon(study: Study) -> str:
     """Gaps without and with one goal ahead, and what further goals gain on tasks that have them."""
     data = horizon(study)
     by_h = data[data.group == "all"].set_index("h").to_dict("index")
     if not {"0", "1"} <= by_h.keys():
         return ""
-    gaps = [random_tasks.with_interval(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
+    gaps = [random_tasks.interval_in_words(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
+    names = {"2": "the second gains", "3": "the third gains", "4": "the fourth gains"}
     further = [
-        f"{words} {random_tasks.with_interval(by_h[h], 'gain', ' %', scale=100)} "
+        f"{words} {random_tasks.interval_in_words(by_h[h], 'gain', ' %', scale=100)} "
         f"({plural(by_h[h]['tasks'], 'task')})"
-        for h, words in FURTHER.items()
+        for h, words in {**names, BEYOND: "the others together gain"}.items()
         if h in by_h and not math.isnan(by_h[h]["gain"])
     ]
     sentence = (
@@ -260,55 +251,48 @@ def finding_of_horizon(study: Study) -> str:
     return sentence
 
 
-def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataFrame:
-    """Gaps by horizon on the tasks that methods were not tuned on, indexed by task."""
+def gaps_of(
+    data: Data, hands: str = "planned", costs: str = "none", *, flawed: bool = False
+) -> pd.DataFrame:
+    """Gaps by horizon on the tasks that methods were not tuned on, indexed by task.
+
+    ``flawed``: as claims take them that do not count, goals that a task does not have gain nothing.
+    """
     gaps = gaps_by_horizon(data.study).query("hands == @hands and costs == @costs")
     gaps = gaps.droplevel(["hands", "costs"])
     gaps = gaps.loc[[name for name in gaps.index if data.task(name).split != "development"]]
     runs = data.study.runs
     planned = runs[(runs.method == random_tasks.RECEDING_HORIZON) & runs.task.isin(gaps.index)]
     data.run_ids.extend(planned.run_id)
-    return gaps
-
-
-def diluted(gaps: pd.DataFrame) -> pd.DataFrame:
-    """Gaps as claims take them that do not count: goals that a task does not have gain nothing."""
+    if not flawed:
+        return gaps
     there = {h: gaps[h].where(gaps.ahead >= h, gaps[ALL_GOALS]) for h in HORIZONS[:-1]}
     return pd.DataFrame({**gaps, **there, "ahead": MOST_GOALS})
 
 
-def first_goal_gains_most(gaps: pd.DataFrame) -> Finding:
+def first_goal_gains_most(data: Data, *, flawed: bool = False) -> Finding:
     """Gain of the first goal ahead less that of all further ones."""
-    gained, left = gaps[0] - gaps[1], gaps[1] - gaps[ALL_GOALS]
+    gaps = gaps_of(data, flawed=flawed)
+    more = (gaps[0] - gaps[1]) - (gaps[1] - gaps[ALL_GOALS])
     sentence = "The first goal ahead gains {} points more than all others together"
-    return random_tasks.means_over_tasks(
-        {sentence: ((gained - left).where(gaps.ahead > 1), 0.0, 1)}
-    )
+    return random_tasks.means_over_tasks({sentence: (more.where(gaps.ahead > 1), 0.0, 1)})
 
 
-@judges(
+judges(
     "first-of-several-goals-ahead-gains-most",
     test="one-tailed bootstrap test over random tasks with three goals or more: the gap of the "
     "planner falls by more from no goal ahead to one than from one to all",
-)
-def first_of_several_goals_gains_most(data: Data) -> Finding:
-    """Of tasks that have further goals."""
-    return first_goal_gains_most(gaps_of(data))
-
-
-@judges(
+)(first_goal_gains_most)
+judges(
     "first-goal-ahead-gains-most",
     test="one-tailed bootstrap test over random tasks: the gap of the planner falls by more from "
     "no goal ahead to one than from one to all",
-)
-def first_goal_gains_most_diluted(data: Data) -> Finding:
-    """Of all tasks."""
-    return first_goal_gains_most(diluted(gaps_of(data)))
+)(partial(first_goal_gains_most, flawed=True))
 
 
-def further_goals_gain_little(gaps: pd.DataFrame) -> Finding:
+def further_goals_gain_little(data: Data, *, flawed: bool = False) -> Finding:
     """Gains of the second and of the fourth goal ahead."""
-    least = MARGINS["gain"]
+    gaps, least = gaps_of(data, flawed=flawed), MARGINS["gain"]
     return random_tasks.means_over_tasks(
         {
             "The second goal ahead gains {} points": (gaps[1] - gaps[2], least, 1),
@@ -317,25 +301,17 @@ def further_goals_gain_little(gaps: pd.DataFrame) -> Finding:
     )
 
 
-@judges(
+judges(
     "further-goals-gain-little-where-they-are",
     test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
     "planner falls by more than {gain:g} % on tasks with three goals or more, and from three to "
     "four by less on those with five or more",
-)
-def further_goals_gain_little_where_they_are(data: Data) -> Finding:
-    """Of tasks that have these goals."""
-    return further_goals_gain_little(gaps_of(data))
-
-
-@judges(
+)(further_goals_gain_little)
+judges(
     "further-goals-gain-little",
     test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
     "planner falls by more than {gain:g} %, and from three to four by less",
-)
-def further_goals_gain_little_diluted(data: Data) -> Finding:
-    """Of all tasks."""
-    return further_goals_gain_little(diluted(gaps_of(data)))
+)(partial(further_goals_gain_little, flawed=True))
 
 
 @judges(
@@ -344,7 +320,7 @@ def further_goals_gain_little_diluted(data: Data) -> Finding:
     "hands less {share_of_loss:g} of the gap with planned hands is above 0",
 )
 def most_of_the_loss_is_posture(data: Data) -> Finding:
-    """Loss without look-ahead, with given hands and with planned ones."""
+    """Loss without look-ahead, with given hands less a share of that with planned ones."""
     planned, given = gaps_of(data)[0], gaps_of(data, hands="optimal")[0]
     share = MARGINS["share_of_loss"]
     sentence = (
@@ -354,10 +330,11 @@ def most_of_the_loss_is_posture(data: Data) -> Finding:
     return random_tasks.means_over_tasks({sentence: (given - share * planned, 0.0, 1)})
 
 
-def dear_joints_keep_the_horizon(gaps_by_costs: dict[str, pd.DataFrame]) -> Finding:
+def dear_joints_keep_the_horizon(data: Data, *, flawed: bool = False) -> Finding:
     """Gains of the second goal ahead, and of those beyond the fourth, with dear joints."""
     parts, least = {}, MARGINS["gain"]
-    for costs, gaps in gaps_by_costs.items():
+    for costs in ("base", "right-arm"):
+        gaps = gaps_of(data, costs=costs, flawed=flawed)
         dear = f"with a dear {costs.replace('-', ' ')}"
         parts[f"{dear} the second goal ahead gains {{}} points"] = gaps[1] - gaps[2], least, 1
         beyond = (gaps[4] - gaps[ALL_GOALS]).where(gaps.ahead > 4)
@@ -365,28 +342,18 @@ def dear_joints_keep_the_horizon(gaps_by_costs: dict[str, pd.DataFrame]) -> Find
     return random_tasks.means_over_tasks(parts)
 
 
-@judges(
+judges(
     "dear-joints-keep-the-horizon-where-goals-are",
     test="one-tailed bootstrap tests over random tasks, of the weighted path length that was "
     "executed: from one goal ahead to two the gap falls by more than {gain:g} % on tasks with "
     "four goals or six, and from four to all by less on those with six, with either dear",
-)
-def dear_joints_keep_the_horizon_where_goals_are(data: Data) -> Finding:
-    """Of tasks that have these goals."""
-    return dear_joints_keep_the_horizon({costs: gaps_of(data, costs=costs) for costs in DEAR})
-
-
-@judges(
+)(dear_joints_keep_the_horizon)
+judges(
     "dear-joints-keep-the-horizon",
     test="one-tailed bootstrap tests over random tasks with four goals or six, of the weighted "
     "path length that was executed: from one goal ahead to two the gap falls by more than "
     "{gain:g} %, and from four to all by less, with either dear",
-)
-def dear_joints_keep_the_horizon_diluted(data: Data) -> Finding:
-    """Of all tasks."""
-    return dear_joints_keep_the_horizon(
-        {costs: diluted(gaps_of(data, costs=costs)) for costs in DEAR}
-    )
+)(partial(dear_joints_keep_the_horizon, flawed=True))
 
 
 @judges(
@@ -396,15 +363,13 @@ def dear_joints_keep_the_horizon_diluted(data: Data) -> Finding:
 )
 def learner_behind_one_goal_ahead(data: Data) -> Finding:
     """Gap of the learner less that of the planner with one goal ahead."""
-    gaps = gaps_of(data)
-    instances = sample(data.study)
-    assert instances is not None  # or there would be no gaps
+    gaps, instances = gaps_of(data), sample(data.study)
+    references = instances.references if instances else {}
     learner = {}
     for name in gaps.index:
-        label = most_exploring(data.task(name))
-        cell = data.study.cells.get((name, label))
+        cell = data.study.cells.get((name, most_exploring(data.task(name))))
         if cell is not None and len(cell.good):
-            share = gap_share(cell.rewards, instances.references[name].reward)
+            share = gap_share(cell.rewards, references[name].reward)
             learner[name] = 100 * float(share.mean())
             data.run_ids.extend(cell.good.run_id)
     behind = pd.Series(learner, dtype=np.float64) - gaps[1]

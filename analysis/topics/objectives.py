@@ -23,21 +23,21 @@ from coartic.learner.rows import movements_from
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
-Solved = tuple[tuple[Movement, ...], CellRuns]
+Solution = tuple[tuple[Movement, ...], CellRuns]
 """A solution and the runs behind it."""
 TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
 """Penalties, each by its one weight, in words."""
-WHO = {
-    "told": "the planner told of the penalty",
-    "ticks": "the planner of ticks",
-    "smooth": "the planner of smoothness",
-    "learner": "the learner",
-    "from plan": "the learner from the plan of ticks",
-    "cma-es": "CMA-ES",
+WHO: dict[str, tuple[str, str, Any]] = {
+    "told": ("the planner told of the penalty", style.INK, style.SOLID),
+    "ticks": ("the planner of ticks", style.VERMILLION, style.SOLID),
+    "smooth": ("the planner of smoothness", style.ORANGE, style.DASHED),
+    "learner": ("the learner", style.BLUE, style.SOLID),
+    "from plan": ("the learner from the plan of ticks", style.SKY, style.DASHED),
+    "cma-es": ("CMA-ES", style.GREEN, style.SOLID),
 }
-"""Who makes movements, in words: planners that are told of the penalty, that believe that ticks
-count alone, that believe in smoothness; the learner, from the corrective process and from the plan
-of ticks; CMA-ES."""
+"""Who makes movements, in words, with colour and dash: planners that are told of the penalty, that
+believe that ticks count alone, that believe in smoothness; the learner, from the corrective process
+and from the plan of ticks; CMA-ES."""
 SCORED = {
     "believed-reward/plan": "told",
     "dual-process": "learner",
@@ -105,10 +105,10 @@ def rewards(study: Study) -> pd.DataFrame:
 
 
 @cached
-def plans_without_penalty(study: Study) -> dict[str, dict[str, Solved]]:
+def plans_without_penalty(study: Study) -> dict[str, dict[str, Solution]]:
     """Plans of those that know of no penalty, and their runs, by task without a penalty."""
     movements, waypoints = study.movements
-    plans: dict[str, dict[str, Solved]] = {}
+    plans: dict[str, dict[str, Solution]] = {}
     for (name, label), cell in study.cells.items():
         who = WITHOUT_PENALTY.get(label.partition(" ")[0])
         if who and study.tasks[name].penalty is None and len(cell.good):
@@ -211,17 +211,6 @@ def crossings(study: Study) -> Rows:
             yield f"{term} {who}", row | ends | runs_of(*cells.values())
 
 
-WHO_LOOKS: dict[str, tuple[str, Any]] = {
-    "told": (style.INK, style.SOLID),
-    "ticks": (style.VERMILLION, style.SOLID),
-    "smooth": (style.ORANGE, style.DASHED),
-    "learner": (style.BLUE, style.SOLID),
-    "from plan": (style.SKY, style.DASHED),
-    "cma-es": (style.GREEN, style.SOLID),
-}
-"""Colour and dash of each line."""
-
-
 @figure(
     "objectives",
     "Regret by how wrong a planner's objective is",
@@ -247,13 +236,13 @@ def draw_objectives(study: Study) -> Parts:
         axes.set_xlim(0, edge)
         axes.set_xlabel("weight (ticks)")
         for at in weights_of_crossings[weights_of_crossings.term == term].to_dict("records"):
-            band: Any = {"color": WHO_LOOKS[at["who"]][0], "alpha": 0.15, "linewidth": 0}
+            band: Any = {"color": WHO[at["who"]][1], "alpha": 0.15, "linewidth": 0}
             axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
-        for who, (color, dash) in WHO_LOOKS.items():
+        for who, (words, color, dash) in WHO.items():
             rows = data[(data.term == term) & (data.who == who)]
             line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
             axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
-            axes.plot(rows.weight, rows.regret, **line, label=WHO[who].removeprefix("the "))
+            axes.plot(rows.weight, rows.regret, **line, label=words.removeprefix("the "))
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("regret (%)")
     style.letters(panels)
@@ -279,7 +268,7 @@ def finding_of_objectives(study: Study) -> str:
         f"learner {', '.join(f'{number(regret, 1)} %' for regret in regrets.learner)}."
     )
     overtakes = [
-        f"{random_tasks.with_interval(row, 'crossing', digits=0)} with {words[row['term']]}"
+        f"{random_tasks.interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
         for row in crossings(study).to_dict("records")
         if row["who"] == "learner"
     ]
@@ -302,10 +291,8 @@ def less_regret(
         at = f"at weight {weight:g} ({TERMS[term]})" if weight else "without a penalty"
         parts.append(f"{estimate(mean(table[weight]), 1)} points {at} on {len(table)} random tasks")
     data.run_ids.extend(data.study.runs.run_id)
-    seen = (
-        f"{capital(WHO[first])} regrets less than {WHO[second]}: {', '.join(parts)}. Points are "
-        "per cent of the best known reward."
-    )
+    pair = f"{capital(WHO[first][0])} regrets less than {WHO[second][0]}"
+    seen = f"{pair}: {', '.join(parts)}. Points are per cent of the best known reward."
     return Finding(all(test.value > 0 for test in tests), seen, tuple(tests))
 
 

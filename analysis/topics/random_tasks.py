@@ -71,7 +71,7 @@ def mean_or_nan(values: Sequence[float] | Array) -> float:
     return float(there.mean()) if len(there) else math.nan
 
 
-def with_interval(
+def interval_in_words(
     row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
 ) -> str:
     """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""

@@ -173,11 +173,11 @@ def finding_of_stops(study: Study) -> str:
         rows = data[(data.timing == timing) & (data.goals_per_stop == 1)]
         by_stop = rows.set_index("stop").to_dict("index")
         if {0.0, 1.0} <= by_stop.keys():
-            passing, stopping = (by_stop[stop] for stop in (0.0, 1.0))
+            passing = random_tasks.interval_in_words(by_stop[0.0], "nearer", " ticks")
+            stopping = random_tasks.interval_in_words(by_stop[1.0], "nearer")
             sentences.append(
                 f"At {words} times postures of minimum-jerk plans leave the next goal nearer by "
-                f"{random_tasks.with_interval(passing, 'nearer', ' ticks')} when passing and by "
-                f"{random_tasks.with_interval(stopping, 'nearer')} with a full stop."
+                f"{passing} when passing and by {stopping} with a full stop."
             )
     return " ".join(sentences)
 

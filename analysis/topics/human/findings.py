@@ -25,7 +25,7 @@ from coartic.analysis.topics.human.measures import (
     Statistic,
     run_ids,
 )
-from coartic.analysis.topics.random_tasks import with_interval
+from coartic.analysis.topics.random_tasks import interval_in_words
 from coartic.analysis.words import listed, read_beside
 from coartic.robot import Array
 
@@ -180,7 +180,7 @@ def verdict_in_words(tests: pd.DataFrame) -> str:
     first = tests.iloc[0]
     verdict = f"{first.verdict}{' *' if first.built_in else ''}"
     there = tests[tests.tasks > 0].drop_duplicates("measure").to_dict("records")
-    effects = [with_interval(row, "value", digits=2) for row in there]
+    effects = [interval_in_words(row, "value", digits=2) for row in there]
     return f"{verdict}: {'; '.join(effects)}" if effects else verdict
 
 
