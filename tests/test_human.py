@@ -15,17 +15,7 @@ from coartic import load_task
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.topics.human import findings, measures
-from coartic.analysis.topics.human.findings import (
-    AGREES,
-    DISAGREES,
-    FINDINGS,
-    GROUPS,
-    NO_CASES,
-    NOT_BEYOND,
-    SILENT,
-    UNDECIDED,
-    bootstrap,
-)
+from coartic.analysis.topics.human.findings import FINDINGS, bootstrap
 from coartic.analysis.topics.human.measures import MEASURES, MODELS, Model, mean_of_rows
 from tests.support.made_up import row, study_of
 from tests.support.suites import run_and_write, suite_of
@@ -38,19 +28,19 @@ RATIO = [{"below": 1, "disagree": 0.9}]
 @pytest.mark.parametrize(
     ("tests", "ends", "tasks", "verdict"),
     [
-        (ABOVE, [(1.5, 9)], 10, AGREES),
-        (ABOVE, [(0.5, 9)], 10, UNDECIDED),
-        (ABOVE, [(-2, 0.5)], 10, DISAGREES),
-        (ABOVE, [(1, 9)], 10, UNDECIDED),  # may be at the bound, which is not above it
-        (ABOVE, [(1.5, 9)], 9, UNDECIDED),
-        (BETWEEN, [(1.2, 2.5)] * 2, 10, AGREES),
-        (BETWEEN, [(1.2, 3.5)] * 2, 10, UNDECIDED),  # above 3, and not yet above 4
-        (BETWEEN, [(4.2, 4.5)] * 2, 10, DISAGREES),
-        (BETWEEN, [(0.2, 0.5)] * 2, 10, DISAGREES),
-        (RATIO, [(0.5, 0.8)], 10, AGREES),
-        (RATIO, [(0.92, 0.98)], 10, UNDECIDED),  # less than 1, but within a tenth of it
-        (RATIO, [(0.95, 1.2)], 10, DISAGREES),
-        (RATIO, [(0.85, 1.2)], 10, UNDECIDED),
+        (ABOVE, [(1.5, 9)], 10, "agrees"),
+        (ABOVE, [(0.5, 9)], 10, "undecided"),
+        (ABOVE, [(-2, 0.5)], 10, "disagrees"),
+        (ABOVE, [(1, 9)], 10, "undecided"),  # may be at the bound, which is not above it
+        (ABOVE, [(1.5, 9)], 9, "undecided"),
+        (BETWEEN, [(1.2, 2.5)] * 2, 10, "agrees"),
+        (BETWEEN, [(1.2, 3.5)] * 2, 10, "undecided"),  # above 3, and not yet above 4
+        (BETWEEN, [(4.2, 4.5)] * 2, 10, "disagrees"),
+        (BETWEEN, [(0.2, 0.5)] * 2, 10, "disagrees"),
+        (RATIO, [(0.5, 0.8)], 10, "agrees"),
+        (RATIO, [(0.92, 0.98)], 10, "undecided"),  # less than 1, but within a tenth of it
+        (RATIO, [(0.95, 1.2)], 10, "disagrees"),
+        (RATIO, [(0.85, 1.2)], 10, "undecided"),
     ],
 )
 def test_verdicts(tests, ends, tasks, verdict):
@@ -59,13 +49,20 @@ def test_verdicts(tests, ends, tasks, verdict):
         for bounds, end in zip(tests, ends, strict=True)
     ]
     assert findings.verdict_of(of_tests) == verdict
+    assert findings.verdict_of_test(Estimate(math.nan), **tests[0]) == "no cases"
 
 
-def test_a_test_without_cases_does_not_hide_one_on_the_wrong_side():
-    verdict_of = findings.verdict_of
-    assert findings.verdict_of_test(Estimate(math.nan), above=1) == NO_CASES
-    assert verdict_of([NO_CASES, DISAGREES]) == verdict_of([AGREES, DISAGREES]) == DISAGREES
-    assert verdict_of([NO_CASES, AGREES]) == NO_CASES
+@pytest.mark.parametrize(
+    ("of_tests", "verdict"),
+    [
+        (["no cases", "disagrees"], "disagrees"),
+        (["agrees", "disagrees"], "disagrees"),
+        (["agrees", "no cases"], "no cases"),
+        (["agrees", "undecided"], "undecided"),
+    ],
+)
+def test_one_test_on_the_wrong_side_disagrees(of_tests, verdict):
+    assert findings.verdict_of(of_tests) == verdict
 
 
 def by_task(numbers):
@@ -98,10 +95,10 @@ def test_a_difference_is_paired_by_task():
 @pytest.mark.parametrize(
     ("learner", "guesses", "expected"),
     [
-        (0.5, 12 * [0.0], (AGREES, "")),
-        (0.5, 12 * [0.5], (UNDECIDED, NOT_BEYOND)),
-        (0.5, 9 * [0.0], (UNDECIDED, NOT_BEYOND)),  # nine tasks of both
-        (-0.5, 12 * [0.0], (DISAGREES, "")),
+        (0.5, 12 * [0.0], ("agrees", "")),
+        (0.5, 12 * [0.5], ("undecided", findings.NOT_BEYOND)),
+        (0.5, 9 * [0.0], ("undecided", findings.NOT_BEYOND)),  # nine tasks of both
+        (-0.5, 12 * [0.0], ("disagrees", "")),
     ],
 )
 def test_models_picked_from_trials_agree_only_beyond_random_guesses(
@@ -120,7 +117,7 @@ def test_models_picked_from_trials_agree_only_beyond_random_guesses(
     study = study_of(runs, [load_task("ascending")], suite="human")
     rows = findings.verdicts(study).set_index(["finding", "model"]).loc["two-ahead"]
     assert tuple(rows.loc["learner", ["verdict", "because"]]) == expected
-    assert rows.verdict["two goals ahead"] == AGREES  # no trials to pick from
+    assert rows.verdict["two goals ahead"] == "agrees"  # no trials to pick from
     over = rows.over_guesses["learner"]
     assert over == pytest.approx(learner - guesses[0], abs=0.03)
     assert rows.over_guesses.isna().sum() == len(rows) - 1
@@ -128,14 +125,14 @@ def test_models_picked_from_trials_agree_only_beyond_random_guesses(
 
 def test_where_the_learner_could_differ_from_planners(monkeypatch):
     verdicts = {
-        "differs": {"learner": DISAGREES, "one goal ahead": AGREES, "least jerk": AGREES},
-        "a-like": {"learner": AGREES, "one goal ahead": AGREES, "no goal ahead": DISAGREES},
-        "split": {"learner": AGREES, "one goal ahead": AGREES, "least jerk": DISAGREES},
-        "undecided": {"learner": UNDECIDED, "one goal ahead": AGREES},
-        "alone": {"learner": DISAGREES, "one goal ahead": SILENT, "least jerk": UNDECIDED},
+        "differs": {"learner": "disagrees", "one goal ahead": "agrees", "least jerk": "agrees"},
+        "a-like": {"learner": "agrees", "one goal ahead": "agrees", "no goal ahead": "disagrees"},
+        "split": {"learner": "agrees", "one goal ahead": "agrees", "least jerk": "disagrees"},
+        "undecided": {"learner": "undecided", "one goal ahead": "agrees"},
+        "alone": {"learner": "disagrees", "one goal ahead": "silent", "least jerk": "undecided"},
     }
     rows = [
-        (finding, model, of_model.get(model, NO_CASES))
+        (finding, model, of_model.get(model, "no cases"))
         for finding, of_model in verdicts.items()
         for model in MODELS
     ]
@@ -153,9 +150,8 @@ def test_where_the_learner_could_differ_from_planners(monkeypatch):
     )
 
 
-@pytest.mark.parametrize("name", FINDINGS)
-def test_a_finding_can_be_cited_and_judged(name):
-    finding = FINDINGS[name]
+@pytest.mark.parametrize("finding", FINDINGS.values(), ids=FINDINGS)
+def test_a_finding_can_be_cited_and_judged(finding):
     for field in "statement population quote place authors title source read predicts".split():
         assert finding[field]
     assert re.fullmatch(r"10\.\d{4,}/\S+", finding["doi"])
@@ -166,14 +162,13 @@ def test_a_finding_can_be_cited_and_judged(name):
         assert test["measure"] in MEASURES
         assert len(test.keys() & {"above", "below"}) == 1
         assert test.keys() <= {"measure", "above", "below", "disagree"}
-    named = {*finding.get("silent", {}), *finding.get("built_in", {})}
-    assert named <= {*MODELS, *GROUPS}
+    named = findings.by_model(finding.get("silent", {}) | finding.get("built_in", {}))
+    assert named.keys() <= MODELS.keys()
 
 
-def test_every_measure_and_model_is_used():
+def test_every_measure_serves_a_finding():
     used = {test["measure"] for finding in FINDINGS.values() for test in finding["tests"]}
     assert used == set(MEASURES)
-    assert {model for models in GROUPS.values() for model in models} <= set(MODELS)
 
 
 def test_rank_correlation_is_kendalls():
@@ -279,10 +274,10 @@ def test_a_small_study(small):
     assert best != replay
     rows = TABLES["human-effects"](small)
     row = rows.loc["two-ahead one goal ahead slope norm at distance 2"]
-    assert (row.tasks, row.of_test, row.bound) == (2, UNDECIDED, "above 0.01")
+    assert (row.tasks, row.of_test, row.bound) == (2, "undecided", "above 0.01")
     assert set(row.run_ids.split()) <= set(small.runs.run_id)
     silent = rows.loc["two-ahead learner EC2 slope norm at distance 2"]
-    assert (silent.verdict, silent.tasks) == (SILENT, 0)
+    assert (silent.verdict, silent.tasks) == ("silent", 0)
     assert silent.because.startswith("they are for two arms")
     table = TABLES["human"](small)
     assert table["of one goal ahead"]["two-ahead"].startswith("undecided: 0.00")
