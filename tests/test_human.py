@@ -1,5 +1,6 @@
 """Models beside people: measures of planted paths and postures, verdicts, a small suite."""
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -176,6 +177,32 @@ def test_rank_correlation_is_kendalls():
     expected = stats.kendalltau(*pairs.T).statistic
     assert measures.rank_correlation(pairs) == pytest.approx(expected)
     assert measures.rank_correlation(np.column_stack([np.zeros(14), np.arange(14)])) == 0
+
+
+def test_statistics_of_all_tasks():
+    # Slope norms at distances 1 and 2 after practice and before.
+    norms = np.array([[1.0, 0.5, 1.0, 0.2], [3.0, 1.5, 1.0, 0.4]])
+    assert measures.horizon_rise(norms) == pytest.approx(0.7)
+    assert measures.ratio_rise(norms) == pytest.approx(0.5 - 0.3)
+    assert measures.ratio_of_means(norms[:, :2]) == pytest.approx(2.0)
+    turns = np.random.default_rng(4).uniform(-2, 2, size=(2, 30))
+    bow = 0.1 - 0.3 * turns[0] + 0.2 * turns[1]
+    assert measures.slope_of_bows(np.column_stack([bow, *turns])) == pytest.approx(-0.3)
+
+
+def test_horizon_that_is_enough():
+    """Within 1 % of all goals in view, on tasks with six goals or more."""
+    tasks = [load_task(f"{family}/v1/i000") for family in ("long", "one-armed")]
+    assert [len(task.goals) >= 6 for task in tasks] == [True, False]
+    rows = [
+        row("receding-horizon", -ticks, task=task.name, variant=f"horizon={h}",
+            parameters=json.dumps({"horizon": h}))
+        for task in tasks
+        for h, ticks in {0: 150, 1: 102, 2: 101, 3: 110, 99: 100}.items()
+    ]  # fmt: skip
+    study = study_of(pd.DataFrame(rows), tasks, suite="human")
+    assert measures.sufficient_horizon(study, MODELS["all goals ahead"]) == {tasks[0].name: 2}
+    assert measures.sufficient_horizon(study, MODELS["one goal ahead"]) == {}
 
 
 def moving(slopes, noise, rng, runs=4):

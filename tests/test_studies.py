@@ -174,6 +174,7 @@ def test_the_table_of_horizons_has_what_was_planted():
     assert 100 * table.gap["hands given h=0"] == pytest.approx(20, abs=0.01)
     low, high = table.gap_low["all all h=0"], table.gap_high["all all h=0"]
     assert 0.24 < low < 0.3 < high < 0.36  # 24 % to 36 % are the tasks' own
+    assert set(table.seconds) == {0.5}  # as planted in every run
     by_goals = table[(table.group == "goals") & (table.h == "0")]
     assert by_goals.tasks.sum() == len(tasks_of("i"))
     runs = f"{tasks_of('i')[0].name} hands=planned, costs=none, horizon=2"
@@ -252,7 +253,9 @@ def test_a_small_study_of_horizons(small):
         mean = (ticks[h] / best - 1)[there].mean()
         assert HORIZON(study).gap[f"all all h={h}"] == pytest.approx(mean)
     signs = TABLES["horizon-signs"](study)
-    assert signs["mean"]["whole h=all"] > signs["mean"]["whole h=0"]
+    none, every = signs.loc["whole h=0"], signs.loc["whole h=all"]
+    assert 0 < none.to_come == pytest.approx(every["mean"] - none["mean"])
+    assert none.tasks == sum(len(task.goals) > 1 for task in study.tasks.values())
     assert build.drawn(study, "horizon")
 
 
