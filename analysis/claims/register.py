@@ -101,7 +101,7 @@ class Claim(FileData):
     id: str
     section: str
     statement: str
-    rule: str
+    rule: str = ""
     test: str = ""
     exact: bool = False
     fitted: bool = False

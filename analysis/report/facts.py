@@ -37,16 +37,11 @@ from coartic.analysis.topics.comparison.runtimes import halfway
 from coartic.analysis.topics.comparison.runtimes import price as price_by_method
 from coartic.analysis.topics.comparison.scores import initial_and_optimum, leaders
 from coartic.analysis.topics.families.sample import one_by_one, sample
-from coartic.analysis.topics.human import judge
 from coartic.analysis.topics.paper.published import RUNS, TRIALS
 from coartic.analysis.topics.paper.rewards import beside_paper
 from coartic.analysis.topics.paper.tables import best_condition
 
 Facts = dict[str, Any]
-PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
-"""Terms of a penalty in words."""
-FURTHER = {"2": "the second", "3": "the third", "4": "the fourth", "5+": "the others together"}
-"""Goals ahead beyond the first in words."""
 
 
 def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
@@ -377,76 +372,6 @@ def exploration(study: Study) -> list[Facts]:
     return [
         {str(k): v for k, v in row.items()} for row in rows.assign(**percent).to_dict("records")
     ]
-
-
-@cached
-def horizon(study: Study) -> Facts | None:
-    """Gaps of the planner by goals ahead over random tasks, and what goals gain on tasks that have
-    them."""
-    rows = TABLES["horizon"](study)
-    rows = rows[rows.group == "all"]
-    if not len(rows):
-        return None
-    columns = [f"{name}{end}" for name in ("gap", "gain") for end in ("", "_low", "_high")]
-    each = rows.assign(**100 * rows[columns]).to_dict("records")
-    return {
-        "tasks": each[0]["tasks"],
-        "by_h": {row["h"]: row for row in each},
-        "further": [
-            row | {"words": words}
-            for row in each
-            if (words := FURTHER.get(row["h"])) and not math.isnan(row["gain"])
-        ],
-    }
-
-
-@cached
-def stops(study: Study) -> list[Facts] | None:
-    """What postures are worth to the next goal when passing and with a full stop, by times.
-
-    Of minimum-jerk plans on random tasks with one arm.
-    """
-    rows = TABLES["stops"](study)
-    jerk = rows[(rows.group == "random, one arm") & rows.method.str.endswith("/jerk")]
-    both = []
-    for timing, words in (("free", "free"), ("fixed", "equal")):
-        at = jerk[jerk.timing == timing].set_index("stop")
-        if {0.0, 1.0} <= set(at.index):
-            both.append({"times": words, "passing": at.loc[0.0], "stopping": at.loc[1.0]})
-    return both or None
-
-
-@cached
-def objectives(study: Study) -> Facts | None:
-    """Regrets at the largest weight, by penalty, and where trial and error overtakes."""
-    rows = TABLES["objectives"](study)
-    if not len(rows):
-        return None
-    last = rows[rows.weight == rows.weight.max()]
-    by_term = {term: part.set_index("who") for term, part in last.groupby("term", sort=False)}
-    crossings = TABLES["crossings"](study)
-    return {
-        "tasks": int(rows.tasks.max()),
-        "weight": rows.weight.max(),
-        "penalties": [
-            {"term": PENALTIES[str(term)], "regret": part.regret.to_dict()}
-            for term, part in by_term.items()
-        ],
-        "crossings": [
-            {**row, "term": PENALTIES[row["term"]]}
-            for row in crossings[crossings.who == "learner"].to_dict("records")
-        ],
-    }
-
-
-@cached
-def human(study: Study) -> Facts | None:
-    """How often the learner agrees with findings about people, and where it could differ."""
-    rows = judge.judged(study).drop_duplicates(["finding", "model"])
-    if not len(rows):
-        return None
-    learner = rows[rows.model == "learner"].verdict.value_counts().to_dict()
-    return {"learner": learner, "findings": len(judge.FINDINGS), **judge.separating(study)}
 
 
 @cached
