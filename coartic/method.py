@@ -333,6 +333,18 @@ class Session:
             better = trials.rewards > np.asarray(until)[: len(given)]
             if better.any():
                 trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
+        self._count_trials(trials)
+        if Information.CORRECTIVE_PROCESS in self._told:
+            return trials
+        return trials._replace(
+            corrections=trials.corrections[:0],
+            iterations=trials.iterations[:0],
+            targets=trials.targets[:0],
+            reached=trials.reached[:0],
+        )
+
+    def _count_trials(self, trials: Trials) -> None:
+        """Count trials and keep their rewards."""
         self._meter.trials += len(trials.ticks)
         self._meter.movement_ticks += int(trials.ticks.sum())
         self._meter.corrections += int(trials.corrections.sum())
@@ -344,14 +356,6 @@ class Session:
         for failed in np.flatnonzero(~trials.completed).tolist():
             rewards[failed] = None
         self._rewards.extend(rewards)
-        if Information.CORRECTIVE_PROCESS in self._told:
-            return trials
-        return trials._replace(
-            corrections=trials.corrections[:0],
-            iterations=trials.iterations[:0],
-            targets=trials.targets[:0],
-            reached=trials.reached[:0],
-        )
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).
