@@ -280,13 +280,24 @@ class TaskEnv(gymnasium.Env):
         if self.render_mode == "rgb_array":
             figure = Figure(figsize=(6, 4))
             canvas: Any = FigureCanvasAgg(figure)
-            draw(figure, self.arms)
+            self._draw(figure)
             canvas.draw()
             return np.asarray(canvas.buffer_rgba())[..., :3].copy()
         self._figure = self._figure or pyplot.figure(figsize=(6, 4))
-        draw(self._figure, self.arms)
+        self._draw(self._figure)
         pyplot.pause(1 / self.metadata["render_fps"])
         return None
+
+    def _draw(self, figure: Figure) -> None:
+        from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
+
+        arms, task = self.arms, self.arms.task
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure.clear()
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, arms.q[0], weight=1.5)
+        number_goals(axes, task, weight=1.5)
+        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[0])
 
     def close(self) -> None:
         """Close the window."""
@@ -341,28 +352,6 @@ class TaskVectorEnv(VectorEnv):
     def _infos(self) -> dict[str, Any]:
         infos = self.arms.infos()
         return infos | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in infos}
-
-
-def draw(figure: Figure, arms: Arms) -> None:
-    """Draw the first robot and the goals; those that are hit are filled."""
-    from matplotlib.patches import Circle
-
-    task, q = arms.task, arms.q[0]
-    shown = [task.goal_array]
-    shown += [task.robot.joint_positions(task.q0, hand) for hand in task.hands]
-    (left, bottom), (right, top) = np.min(np.vstack(shown), 0), np.max(np.vstack(shown), 0)
-    figure.clear()
-    axes = figure.add_subplot(
-        aspect="equal", xlim=(left - 1, right + 1), ylim=(bottom - 1, top + 1)
-    )
-    axes.fill(*task.robot.base_outline(q).T, color="0.8")
-    for hand in task.hands:
-        axes.plot(*task.robot.joint_positions(q, hand).T, "k-o", markersize=3)
-    for number, (x, y) in enumerate(task.goals):
-        next_color = "tab:red" if number == arms.goal[0] else "0.5"
-        is_hit = bool(number < arms.goal[0])
-        axes.add_patch(Circle((x, y), task.radius, color=next_color, fill=is_hit))
-        axes.annotate(str(number + 1), (x, y + task.radius), ha="center", va="bottom")
 
 
 TASKS = {

@@ -66,7 +66,7 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import animate, check_film
+    from coartic.analysis.figures.animation import check_film, write_film
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
@@ -85,7 +85,7 @@ def animate(
         movements = corrective_trial(task, hands, model=stored.model).movements
         initial_solution = trajectory(task, movements, model=stored.model)
         panels.insert(0, (f"{task.label}: initial solution", initial_solution))
-    frames, ticks_a_second = animate(panels, out, width=width, replace=replace)
+    frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
 
