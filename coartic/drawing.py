@@ -40,7 +40,7 @@ def draw_robot(axes: Axes, task: Task, q: Array, *, weight: float = 1.0) -> Call
     ]
     for patch in base:
         axes.add_artist(patch)
-    style = {"color": INK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
+    style: Any = {"color": INK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
     arms = {
         hand: axes.plot(*task.robot.joint_positions(q, hand).T, **style, **MARKERS[hand])[0]
         for hand in task.hands

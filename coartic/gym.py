@@ -123,10 +123,9 @@ class Arms:
         self.goal = np.empty(count, dtype=np.int64)
         self.hands = np.empty((count, goals), dtype=np.int64)
         counts = np.empty((5, count), dtype=np.int64)
-        self.trials = Trials(
-            counts[0], np.empty(count, np.bool_), *counts[1:4],
-            *np.empty((2, count, goals, dof)), counts[4],
-        )  # fmt: skip
+        places = np.empty((2, count, goals, dof))
+        completed = np.empty(count, dtype=np.bool_)
+        self.trials = Trials._make([counts[0], completed, *counts[1:4], *places, counts[4]])
         """The trials as far as they are made."""
         self.reset(np.ones(count, dtype=np.bool_))
 
