@@ -181,7 +181,6 @@ class Arms:
             model=self.model,
         )
         penalties = penalties_of_movements(self.task, self.q[rows], reached.q, hands, goal == 0)
-        penalties[~reached.hit] = 0
         self.q[rows] = reached.q
         self.hands[rows, goal] = hands
         self.goal[rows] += reached.hit
