@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
-INK, GREY, WHITE = "#000000", "#7a7a7a", "#ffffff"
+BLACK, BASE, WHITE = "#000000", "#7a7a7a", "#ffffff"
 HIT = "0.55"  # of a goal; not black, which is the right hand
 MARKERS: dict[Hand, dict[str, Any]] = {
     # Squares are larger than circles, so that hands at one place show both.
@@ -35,12 +35,12 @@ def draw_robot(axes: Axes, task: Task, q: Array, *, weight: float = 1.0) -> Call
     """
     outline = task.robot.base_outline(q)
     base = [
-        Polygon(outline, facecolor=GREY, alpha=0.25, edgecolor="none", zorder=1.5),
-        Polygon(outline, fill=False, edgecolor=INK, linewidth=0.6 * weight, zorder=1.6),
+        Polygon(outline, facecolor=BASE, alpha=0.25, edgecolor="none", zorder=1.5),
+        Polygon(outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, zorder=1.6),
     ]
     for patch in base:
         axes.add_artist(patch)
-    style: Any = {"color": INK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
+    style: Any = {"color": BLACK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
     arms = {
         hand: axes.plot(*task.robot.joint_positions(q, hand).T, **style, **MARKERS[hand])[0]
         for hand in task.hands
@@ -57,7 +57,7 @@ def draw_robot(axes: Axes, task: Task, q: Array, *, weight: float = 1.0) -> Call
 
 def draw_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
     """Draw every goal as an open circle of its radius; returns the circles."""
-    options: Any = {"fill": False, "edgecolor": INK, "linewidth": 0.7 * weight, "zorder": 3}
+    options: Any = {"fill": False, "edgecolor": BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]
     for circle in circles:
         axes.add_artist(circle)
@@ -77,7 +77,7 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
         axes.annotate(
             str(index), (x, y + side * task.radius), (0, 1.5 * weight * side),
             textcoords="offset points", ha="center", va="top" if below else "bottom",
-            color=INK, zorder=4,
+            color=BLACK, zorder=4,
             bbox={"boxstyle": "square,pad=0", "facecolor": WHITE, "alpha": 0.8, "linewidth": 0},
             **text,
         )  # fmt: skip

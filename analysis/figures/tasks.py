@@ -14,7 +14,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.generality.sample import one_by_one
 from coartic.analysis.study import Study
-from coartic.drawing import INK, MARKERS, box, draw_goals, draw_robot, number_goals
+from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
 @figure(
@@ -77,11 +77,11 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_ylabel("y (length unit)")
     hands = {hand for task in tasks for hand in task.hands}
     arms = [
-        style.entry(f"{hand} arm", color=INK, linewidth=0.9, **look)
+        style.entry(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
         for hand, look in MARKERS.items()
         if hand in hands
     ]
     circle: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
-    goal = style.entry("goal", linestyle="", color=INK, **circle)
+    goal = style.entry("goal", linestyle="", color=style.INK, **circle)
     style.legend(drawing, [*arms, goal], 3)
     return drawing

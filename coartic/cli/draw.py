@@ -10,7 +10,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.text import counted, one_line
+from coartic.text import counted
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -77,7 +77,7 @@ def animate(
     for name in (run_id,) if other is None else (run_id, other):
         _, stored = find_run(name, folder)
         movement, number = trajectory_of(stored), stored.run.row["run"]
-        title = one_line(f"{movement.task.label}: {name_of(stored.method)}, run {number}")
+        title = f"{movement.task.label}: {name_of(stored.method)}, run {number}"
         panels.append((title, movement))
     if initial:
         task = panels[0][1].task
@@ -87,6 +87,3 @@ def animate(
         panels.insert(0, (f"{task.label}: initial solution", initial_solution))
     frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
-
-
-COMMANDS = (draw, animate)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import names_in
+from coartic.cli.arguments import split_names
 from coartic.cli.terminal import Display, interruptible, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 def run(
     suite: given.SuiteName,
     folder: given.Out = None,
-    runs: given.Runs = None,
-    trials: given.Trials = None,
+    runs: given.RunCount = None,
+    trials: given.TrialCount = None,
     jobs: given.Jobs = -1,
     tasks: given.Tasks = None,
     methods: given.Methods = None,
@@ -48,7 +48,7 @@ def run(
 
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
+    wanted = split_names(tasks, "--tasks"), split_names(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     plan = plan_suite(
         chosen,
@@ -235,6 +235,3 @@ def show_laws(name: str, laws: Sequence[Law]) -> int:
     passed = sum(law.passed for law in laws)
     say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
     return len(laws) - passed
-
-
-COMMANDS = (run, list_, check, reproduce)
