@@ -17,14 +17,12 @@ class Practised:
 
     def __init__(self, envs, action, seed):
         self.envs, self.action, self.rng = envs, action, np.random.default_rng(seed)
-        self.gains = []
 
     def learn(self, steps):
         self.envs.reset()
         for _ in range(steps):
             size = (self.envs.num_envs, *self.envs.action_space.shape)
-            gains, ended = self.envs.step(self.rng.uniform(-1, 1, size))[1:3]
-            self.gains += gains[ended].tolist()
+            self.envs.step(self.rng.uniform(-1, 1, size))
 
     def predict(self, observations, deterministic=False):
         assert deterministic
@@ -74,3 +72,28 @@ def test_an_agent_needs_a_trial_for_its_policy():
         else:
             assert len(agent_of(0.0).solve(session).solution) == 4
         assert session.meter.trials == (budget if budget > 1 else 0)
+
+
+def test_what_an_agent_sees_and_gets():
+    """Goal, hand before, last action; at the end by how many per cent the trial was better."""
+    session = Session(load_task("two-armed-1"), 0, TOLD)
+    envs = agents.SessionEnvs(session, agents.AgentParameters(envs=3, scale=0.25))
+    assert (envs.reset() == [1] + 14 * [0]).all()
+    actions = np.float32(0.02) * np.arange(3)[:, None] * np.ones((3, 9), np.float32)
+    for goal in range(3):
+        seen, rewards, ended, infos = envs.step(actions)
+        hand = [1, 0] if "LRLR"[goal] == "L" else [0, 1]
+        assert (seen[:, :6] == [*np.eye(4)[goal + 1], *hand]).all()
+        np.testing.assert_array_equal(seen[:, 6:], actions)
+        assert not rewards.any()
+        assert not ended.any()
+        assert not any(infos)
+    seen, rewards, ended, infos = envs.step(actions)
+    cost = coartic.objective("two-armed-1", "LRLR")
+    due = [100 * (1 - cost(cost.x0 + 0.25 * float(action[0])) / 532) for action in actions]
+    np.testing.assert_allclose(rewards, due, rtol=1e-6)
+    assert len({*due}) == 3
+    assert ended.all()
+    assert (seen == [1] + 14 * [0]).all()
+    assert infos[2]["episode"] == {"r": pytest.approx(due[2]), "l": 4, "t": 0}
+    assert session.meter.trials == 16 + 3

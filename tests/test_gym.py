@@ -130,6 +130,21 @@ def test_the_vector_is_as_many_single_ones(options):
 
 
 def test_the_robot_is_drawn():
+    """Goals that are hit are filled; the robot moves."""
+    from matplotlib.figure import Figure
+
+    from coartic import drawing
+
+    task, axes = load_task("two-armed-1"), Figure().add_subplot()
+    circles = drawing.draw_goals(axes, task)
+    drawing.fill_goals(circles, [True, False, False, False])
+    assert [circle.get_fill() for circle in circles] == [True, False, False, False]
+    assert [circle.center for circle in circles] == [*map(tuple, task.goals)]
+    move = drawing.draw_robot(axes, task, task.q0)
+    move(task.q0 + 1.0)
+    for line, hand in zip(axes.lines, ("left", "right"), strict=True):
+        due = task.robot.joint_positions(task.q0 + 1.0, hand)
+        np.testing.assert_array_equal(line.get_xydata(), due)
     env = gymnasium.make(TWO, render_mode="rgb_array")
     env.reset()
     before = env.render()
