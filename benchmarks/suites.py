@@ -22,9 +22,9 @@ from coartic.inputs import (
     MOST_TRIALS,
     FileData,
     brief_value,
+    error_saying,
     problems,
     read_toml,
-    sentence,
 )
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
@@ -86,9 +86,11 @@ class Block(FileData):
         """Refuses a parameter that is there twice, or has a value twice."""
         for name, values in self.grid.items():
             if name in self.parameters:
-                raise sentence(f"{brief_value(name)} stands among the parameters and in the grid")
+                raise error_saying(
+                    f"{brief_value(name)} stands among the parameters and in the grid"
+                )
             if len(set(values)) < len(values):
-                raise sentence(f"{brief_value(name)} has the same value twice in the grid")
+                raise error_saying(f"{brief_value(name)} has the same value twice in the grid")
         return self
 
     def task_names(self, user_tasks: Iterable[str]) -> list[str]:

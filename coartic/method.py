@@ -372,11 +372,7 @@ class Session(TaskView):
             better = trials.rewards > np.asarray(until)[: len(given)]
             if better.any():
                 trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
-        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
-        for failed in np.flatnonzero(~trials.completed).tolist():
-            rewards[failed] = None
-        spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
-        self._count_trials(rewards, *(each.sum() for each in spent))
+        self._count_batch(trials)
         if Information.CORRECTIVE_PROCESS in self._told:
             return trials
         return trials._replace(
@@ -385,6 +381,14 @@ class Session(TaskView):
             targets=trials.targets[:0],
             reached=trials.reached[:0],
         )
+
+    def _count_batch(self, trials: Trials) -> None:
+        """Count the trials of a batch and keep their rewards."""
+        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
+        for failed in np.flatnonzero(~trials.completed).tolist():
+            rewards[failed] = None
+        spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
+        self._count_trials(rewards, *(each.sum() for each in spent))
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).

@@ -7,14 +7,13 @@ import numpy.testing as npt
 import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
-from coartic.benchmarks.run import Batch, split
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
 from coartic.motion.compiled import entry
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.trigonometry import LARGEST
 from tests.support.strategies import UNEVEN
-from tests.support.suites import KNOWN, InProcess, planned, run_and_write
+from tests.support.suites import KNOWN, InProcess, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -97,22 +96,7 @@ def test_lanes_do_not_mix(count, far):
         npt.assert_allclose((xs[-1, number], ys[-1, number]), expected, atol=1e-9)
 
 
-class Watched(InProcess):
-    """An executor that keeps what it was asked."""
-
-    def __init__(self):
-        self.jobs = []
-
-    def perform(self, jobs):
-        self.jobs += jobs
-        return super().perform(jobs)
-
-    @property
-    def sizes(self):
-        return [len(job.keys) for job in self.jobs]
-
-
-class Nobody(Watched):
+class Nobody(InProcess):
     """Its processes end wherever runs are performed side by side."""
 
     def perform(self, jobs):
@@ -128,36 +112,12 @@ ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     tables = []
-    for number, executor in enumerate((Watched(), Nobody())):
+    for number, executor in enumerate((InProcess(), Nobody())):
         options = {"runs": LANES + 2, "trials": 3, "executor": executor}
         tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
     assert (tables[0].status == "ok").all()
     assert tables[0].result.tolist() == tables[1].result.tolist()
-    assert executor.sizes == [LANES, 2, 1] + [1] * (LANES + 2)
     assert [set(runs.together) for runs in tables] == [{1, 2, LANES}, {1}]
-
-
-@pytest.mark.parametrize(
-    ("cells", "runs", "workers", "sizes"),
-    [
-        ([LEARNER], 40, 2, [20, 20]),
-        ([LEARNER], 20, 8, [8, 8, 4]),
-        ([LEARNER], 2 * LANES + 20, 2, [LANES, LANES, 10, 10]),
-        ([LEARNER], 2 * LANES + 3, 2, [LANES, LANES, 3]),
-        ([LEARNER], LANES, 1, [LANES]),
-        ([LEARNER, ALONE], 20, 2, [11, 9, 1]),
-    ],
-)
-def test_runs_are_divided_among_workers(cells, runs, workers, sizes):
-    plan = planned(cells, runs=runs, trials=3)
-    every = [
-        Batch(position, [plan.key(position, number) for number in range(cell.runs)])
-        for position, cell in enumerate(plan.cells)
-    ]
-    batches = list(split(plan, every, workers))
-    assert [len(batch.keys) for batch in batches] == sizes
-    kept = [(batch.position, key) for batch in batches for key in batch.keys]
-    assert kept == [(batch.position, key) for batch in every for key in batch.keys]
 
 
 class Forges(InProcess):

@@ -28,9 +28,8 @@ from coartic.optimisers import objective
 from coartic.tasks.families import task_text
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import tiny_task, uneven_task
+from tests.support.strategies import sample, tiny_task, uneven_task
 from tests.support.suites import InProcess
-from tests.test_doors import sample
 from tests.test_learner import assert_equals_reference
 
 TERMS = {

@@ -179,6 +179,3 @@ def cite(
             declared, made_with = store.plan().methods, store.made_with()
     text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
-
-
-COMMANDS = (report, trace, compare, verify, cite)

@@ -236,6 +236,3 @@ def show_laws(name: str, laws: Sequence[Law]) -> int:
     passed = sum(law.passed for law in laws)
     say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
     return len(laws) - passed
-
-
-COMMANDS = (run, list_, check, reproduce)

@@ -189,6 +189,7 @@ def learn_together(
     runs, dof = len(seeds), task.robot.dof
     first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
     for number, movements in movements_by_goal(task, list(start)) if start else ():
+        first_targets[number - 1] = 0.0  # beyond the joints of a smaller robot
         first_targets[number - 1, :dof] = movements[0].target
     codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
     if len(codes) != len(task.goals):

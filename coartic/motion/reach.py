@@ -44,7 +44,7 @@ class Reached(NamedTuple):
     """Forward-kinematics evaluations reached."""
 
 
-class Reaches(NamedTuple):
+class Requests(NamedTuple):
     """What the kernel reads: N arms in K groups, each to G goals in turn."""
 
     starts: Any  # (N, dof)
@@ -167,7 +167,7 @@ def correct_missed(
 def reach_lot(
     first: int, count: int, group: int, arms: Any, setup: Any, reached: Any, batch: Any
 ) -> None:
-    """Reaches of one group, as many as there is room for."""
+    """Requests of one group, as many as there is room for."""
     for i in range(count):
         fill_row(batch.runs[i].q, arms.starts[first + i])
         batch.going[i] = True
@@ -226,7 +226,7 @@ def reach_in_turn(
     free = ("x" not in locked_base, "y" not in locked_base)
     flags = np.zeros((2, lot), dtype=np.bool_)
     reach_goals(
-        Reaches(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
+        Requests(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
         Setup(
             robot.arm("left"), robot.arm("right"), radius, Corrector(*free), model, corrects, looks
         ),

@@ -28,7 +28,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, FileData, problems, read_toml, sentence
+from coartic.inputs import MOST_CELLS, FileData, error_saying, problems, read_toml
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
@@ -62,7 +62,7 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 def in_thousandths(value: float) -> int:
     """A number of up to three decimals as a whole number of thousandths."""
     if round(value * _PARTS) / _PARTS != value:
-        raise sentence(f"{value} should have at most three decimals")
+        raise error_saying(f"{value} should have at most three decimals")
     return round(value * _PARTS)
 
 

@@ -26,7 +26,7 @@ from pydantic import (
 )
 
 from coartic.errors import TaskError
-from coartic.inputs import FileData, brief_value, problems, read_toml, sentence
+from coartic.inputs import FileData, brief_value, error_saying, problems, read_toml
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, counted, did_you_mean, short_repr
@@ -241,10 +241,10 @@ class Task(FileData):
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Task:
         if (problem := next(contradictions(self), None)) is not None:
-            raise sentence(problem)
+            raise error_saying(problem)
         # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
-            raise sentence(far)
+            raise error_saying(far)
         return self
 
     def __repr__(self) -> str:

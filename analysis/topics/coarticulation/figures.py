@@ -13,11 +13,11 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.figures.robot import MARKERS
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study
+from coartic.drawing import MARKERS
 
 _LETTERS = 9  # points: the page shows it small
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
