@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from coartic.learner.rows import movements_from
 
 import coartic
 from coartic import MotionModel, builtin_tasks, corrective_trial, execute, hand_sequences, load_task
@@ -17,6 +16,7 @@ from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, MethodError, Session
 from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
+from coartic.runs.run import movements_from
 from tests.support.strategies import tiny_task
 
 DOCS = Path(__file__).parent.parent / "docs"

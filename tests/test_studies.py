@@ -208,7 +208,9 @@ def test_claims_on_stops(passing, stopped, expected, monkeypatch):
         at = dict(zip(stops.KEYS, ("random, one arm", method, timing, stop, every), strict=True))
         rows.append({**at, "task": task.name, "cell": cell, "nearer": ticks})
     monkeypatch.setattr(stops, "stop_values", lambda study: pd.DataFrame(rows))
-    study = study_of(pd.DataFrame([row(judged_plan, -500, task="ascending")]), tasks, suite="stops")
+    study = study_of(
+        pd.DataFrame([row(judged_plan, -500, task=task.name) for task in tasks]), tasks, suite="stops"
+    )
     assert list(verdicts(study).values()) == expected
     assert {run for entry in judged(study) for run in entry.run_ids} == {
         f"{task.name} {stop}" for task in tasks_of("i") for stop in (0.0, 1.0)
