@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.claims.judge import judged
+from coartic.analysis.claims.judge import judgements
 from coartic.analysis.report import build, facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
@@ -103,7 +103,7 @@ def fewer_resamples(monkeypatch):
 
 
 def verdicts(study):
-    entries = judged(study)
+    entries = judgements(study)
     assert {entry.claim.suite for entry in entries} == {study.suite}
     return {entry.claim.id: entry.verdict for entry in entries if not entry.claim.uncounted}
 
@@ -145,7 +145,7 @@ def test_a_claim_fails_alone_where_its_contrary_was_planted(claim, other):
 
 def found(study):
     """What is seen of each claim."""
-    return {entry.claim.id: entry.finding for entry in judged(study)}
+    return {entry.claim.id: entry.finding for entry in judgements(study)}
 
 
 def test_where_tasks_have_all_goals_flawed_claims_are_the_corrected_ones():
