@@ -1,7 +1,6 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -523,7 +522,7 @@ def test_the_shortest_reach():
     assert 0.9 * least < lengths[1] < least
 
 
-def test_the_corrective_process_is_near_the_shortest_way(monkeypatch):
+def test_the_corrective_process_is_near_the_shortest_way():
     """With the goals of the first release goal 2 of two-armed task 2 is 13 % off.
 
     The sum over its subtasks would hide that.
@@ -536,10 +535,6 @@ def test_the_corrective_process_is_near_the_shortest_way(monkeypatch):
     two = verdict_of(claims[1], study)
     assert two.verdict == "not supported"
     assert "two-armed-2 0.3%, 13.2%" in two.evidence
-    monkeypatch.setitem(MARGINS, "close", 0.14)
-    assert verdict_of(claims[1], study).verdict == "supported"
-    monkeypatch.setitem(MARGINS, "close", 0.08)
-    assert verdict_of(claims[0], study).verdict == "not supported"
 
 
 BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
@@ -708,13 +703,12 @@ SEEN = {
         (1, 0, 1, "undecided"),  # what a reward by subtask shows
         (1, 2, 0, "not supported"),
         (1, 0, 2, "not supported"),
-        (-1, 0, 0, "not supported"),
+        (-1, -2, -2, "not supported"),  # though the placebos show less
     ],
 )
 def test_coarticulation_is_more_than_either_placebo_shows(
     claim, learned, guesses, subtask, verdict
 ):
-    """A difference of postures has no direction: -1 is as far apart."""
     run, tasks, conditions, size, step = SEEN[claim]
 
     def runs(task, much):
@@ -731,8 +725,7 @@ def test_coarticulation_is_more_than_either_placebo_shows(
         )
     }
     judged = verdict_of(claim, plant(solutions))
-    expected = "supported" if claim == "context" and learned < 0 else verdict
-    assert judged.verdict == expected, judged.evidence
+    assert judged.verdict == verdict, judged.evidence
 
 
 @pytest.mark.parametrize(
@@ -809,41 +802,16 @@ def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
     assert verdict_of("no-reversal", study).verdict == verdict
 
 
-class FewStarts(InProcess):
-    """Plans are begun from little: how good they are is for the tests of their methods."""
-
-    def perform(self, jobs):
-        few = {"graphs": 1, "chains": 1, "noisy_starts": 0, "nodes": 60}
-        return super().perform(
-            replace(job, parameters=job.parameters | (few if "graphs" in job.parameters else {}))
-            for job in jobs
-        )
-
-
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The paper's cells as far as its claims need them, beside a plan and the initial solution."""
-    cells = [
-        (task, f"dual-process/{condition}")
-        for task, conditions in (
-            ("ascending", ["EC1"]),
-            ("descending", ["EC1"]),
-            (T1, ["EC2", "EC3", "EC4"]),
-            (T2, ["EC3", "EC4"]),
-        )
-        for condition in conditions
-    ]
+    """The paper's cells as far as its claims need them, beside a placebo."""
+    cells = [(task, f"dual-process/{condition}") for task, condition, _ in CELLS]
     cells += [
-        (task, method)
-        for method in (
-            "trajectory-optimisation/squared-changes", "corrective-alone/given",
-            "placebo/guesses", "dual-process/EC1-subtask",
-        )
-        for task in ("ascending", "descending")
-    ]  # fmt: skip
+        (task, method) for task in ONE_ARMED for method in (GUESSES, "dual-process/EC1-subtask")
+    ]
     planned = [Cell(load_task(task), KNOWN[method]) for task, method in cells]
     folder = tmp_path_factory.mktemp("claims")
-    study = run_and_write(folder, planned, runs=4, trials=600, executor=FewStarts())
+    study = run_and_write(folder, planned, runs=4, trials=600, executor=InProcess())
     study.runs["trials"] = study.runs.trials.replace(600, 10_000)  # as long as the paper's
     return study
 
@@ -864,21 +832,6 @@ def test_the_register_on_runs(study):
         assert "this folder has no runs of" in entries[name].finding.evidence
     table = TABLES["claims"](study)
     assert table.verdict.tolist() == [entry.verdict for entry in entries.values()]
-
-
-def test_what_else_was_run_changes_no_verdict_on_the_papers_cells(study):
-    """The same runs alone, and with other methods beside them, one of them tested against."""
-    learned = study.runs[study.runs.method.str.startswith("dual-process/")]
-    cells = [cell for cell in study.plan.cells if cell.method.startswith("dual-process/")]
-    alone = replace(study, runs=learned, plan=replace(study.plan, cells=tuple(cells)))
-    changed_ones = []
-    for one, other in zip(judge.judgements(alone), judge.judgements(study), strict=True):
-        if one.claim.beside:
-            changed_ones += [one.claim.id] * (one.finding.evidence != other.finding.evidence)
-            continue
-        for name in ("verdict", "adjusted_p", "adjusted_opposite_p"):
-            np.testing.assert_equal(getattr(one, name), getattr(other, name), one.claim.id)
-    assert "resembles-squared-changes" in changed_ones
 
 
 def test_independent_claims_rest_on_printed_tasks(study):

@@ -33,7 +33,7 @@ from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import CellKey, Study, cached
 from coartic.analysis.topics import horizon, objectives, stops
 from coartic.analysis.topics.families import claims as _  # noqa: F401 (registers its judges)
-from coartic.analysis.topics.paper import claims as __  # noqa: F401
+from coartic.analysis.topics.paper import coarticulation as __  # noqa: F401 (and claims.py)
 
 RULES: dict[str, Callable[[Data, Claim], Finding]] = {
     rule.__name__: rule
