@@ -11,7 +11,7 @@ from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
 from coartic.analysis.claims import ensemble, judge
-from coartic.analysis.claims.data import JUDGES, Data, MissingError, Values
+from coartic.analysis.claims.data import JUDGES, Data, Measurement, MissingError
 from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
 from coartic.analysis.claims.rules import all_of, higher, in_every_family, some_of
 from coartic.analysis.optima import KnownOptimum
@@ -325,8 +325,8 @@ def test_values_are_those_of_the_runs():
 
 
 def ticks(task, *values):
-    """Values that were counted in ticks."""
-    return Values(task, "who", np.array(values, dtype=float), "ticks by which it is so")
+    """A number of ticks for each run."""
+    return Measurement(task, "who", np.array(values, dtype=float), "ticks by which it is so")
 
 
 def test_a_margin_is_taken_off_and_values_are_said_once():
@@ -366,7 +366,7 @@ def test_the_mean_over_a_family_is_one_of_instances(quantity, value, margin, wor
     study = MadeUp(study_of(pd.DataFrame(rows), tasks), optima=optima)
 
     def compare(task):
-        mine = Values(task, "learner", np.array([-1.0, 1.0] * len(task)) + off[task], quantity)
+        mine = Measurement(task, "learner", np.array([-1.0, 1.0] * len(task)) + off[task], quantity)
         return higher(mine, by=margin)
 
     finding = in_every_family(Data(study), ["one-armed/v1"], (", so", compare))

@@ -59,7 +59,7 @@ def judges(claim: str, test: str, **arguments: Any) -> Callable[[Judge], Judge]:
 
 
 @dataclass(frozen=True, eq=False)
-class Values:
+class Measurement:
     """A value of each run, or one number, with the words by which evidence names them."""
 
     task: str
@@ -90,7 +90,7 @@ class Values:
 
 
 @dataclass(frozen=True)
-class Count:
+class RunCount:
     """How many runs of a cell do something."""
 
     number: int
@@ -122,17 +122,17 @@ class LearnedHands:
         """The sequence that most runs learned."""
         return self.tally.most_common(1)[0][0]
 
-    def count(self, what: str, does: Sequence[bool] | NDArray[np.bool_]) -> Count:
+    def count(self, what: str, does: Sequence[bool] | NDArray[np.bool_]) -> RunCount:
         """How many runs do something, which the evidence calls ``what``."""
         words = f"{self.task} {self.condition} {what}"
         count, total = int(np.sum(does)), len(does)
-        return Count(count, total, f"{words}: {count} of {total} runs ({tally(self.tally)})")
+        return RunCount(count, total, f"{words}: {count} of {total} runs ({tally(self.tally)})")
 
-    def are(self, *sequences: str, name: str) -> Count:
+    def are(self, *sequences: str, name: str) -> RunCount:
         """How many runs learned one of some sequences, which the evidence calls ``name``."""
         return self.count(name, [hands in sequences for hands in self.sequences])
 
-    def are_not(self, *sequences: str, name: str) -> Count:
+    def are_not(self, *sequences: str, name: str) -> RunCount:
         """How many runs learned none of them."""
         return self.count(f"not {name}", [hands not in sequences for hands in self.sequences])
 
@@ -198,7 +198,7 @@ class Data:
         learned = tuple(map(str, self.runs(task, label).hands))
         return LearnedHands(task, who_is(label), learned)
 
-    def reward(self, task: str, label: str, hands: str = "") -> Values:
+    def reward(self, task: str, label: str, hands: str = "") -> Measurement:
         """Rewards of the best trials; of a method that draws nothing its one reward."""
         rewards = self.runs(task, label, hands).reward.to_numpy(dtype=np.float64)
         method = self.study.cells[task, label].method
@@ -206,7 +206,7 @@ class Data:
             rewards = np.array(rewards.mean())
         return self._of(task, label, rewards, "reward", hands=hands)
 
-    def replay(self, task: str, label: str, hands: str = "") -> Values:
+    def replay(self, task: str, label: str, hands: str = "") -> Measurement:
         """Rewards of noiseless replays after learning.
 
         The learned reward is that of the best trial, which is never below trial 0's.
@@ -215,19 +215,19 @@ class Data:
         rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         return self._of(task, label, rewards, "replay", hands=hands)
 
-    def initial(self, task: str) -> Values:
+    def initial(self, task: str) -> Measurement:
         """Reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
         printed = published_initial(task)
-        return Values(task, "initial", reward, printed=printed.in_words if printed else "")
+        return Measurement(task, "initial", reward, printed=printed.in_words if printed else "")
 
-    def best(self, task: str) -> Values:
+    def best(self, task: str) -> Measurement:
         """Highest reward of the corrective process alone over all hand sequences."""
         printed = published_exhaustive(task)
         reward = np.array(self.best_sequences(task)[1])
-        return Values(task, "best", reward, printed=printed.in_words if printed else "")
+        return Measurement(task, "best", reward, printed=printed.in_words if printed else "")
 
-    def corrections(self, task: str, label: str, tenth: Literal["early", "late"]) -> Values:
+    def corrections(self, task: str, label: str, tenth: Literal["early", "late"]) -> Measurement:
         """Share of movements that are corrected, in the first or the last tenth of the trials.
 
         Trial 0 does not count: it has no other movements by construction.
@@ -239,14 +239,14 @@ class Data:
         words = f"share of movements that are corrected, in the {when} tenth of the trials"
         return self._of(task, label, shares, tenth, words)
 
-    def last_corrections(self, task: str, label: str) -> Values:
+    def last_corrections(self, task: str, label: str) -> Measurement:
         """Share of movements that are corrected in the learned solution."""
         corrections = self.runs(task, label).solution_corrections
         shares = (corrections / len(self.task(task).goals)).to_numpy(np.float64)
         words = "share of movements that are corrected, in the learned solution"
         return self._of(task, label, shares, "last", words)
 
-    def sign(self, name: str, task: str, label: str) -> Values:
+    def sign(self, name: str, task: str, label: str) -> Measurement:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
         self.runs(task, label)
         if self.task(task).family is not None:
@@ -255,14 +255,14 @@ class Data:
             values = SIGNS[name].of(self.study.trajectories(task, label))
         return self._of(task, label, values, name, SIGNS[name].words)
 
-    def replayed_sign(self, name: str, task: str, label: str) -> Values:
+    def replayed_sign(self, name: str, task: str, label: str) -> Measurement:
         """A sign of coarticulation in noiseless replays after learning."""
         self.runs(task, label)
         values = SIGNS[name].of(self.study.replays(task, label))
         words = SIGNS[name].in_short or SIGNS[name].words
         return self._of(task, label, values, name, f"in noiseless replays, {words}")
 
-    def resemblance(self, task: str, label: str) -> Values:
+    def resemblance(self, task: str, label: str) -> Measurement:
         """Share of the initial solution's distance to the plan that each run has covered."""
         self.runs(task, label)
         (plan,) = self.cell(task, LEAST_CHANGES).runs
@@ -283,14 +283,14 @@ class Data:
 
     def _of(
         self, task: str, label: str, values: Array, name: str, quantity: str = "", hands: str = ""
-    ) -> Values:
-        """Values of a method's runs."""
+    ) -> Measurement:
+        """What is measured of runs of a method."""
         if values.ndim and (not len(values) or not np.isfinite(values).all()):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         replay = "replay of" * (name == "replay")
         who = " ".join(filter(None, (replay, who_is(label), hands)))
         printed = "" if quantity else printed_reward(task, label, hands)
-        return Values(task, who, values, quantity, printed)
+        return Measurement(task, who, values, quantity, printed)
 
     def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""

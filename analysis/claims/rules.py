@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from coartic.analysis.claims.data import Count, Data, LearnedHands, MissingError, Values
+from coartic.analysis.claims.data import Data, LearnedHands, Measurement, MissingError, RunCount
 from coartic.analysis.claims.register import MARGINS, Finding
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.statistics.estimates import (
@@ -28,14 +28,14 @@ from coartic.analysis.words import capital, estimate, number
 RESAMPLES_OF_FAMILIES = 99_999
 """More than elsewhere: some verdicts on families are close, and samples are small."""
 
-MEANS = "one-tailed bootstrap test of the mean reward for each comparison"
-MEANS_OF_FAMILIES = (
+TEST_OF_MEANS = "one-tailed bootstrap test of the mean reward for each comparison"
+TEST_OF_FAMILIES = (
     "one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
     "known reward, in each family"
 )
-MOST = "exact binomial test that more than {most:.0%} of the runs do"
-NOT_MOST = "exact binomial test that fewer than {most:.0%} of the runs do"
-HALF = (
+TEST_OF_MOST = "exact binomial test that more than {most:.0%} of the runs do"
+TEST_OF_NOT_MOST = "exact binomial test that fewer than {most:.0%} of the runs do"
+TEST_OF_HALF = (
     "exact binomial tests that more than {few:.0%} and fewer than {most:.0%} of all runs do; for "
     "the opposite: the share lies outside, and Fisher's exact test tells the counts from the "
     "printed ones. 20 runs are too few to pass it after Holm's correction"
@@ -43,16 +43,16 @@ HALF = (
 
 
 OPPOSITE: dict[str, Literal["greater", "less"]] = {"greater": "less", "less": "greater"}
-Parts = list[tuple[str, str]]
-"""Parts of the evidence, each after what is measured."""
+EvidenceParts = list[tuple[str, str]]
+"""EvidenceParts of the evidence, each after what is measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """One mean beside another; without another, beside 0."""
 
-    first: Values
-    second: Values | None
+    first: Measurement
+    second: Measurement | None
     margin: float
     """By more than this the first is claimed to be higher."""
 
@@ -85,16 +85,16 @@ class Comparison:
         return words
 
 
-def higher(first: Values, second: Values | None = None, *, by: float = 0.0) -> Comparison:
+def higher(first: Measurement, second: Measurement | None = None, *, by: float = 0.0) -> Comparison:
     """The claim that the mean of the first is higher by more than a margin."""
     return Comparison(first, second, by)
 
 
-def all_of(comparisons: Iterable[Comparison], shown: Iterable[Values] = ()) -> Finding:
+def all_of(comparisons: Iterable[Comparison], shown: Iterable[Measurement] = ()) -> Finding:
     """Whether every comparison is as claimed; ``shown``: values that the evidence has as well."""
     tests: list[Estimate] = []
-    parts: Parts = []
-    before: Values | None = None
+    parts: EvidenceParts = []
+    before: Measurement | None = None
     for each in comparisons:
         tests.append(each.test)
         value = "" if each.first is before else f": {each.first}"  # said once
@@ -114,14 +114,14 @@ def some_of(comparisons: Iterable[Comparison]) -> Finding:
     return Finding(holds, every.evidence, (best,))
 
 
-def there(reads: Iterable[Callable[[], Values]]) -> Iterator[Values]:
+def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:
     """What the folder has of some values."""
     for read in reads:
         with suppress(MissingError):
             yield read()
 
 
-def all_positive(tests: Sequence[Estimate], parts: Parts) -> Finding:
+def all_positive(tests: Sequence[Estimate], parts: EvidenceParts) -> Finding:
     """Whether every test points as claimed; the evidence has its parts by what is measured."""
     by_quantity: dict[str, list[str]] = {}
     for quantity, part in parts:
@@ -141,7 +141,7 @@ def in_every_family(
     Rewards are in per cent of the best known.
     """
     tests: list[Estimate] = []
-    parts: Parts = []
+    parts: EvidenceParts = []
     for name, compare in comparisons:
         for family in families:
             each = compare_instances(data, family, compare)
@@ -179,27 +179,27 @@ def reported_instances(data: Data, family: str) -> dict[str, KnownOptimum]:
     return {name: instances.references[name] for name in reported}
 
 
-def most(count: Count) -> Finding:
+def most(count: RunCount) -> Finding:
     """Whether more than three quarters of the runs do something."""
     return beyond(count, MARGINS["most"], "greater")
 
 
-def not_most(count: Count) -> Finding:
+def not_most(count: RunCount) -> Finding:
     """Whether fewer than three quarters of the runs do something."""
     return beyond(count, MARGINS["most"], "less")
 
 
-def majority(count: Count) -> Finding:
+def majority(count: RunCount) -> Finding:
     """Whether more than half of the runs do something, counted exactly."""
     return replace(beyond(count, MARGINS["majority"], "greater"), tests=(), against=None)
 
 
-def some(count: Count) -> Finding:
+def some(count: RunCount) -> Finding:
     """Whether a run does something, counted exactly."""
     return Finding(count.number > 0, count.words)
 
 
-def beyond(count: Count, bound: float, side: Literal["greater", "less"]) -> Finding:
+def beyond(count: RunCount, bound: float, side: Literal["greater", "less"]) -> Finding:
     """Whether the share of runs lies on one side of a bound, by an exact binomial test."""
     runs = count.number, count.total
     limits = stats.binomtest(*runs, alternative=side).proportion_ci()

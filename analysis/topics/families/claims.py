@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from coartic.analysis.claims.data import Data, judges
 from coartic.analysis.claims.register import MARGINS, Finding
 from coartic.analysis.claims.rules import (
-    MEANS_OF_FAMILIES,
+    TEST_OF_FAMILIES,
     Comparison,
     higher,
     in_every_family,
@@ -22,7 +22,7 @@ EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
 
 
-@judges("learning-improves-in-general", test=MEANS_OF_FAMILIES)
+@judges("learning-improves-in-general", test=TEST_OF_FAMILIES)
 def learning_improves_in_general(data: Data) -> Finding:
     """Replays of the learner that explores most are better than the initial solution."""
 
@@ -35,14 +35,14 @@ def learning_improves_in_general(data: Data) -> Finding:
 
 @judges(
     "proficiency-rises-in-general",
-    test=MEANS_OF_FAMILIES,
+    test=TEST_OF_FAMILIES,
     pairs={"EC3 > EC2": (EC3, EC2), "EC4 > EC3": (EC4, EC3)},
 )
-@judges("random-hands-pay-in-general", test=MEANS_OF_FAMILIES, pairs={"EC4 > EC2": (EC4, EC2)})
-@judges("other-arm-pays-in-general", test=MEANS_OF_FAMILIES, pairs={"EC4 > EC3": (EC4, EC3)})
+@judges("random-hands-pay-in-general", test=TEST_OF_FAMILIES, pairs={"EC4 > EC2": (EC4, EC2)})
+@judges("other-arm-pays-in-general", test=TEST_OF_FAMILIES, pairs={"EC4 > EC3": (EC4, EC3)})
 @judges(
     "beats-inaccurate-in-general",
-    test=MEANS_OF_FAMILIES,
+    test=TEST_OF_FAMILIES,
     pairs={f"EC1 > {JERK}": (EC1, JERK)},
     families=OF_ONE_ARM,
 )
@@ -58,7 +58,7 @@ def earns_more_in_general(
     return in_every_family(data, families, *pairs_by_name)
 
 
-@judges("beats-exhaustive-in-general", test=MEANS_OF_FAMILIES)
+@judges("beats-exhaustive-in-general", test=TEST_OF_FAMILIES)
 def beats_exhaustive_in_general(data: Data) -> Finding:
     """Learning is better than trying all hands with the corrective process alone."""
     best = (" EC3 > best", lambda task: higher(data.reward(task, EC3), data.best(task)))

@@ -11,9 +11,9 @@ import numpy as np
 from scipy import stats
 
 from coartic.analysis.claims import rules
-from coartic.analysis.claims.data import Data, MissingError, Values, judges
+from coartic.analysis.claims.data import Data, Measurement, MissingError, judges
 from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.claims.rules import all_of, higher
+from coartic.analysis.claims.rules import TEST_OF_MEANS, all_of, higher
 from coartic.analysis.methods import EC1, EC2, EC3, EC4
 from coartic.analysis.signatures.subtasks import postures_before
 from coartic.analysis.statistics.hypotheses import (
@@ -44,9 +44,9 @@ Cells = Sequence[tuple[str, str]]
 # One-armed tasks, and what is judged on both kinds alike.
 
 
-@judges("learning-improves-one-armed", test=rules.MEANS, cells=CELLS_OF_ONE_ARM)
-@judges("learning-improves-two-armed", test=rules.MEANS, cells=CELLS_OF_TWO_ARMS)
-@judges("ec2-improves", test=rules.MEANS, cells=((TASK_1, EC2),), hands="RRRR")
+@judges("learning-improves-one-armed", test=TEST_OF_MEANS, cells=CELLS_OF_ONE_ARM)
+@judges("learning-improves-two-armed", test=TEST_OF_MEANS, cells=CELLS_OF_TWO_ARMS)
+@judges("ec2-improves", test=TEST_OF_MEANS, cells=((TASK_1, EC2),), hands="RRRR")
 def learning_improves(data: Data, cells: Cells, hands: str = "") -> Finding:
     """Whether replays are better than the initial solution, of all runs or those with hands."""
     return all_of(
@@ -108,18 +108,18 @@ def corrective_near_shortest(data: Data, tasks: Iterable[str]) -> Finding:
     )
 
 
-CORRECTIONS = (
+FEWER_CORRECTIONS = (
     "one-tailed paired bootstrap tests in each cell: more corrective movements in the first tenth "
     "of the trials than in the last. Trial 0 does not count, as it has no others by construction"
 )
 
 
-@judges("corrections-one-armed", test=CORRECTIONS, cells=CELLS_OF_ONE_ARM)
-@judges("corrections-two-armed", test=CORRECTIONS, cells=CELLS_OF_TWO_ARMS)
+@judges("corrections-one-armed", test=FEWER_CORRECTIONS, cells=CELLS_OF_ONE_ARM)
+@judges("corrections-two-armed", test=FEWER_CORRECTIONS, cells=CELLS_OF_TWO_ARMS)
 def corrected_less_later(data: Data, cells: Cells) -> Finding:
     """Whether the runs of each cell make fewer corrective movements in the end."""
     tests, parts = [], []
-    last: list[partial[Values]] = []
+    last: list[partial[Measurement]] = []
     for task, label in cells_among(data, cells):
         early, late = (data.corrections(task, label, tenth) for tenth in ("early", "late"))
         tests.append(bootstrap_test(early.numbers - late.numbers, 0.0))
@@ -205,18 +205,18 @@ def base_steps(start: Array, configurations: Array) -> Array:
     return np.diff(np.append(start[0], configurations[:, 0]))
 
 
-@judges("ec2-sequences", test=rules.HALF, task=TASK_1, label=EC2, hands="RRLR")
-@judges("half-choose-rlrr", test=rules.HALF, task=TASK_2, label=EC3, hands="RLRR")
+@judges("ec2-sequences", test=rules.TEST_OF_HALF, task=TASK_1, label=EC2, hands="RRLR")
+@judges("half-choose-rlrr", test=rules.TEST_OF_HALF, task=TASK_2, label=EC3, hands="RLRR")
 def half_find(data: Data, task: str, label: str, hands: str) -> Finding:
     """Whether about half of the runs learn a sequence."""
     return rules.about_half(data.hands(task, label), hands)
 
 
-@judges("ec2-rrlr-better", rules.MEANS, first=(EC2, "RRLR"), second=(EC2, "RRRR"))
-@judges("ec3-better-than-ec2", rules.MEANS, first=(EC3, "LRLR"), second=(EC2, "RRLR"))
-@judges("rlrr-better", rules.MEANS, first=(EC3, "RLRR"), second=(EC3, "RRRR"), tasks=(TASK_2,))
-@judges("ec4-beats-ec3", rules.MEANS, first=(EC4,), second=(EC3,))
-@judges("multilevel-search", rules.MEANS, first=(EC3,), second=(EC1,), tasks=TWO_ARMED)
+@judges("ec2-rrlr-better", TEST_OF_MEANS, first=(EC2, "RRLR"), second=(EC2, "RRRR"))
+@judges("ec3-better-than-ec2", TEST_OF_MEANS, first=(EC3, "LRLR"), second=(EC2, "RRLR"))
+@judges("rlrr-better", TEST_OF_MEANS, first=(EC3, "RLRR"), second=(EC3, "RRRR"), tasks=(TASK_2,))
+@judges("ec4-beats-ec3", TEST_OF_MEANS, first=(EC4,), second=(EC3,))
+@judges("multilevel-search", TEST_OF_MEANS, first=(EC3,), second=(EC1,), tasks=TWO_ARMED)
 def earn_more(
     data: Data, first: Sequence[str], second: Sequence[str], tasks: Sequence[str] = (TASK_1,)
 ) -> Finding:
@@ -241,14 +241,14 @@ def no_reversal(data: Data) -> Finding:
     return rules.most(learned.count("RRLR rightward", rightward))
 
 
-@judges("ec2-unreliable", test=rules.NOT_MOST)
+@judges("ec2-unreliable", test=rules.TEST_OF_NOT_MOST)
 def ec2_unreliable(data: Data) -> Finding:
     """Not most runs find other hands than RRRR."""
     return rules.not_most(data.hands(TASK_1, EC2).are_not("RRRR", name="RRRR"))
 
 
-@judges("ec3-alternates", test=rules.MOST, label=EC3)
-@judges("ec4-keeps-lrlr", test=rules.MOST, label=EC4)
+@judges("ec3-alternates", test=rules.TEST_OF_MOST, label=EC3)
+@judges("ec4-keeps-lrlr", test=rules.TEST_OF_MOST, label=EC4)
 def most_alternate(data: Data, label: str) -> Finding:
     """Whether most runs learn LRLR."""
     return rules.most(data.hands(TASK_1, label).are("LRLR", name="LRLR"))
@@ -265,7 +265,7 @@ def ec3_as_exhaustive(data: Data) -> Finding:
     return rules.majority(learned.are(*data.best_sequences(TASK_1)[0], name="best"))
 
 
-@judges("ec3-beats-exhaustive", test=rules.MEANS)
+@judges("ec3-beats-exhaustive", test=TEST_OF_MEANS)
 def ec3_beats_exhaustive(data: Data) -> Finding:
     """Learning is better than trying all hands with the corrective process alone."""
     return all_of([higher(data.reward(TASK_1, EC3), data.best(TASK_1))])
@@ -292,7 +292,7 @@ def ec4_mixed(data: Data) -> Finding:
     return rules.some(learned.are_not(learned.commonest, name="commonest"))
 
 
-@judges("proficiency-rises", test=rules.MEANS)
+@judges("proficiency-rises", test=TEST_OF_MEANS)
 def proficiency_rises(data: Data) -> Finding:
     """Each condition is better than the one before, the first than the initial solution."""
     comparisons: list[rules.Comparison] = []

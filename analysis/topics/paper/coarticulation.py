@@ -14,7 +14,7 @@ from coartic.analysis import methods
 from coartic.analysis.claims import rules
 from coartic.analysis.claims.data import Data, MissingError, judges, who_is
 from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.claims.rules import all_of, higher
+from coartic.analysis.claims.rules import TEST_OF_MEANS, all_of, higher
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import dependence_below
@@ -171,7 +171,7 @@ def other_arm_coarticulation(data: Data) -> Finding:
     return all_of(comparisons, rules.there(shown))
 
 
-@judges("overall-reward-two-armed", test=rules.MEANS)
+@judges("overall-reward-two-armed", test=TEST_OF_MEANS)
 def overall_reward_two_armed(data: Data) -> Finding:
     """Without a reward for the whole less is earned."""
     return all_of(
