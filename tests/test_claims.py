@@ -240,65 +240,64 @@ def lrlr(count):
     return ["LRLR"] * count + ["RRRR"] * (20 - count)
 
 
-def second(ec3, ec4, hands3="RRRR", hands4="RLRR"):
-    return learner(T2, "EC3", ec3, hands3, -357) + learner(T2, "EC4", ec4, hands4, -357)
+def on_1(condition, rewards, hands="LRLR"):
+    return learner(T1, condition, rewards, hands)
+
+
+def on_2(condition, rewards, hands):
+    return learner(T2, condition, rewards, hands, -357)
 
 
 @pytest.mark.parametrize(
     ("claim", "rows", "verdict"),
     [
         # Means, against a number.
-        ("ec3-beats-exhaustive", learner(T1, "EC3", MIDDLE), "supported"),
-        ("ec3-beats-exhaustive", learner(T1, "EC3", LOW), "not supported"),
-        ("ec3-beats-exhaustive", learner(T1, "EC3", [-533, -600, -470]), "undecided"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-improves", learner(T1, "EC2", MIDDLE + BELOW, RRLR), "not supported"),
+        ("ec3-beats-exhaustive", on_1("EC3", MIDDLE), "supported"),
+        ("ec3-beats-exhaustive", on_1("EC3", LOW), "not supported"),
+        ("ec3-beats-exhaustive", on_1("EC3", [-533, -600, -470]), "undecided"),
+        ("ec2-improves", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-improves", on_1("EC2", MIDDLE + BELOW, RRLR), "not supported"),
         # Against other runs, all of several comparisons, runs with certain hands.
-        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", HIGH), "supported"),
-        ("ec4-beats-ec3", learner(T1, "EC3", HIGH) + learner(T1, "EC4", MIDDLE), "not supported"),
-        ("ec4-beats-ec3", learner(T1, "EC3", MIDDLE) + learner(T1, "EC4", MIDDLE[::-1]),
-         "undecided"),
-        ("proficiency-rises", learner(T1, "EC2", LOW) + learner(T1, "EC3", MIDDLE)
-         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "supported"),
-        ("proficiency-rises", learner(T1, "EC2", HIGH) + learner(T1, "EC3", MIDDLE)
-         + learner(T1, "EC4", HIGH) + second(WORSE, BETTER), "not supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-rrlr-better", learner(T1, "EC2", LOW, "RRRR"), "undecided"),
+        ("ec4-beats-ec3", on_1("EC3", MIDDLE) + on_1("EC4", HIGH), "supported"),
+        ("ec4-beats-ec3", on_1("EC3", HIGH) + on_1("EC4", MIDDLE), "not supported"),
+        ("ec4-beats-ec3", on_1("EC3", MIDDLE) + on_1("EC4", MIDDLE[::-1]), "undecided"),
+        ("proficiency-rises", on_1("EC2", LOW) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
+         + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
+        ("proficiency-rises", on_1("EC2", HIGH) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
+         + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "not supported"),
+        ("ec2-rrlr-better", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-rrlr-better", on_1("EC2", LOW, "RRRR"), "undecided"),
         # Better than all runs of EC2 together, but not than those with RRLR.
-        ("ec3-better-than-ec2", learner(T1, "EC2", HIGH + LOW, RRLR) + learner(T1, "EC3", MIDDLE),
+        ("ec3-better-than-ec2", on_1("EC2", HIGH + LOW, RRLR) + on_1("EC3", MIDDLE),
          "not supported"),
         # More than three quarters: 19 of 20 has p = 0.024, 18 has 0.09; fewer: 11 has 0.041.
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(19)), "supported"),
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(18)), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(12)), "undecided"),
-        ("ec3-alternates", learner(T1, "EC3", TWENTY, lrlr(11)), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec2-unreliable", learner(T1, "EC2", MIDDLE, "RRLR"), "undecided"),
+        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(19)), "supported"),
+        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(18)), "undecided"),
+        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(12)), "undecided"),
+        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(11)), "not supported"),
+        ("ec2-unreliable", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
+        ("ec2-unreliable", on_1("EC2", MIDDLE * 3, "RRLR"), "not supported"),
+        ("ec2-unreliable", on_1("EC2", MIDDLE, "RRLR"), "undecided"),
         # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, "RRRR", -357), "not supported"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR", "RRRR"] * 20, -357),
-         "supported"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE, ["RLRR"] + ["RRRR"] * 7, -357),
-         "undecided"),
-        ("half-choose-rlrr", learner(T2, "EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36, -357),
-         "not supported"),
+        ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
+        ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR", "RRRR"] * 20), "supported"),
+        ("half-choose-rlrr", on_2("EC3", WORSE, ["RLRR"] + ["RRRR"] * 7), "undecided"),
+        ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36), "not supported"),
         # Exact: a majority, one run.
-        ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(11)), "supported"),
-        ("ec3-as-exhaustive", learner(T1, "EC3", TWENTY, lrlr(10)), "not supported"),
-        ("ec3-departs", learner(T2, "EC3", BETTER, "RLRR", -357), "not supported"),  # a tie
-        ("ec3-departs", learner(T2, "EC3", BETTER, ["RLLR"] + ["RRRR"] * 7, -357), "supported"),
-        ("ec4-mixed", learner(T2, "EC4", WORSE + BETTER, MIXED, -357), "supported"),
-        ("ec4-mixed", learner(T2, "EC4", WORSE, "RLRR", -357), "not supported"),
-        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-         + learner(T2, "EC3", WORSE, ["RRRR"] * 7 + ["RLRR"], -357), "supported"),
-        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-         + learner(T2, "EC3", WORSE, "RRRR", -357), "undecided"),
-        ("sequences-change", learner(T1, "EC2", LOW, "RRRR") + learner(T1, "EC3", MIDDLE)
-         + learner(T2, "EC3", WORSE * 4, "RRRR", -357), "not supported"),
-        ("sequences-change", learner(T1, "EC2", LOW * 4, "RRRR")
-         + learner(T1, "EC3", MIDDLE * 4, "RRRR") + learner(T2, "EC3", BETTER, "RLRR", -357),
-         "not supported"),
+        ("ec3-as-exhaustive", on_1("EC3", TWENTY, lrlr(11)), "supported"),
+        ("ec3-as-exhaustive", on_1("EC3", TWENTY, lrlr(10)), "not supported"),
+        ("ec3-departs", on_2("EC3", BETTER, "RLRR"), "not supported"),  # a tie
+        ("ec3-departs", on_2("EC3", BETTER, ["RLLR"] + ["RRRR"] * 7), "supported"),
+        ("ec4-mixed", on_2("EC4", WORSE + BETTER, MIXED), "supported"),
+        ("ec4-mixed", on_2("EC4", WORSE, "RLRR"), "not supported"),
+        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
+         + on_2("EC3", WORSE, ["RRRR"] * 7 + ["RLRR"]), "supported"),
+        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
+         + on_2("EC3", WORSE, "RRRR"), "undecided"),
+        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
+         + on_2("EC3", WORSE * 4, "RRRR"), "not supported"),
+        ("sequences-change", on_1("EC2", LOW * 4, "RRRR") + on_1("EC3", MIDDLE * 4, "RRRR")
+         + on_2("EC3", BETTER, "RLRR"), "not supported"),
     ],
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict):
