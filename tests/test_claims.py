@@ -21,6 +21,7 @@ from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, serve
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
+from coartic.analysis.topics.paper import sentences
 from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import read_beside
@@ -141,6 +142,22 @@ def test_claims_that_say_nothing_of_the_model_are_not_counted(judged):
     )
     numbers = {"supported": 1, "not supported": 0, "undecided": 1, "depends on the goals": 0}
     assert judge.counts(entries) == numbers
+
+
+def test_verdicts_in_words(judged):
+    entries = judged(
+        (found(True, 0.001), {"short": "it is so"}),
+        (found(True, 0.001), {"short": "flawed", "uncounted": "flawed"}),
+        (found(False, 0.999), {}),
+        (found(True, 0.2), {"short": "it may be so"}),
+        (None, {}),
+    )
+    central = {"supported": ["it is so"], "undecided": ["it may be so"]}
+    assert sentences.central_claims(entries) == central
+    others = sentences.counts_of_others(entries)
+    assert sentences.in_numbers(others) == "0 are supported, 1 is not, 1 is undecided"
+    assert sentences.mostly_undecided(entries)  # two of four that count
+    assert not sentences.mostly_undecided(entries[:-1])
 
 
 def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims(judged):
@@ -894,14 +911,14 @@ def test_what_a_posture_serves():
 
 
 def test_every_sentence_is_accounted_for():
-    sentences = read_beside(judge.__file__, "sentences")["sentence"]
-    for each in sentences:
+    printed = read_beside(judge.__file__, "sentences")["sentence"]
+    for each in printed:
         assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
         assert set(each.get("claims", ())) <= set(CLAIMS), each["quote"]
-    accounted = {name for each in sentences for name in each.get("claims", ())}
+    accounted = {name for each in printed for name in each.get("claims", ())}
     lacking = {claim.id for claim in CLAIMS.values() if claim.place} - accounted
     assert not lacking, f"in no sentence of sentences.toml: {lacking}"
-    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(sentences))
+    files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(printed))
     assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
 
 

@@ -26,14 +26,16 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
+# These register the claims that they judge.
+import coartic.analysis.topics.families.claims
+import coartic.analysis.topics.paper.claims
+import coartic.analysis.topics.paper.coarticulation  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
 from coartic.analysis.claims.ensemble import held_by, rarely_supported
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import CellKey, Study, cached
 from coartic.analysis.topics import horizon, objectives, stops
-from coartic.analysis.topics.families import claims as _  # noqa: F401 (registers its judges)
-from coartic.analysis.topics.paper import coarticulation as __  # noqa: F401 (and claims.py)
 
 RULES: dict[str, Callable[[Data, Claim], Finding]] = {
     rule.__name__: rule

@@ -77,7 +77,7 @@ def posture_depends_on_context(data: Data) -> Finding:
     less_p = dependence_below(*contexts.postures, bound, np.random.default_rng(SEED))
     tests = [test]
     against = [replace(test, value=bound - test.value, p=less_p)]
-    for label in (PLACEBO, f"{EC1}-subtask"):
+    for label in (PLACEBO, EC1_BY_SUBTASK):
         placebo = contexts_of(data, label)
         more = contexts.apart - placebo.apart
         beyond = replace(test, value=more, n=(contexts.n, placebo.n))
