@@ -299,6 +299,7 @@ def on_2(condition, rewards, hands):
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR", "RRRR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE, ["RLRR"] + ["RRRR"] * 7), "undecided"),
+        ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 12 + ["RRRR"] * 28), "undecided"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36), "not supported"),
         # Exact: a majority, one run.
         ("ec3-as-exhaustive", on_1("EC3", TWENTY, lrlr(11)), "supported"),

@@ -94,10 +94,9 @@ def posture_depends_on_context(data: Data) -> Finding:
 
 def contexts_of(data: Data, label: str, *, replayed: bool = False) -> TwoContexts:
     """Runs of a method that hit goal 1 of both one-armed tasks; MissingError without them."""
-    tasks = ("ascending", "descending")
-    first, second = (data.cell(task, label) for task in tasks)
+    first, second = (data.cell(task, label) for task in ONE_ARMED)
     if replayed:
-        first, second = (data.study.replays(task, label) for task in tasks)
+        first, second = (data.study.replays(task, label) for task in ONE_ARMED)
     contexts = TwoContexts(first, second, 1, "right")
     if not all(contexts.runs):
         raise MissingError(f"no run of {label} hits goal 1 of both tasks with the right hand")
