@@ -199,11 +199,11 @@ def signatures() -> Iterator[str]:
 
 def claims() -> Iterator[str]:
     """The register of the paper's claims; each claim has its id for an anchor."""
-    from coartic.analysis.claims.judge import test_in_words
+    from coartic.analysis.claims.judge import words_of_test
     from coartic.analysis.claims.register import CLAIMS
 
     def goals(claim: Any) -> str:
-        if claim.families:
+        if claim.on_random_tasks:
             return "random tasks"
         return "reconstructed †" if claim.fitted else "printed"
 
@@ -211,17 +211,12 @@ def claims() -> Iterator[str]:
         return f"{claim.place}: “{claim.quote}”" if claim.place else "nothing: it is our claim"
 
     def rule(claim: Any) -> str:
-        text = test_in_words(claim)
-        what = [", ".join(claim.compared)] if claim.compared else []
-        for by_task in (claim.pairs, claim.runs, claim.cells):
-            for task, names in by_task.items():
-                what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
+        text = words_of_test(claim)
         before = f"Power, stated before suite `{claim.suite}` was run: "
         before = "" if claim.power.startswith("Written after") else before
         power = f" {before}{claim.power}."
         return (
             f"{text[0].upper()}{text[1:]}."
-            + (f" *{'; '.join(what)}.*" if what else "")
             + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
             + (power if claim.power else "")
         )

@@ -156,9 +156,9 @@ def test_claims_of_generality(monkeypatch):
     monkeypatch.setattr(data, "initial_solution", lambda task, model: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
     study = with_signs(rewarded(centres, families=ONE + TWO))
-    entries = {entry.claim.id: entry for entry in judge.judged(study)}
+    entries = {entry.claim.id: entry for entry in judge.judgements(study)}
     assert set(entries) == {
-        name for name, claim in CLAIMS.items() if claim.families and not claim.suite
+        name for name, claim in CLAIMS.items() if claim.on_random_tasks and not claim.suite
     }
     for name in (
         "learning-improves",
@@ -170,7 +170,7 @@ def test_claims_of_generality(monkeypatch):
         assert entry.verdict == "supported", entry.finding.evidence
         assert entry.adjusted_p < 0.05
     guessed = with_signs(rewarded(centres, families=ONE + TWO), placebo=1.0)
-    entries_of_guesses = {entry.claim.id: entry for entry in judge.judged(guessed)}
+    entries_of_guesses = {entry.claim.id: entry for entry in judge.judgements(guessed)}
     for name in ("other-arm-coarticulation-in-general", "arm-coarticulation-in-general"):
         assert entries_of_guesses[name].verdict == "undecided"  # no more than guessing shows
     ensured = entries["corrective-ensures-in-general"]
@@ -189,7 +189,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
                 values["hand"] = np.array([0.4, 0.6]) + shift
-        (entry,) = judge.judge(study, [CLAIMS["hand-coarticulation-in-general"]])
+        (entry,) = judge.judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]])
         return entry.verdict
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [
@@ -206,13 +206,13 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
         CLAIMS[f"{name}-in-general"]
         for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
     ]
-    assert {entry.verdict for entry in judge.judge(falling, claims)} == {"not supported"}
-    assert judge.judge(mixed, claims)[0].verdict == "undecided"
+    assert {entry.verdict for entry in judge.judge_claims(falling, claims)} == {"not supported"}
+    assert judge.judge_claims(mixed, claims)[0].verdict == "undecided"
 
 
 def test_development_instances_are_not_judged():
     study = with_signs(rewarded(RISING, split="d"))
-    assert {entry.verdict for entry in judge.judged(study)} == {"undecided"}
+    assert {entry.verdict for entry in judge.judgements(study)} == {"undecided"}
 
 
 def test_tables_over_instances():

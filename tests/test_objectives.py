@@ -10,7 +10,7 @@ import pytest
 
 from coartic import execute, load_task
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.judge import judge
+from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.report import build
 from coartic.analysis.report.contents import TABLES
@@ -192,7 +192,7 @@ def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
         "costly disc, 84 [84, 84] with postures alike."
     )
     claims = [claim for claim in CLAIMS.values() if claim.suite == "objectives"]
-    entries = {entry.claim.id: entry for entry in judge(study, claims)}
+    entries = {entry.claim.id: entry for entry in judge_claims(study, claims)}
     finding = entries["cma-es-overtakes-sooner"].finding
     assert [test.value for test in finding.tests] == pytest.approx([-6, -6])  # and the margin, 1
     assert re.fullmatch(

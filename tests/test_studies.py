@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.claims.judge import judged
+from coartic.analysis.claims.judge import judgements
 from coartic.analysis.report import build
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.signatures.signs import SIGNS
@@ -82,13 +82,13 @@ def planted(*, stream="i", plain=FALLING, given=FALLING, dear=FALLING, learner=2
 
 
 def verdicts(study):
-    entries = judged(study)
+    entries = judgements(study)
     assert {entry.claim.suite for entry in entries} == {study.suite}
     return {entry.claim.id: entry.verdict for entry in entries if not entry.claim.uncounted}
 
 
 def evidence(study):
-    return {entry.claim.id: entry.finding.evidence for entry in judged(study)}
+    return {entry.claim.id: entry.finding.evidence for entry in judgements(study)}
 
 
 def test_claims_hold_where_they_were_planted():
@@ -209,10 +209,12 @@ def test_claims_on_stops(passing, stopped, expected, monkeypatch):
         rows.append({**at, "task": task.name, "cell": cell, "nearer": ticks})
     monkeypatch.setattr(stops, "stop_values", lambda study: pd.DataFrame(rows))
     study = study_of(
-        pd.DataFrame([row(judged_plan, -500, task=task.name) for task in tasks]), tasks, suite="stops"
+        pd.DataFrame([row(judged_plan, -500, task=task.name) for task in tasks]),
+        tasks,
+        suite="stops",
     )
     assert list(verdicts(study).values()) == expected
-    assert {run for entry in judged(study) for run in entry.run_ids} == {
+    assert {run for entry in judgements(study) for run in entry.run_ids} == {
         f"{task.name} {stop}" for task in tasks_of("i") for stop in (0.0, 1.0)
     }
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
+from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS, Claim
 from coartic.analysis.study import Study
 from coartic.tasks.catalogue import is_admitted, task_of, with_members
@@ -27,7 +27,7 @@ from coartic.tasks.readings import condition_under, load_readings
 from coartic.threads import begin_worker, one_thread_each, threads_for
 
 ROW = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
-PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
+PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.on_random_tasks)
 VERDICTS = ("supported", "not supported", "undecided")
 
 
@@ -126,24 +126,15 @@ def judge_view(
 ) -> tuple[Specification, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
     task, rows, claims_judged = specification[1], [], []
-    wanted = [CLAIMS[name] for name in names]
-    if task:  # what the default goals of the other task do is no matter of a member's
-        for number, claim in enumerate(wanted):
-            if task in claim.pairs:
-                fields = {"pairs": claim.pairs, "shown": claim.shown}
-                alone = {
-                    name: {other: texts for other, texts in by_task.items() if other == task}
-                    for name, by_task in fields.items()
-                }
-                wanted[number] = claim.model_copy(update=alone)
     its_runs = set(view.runs.run_id[view.runs.task == task] if task else view.runs.run_id)
-    for judged in judge(view, wanted):
+    # What the default goals of the other task do is no matter of a member's.
+    for judged in judge_claims(view, [CLAIMS[name] for name in names], only=task):
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
             claims_judged.append(claim.id)
         row: dict[str, Any] = dict.fromkeys(ROW, math.nan)
         row |= zip(ROW, (*specification, claim.id), strict=False)
-        row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
+        row["verdict"] = finding.verdict(finding.p, finding.opposite_p)
         if finding.tests:
             first = finding.tests[0]
             row |= {"effect": first.value, "low": first.low, "high": first.high, "p": first.p}

@@ -27,7 +27,7 @@ __all__ = ["FIGURES", "SECTIONS", "TABLES"]
 SECTIONS: tuple[Section, ...] = (
     coarticulation.COARTICULATION,
     human.HUMAN,
-    paper.PAPER,
+    paper.PUBLISHED,
     paper.CLAIMS,
     comparison.NEAREST,
     comparison.PRICE,

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.methods import (
     CONDITIONS,
     KNOWN_METHODS,
@@ -37,9 +36,9 @@ from coartic.analysis.topics.comparison.runtimes import halfway
 from coartic.analysis.topics.comparison.runtimes import price as price_by_method
 from coartic.analysis.topics.comparison.scores import initial_and_optimum, leaders
 from coartic.analysis.topics.families.sample import one_by_one, sample
-from coartic.analysis.topics.paper.published import RUNS, TRIALS
-from coartic.analysis.topics.paper.rewards import beside_paper
+from coartic.analysis.topics.paper.published import RUNS
 from coartic.analysis.topics.paper.tables import best_condition
+from coartic.learner.learning import TRIALS
 
 Facts = dict[str, Any]
 
@@ -159,62 +158,6 @@ def gain(study: Study) -> Facts | None:
 
 
 @cached
-def paper(study: Study) -> Facts | None:
-    """What became of the paper's rewards and claims; None without its tasks and families."""
-    entries = [entry for entry in judged(study) if entry.claim.place]
-    if not entries or not (beside_paper(study) or any(entry.run_ids for entry in entries)):
-        return None
-    rows = [row for row in beside_paper(study) if not row["hands"]]
-    rewards = Counter(row["verdict"] for row in rows)
-    return {
-        # Undecided, though 0 is not in the interval.
-        "off": [
-            {
-                **{f"by{key}": row[f"difference{key}"] for key in ("", "_low", "_high")},
-                "condition": row["cell"].label.removeprefix(LEARNER),
-                "task": study.tasks[row["cell"].task].label,
-            }
-            for row in rows
-            if row["verdict"] == "undecided"
-            and (row["difference_low"] > 0 or row["difference_high"] < 0)
-        ],
-        "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
-        **verdicts_of(entries),
-        "failed": failed_behind(study, (cell for e in entries for cell in e.finding.failed)),
-    }
-
-
-@cached
-def claims(study: Study) -> Facts | None:
-    """The verdicts on the paper's claims, or on ours where the folder is one of our studies."""
-    entries = judged(study)
-    return verdicts_of(entries) if entries and entries[0].claim.suite else paper(study)
-
-
-def verdicts_of(entries: list[Judged]) -> Facts:
-    """How many claims have each verdict, and whether most are decided.
-
-    ``central``: by verdict, the claims that carry the paper's point; ``others``: counts of the
-    others that count.
-    """
-    counted = [entry for entry in entries if not entry.claim.uncounted]
-    central: dict[str, list[str]] = {}
-    for entry in counted:
-        if entry.claim.short:
-            central.setdefault(entry.verdict, []).append(entry.claim.short)
-    by_verdict = counts(entries)
-    return {
-        "claims": by_verdict,
-        "central": central,
-        "others": counts(entry for entry in counted if not entry.claim.short),
-        "judged": len(counted),
-        "uncounted": len(entries) - len(counted),
-        # With few runs or trials most claims cannot be judged.
-        "decided": 2 * by_verdict["undecided"] < len(counted),
-    }
-
-
-@cached
 def nearest(study: Study) -> Facts | None:
     """Who comes nearest to the optimum, among those that know as much of the reward.
 
@@ -306,22 +249,6 @@ def price(study: Study) -> Facts | None:
         "learner_seconds": learner.seconds_to_half,
         "failed": failed_compared(study, BY_TRIAL),
     }
-
-
-@cached
-def hands(study: Study) -> Facts:
-    """Tasks on which the learner's best condition ends with other hands than it began with."""
-    changes, tasks = [], 0
-    for name, task in study.tasks.items():
-        label = best_condition(study, name)
-        good = study.cells[name, label].good if label else None
-        if good is not None and good.initial_hands.notna().any():
-            tasks += 1
-            before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
-            if before not in most_frequent:
-                change = f"{before} to {' or '.join(most_frequent)}"
-                changes.append({"task": task.label, "change": change})
-    return {"changes": changes, "tasks": tasks}
 
 
 @cached
