@@ -16,7 +16,6 @@ from coartic.analysis.claims.judge import judged
 from coartic.analysis.report import build, facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
-from coartic.analysis.signatures.signs import Sign
 from coartic.analysis.topics import horizon, random_tasks, stops
 from coartic.analysis.topics.horizon import HORIZONS, gaps_by_horizon
 from coartic.motion.costs import joint_costs
@@ -239,7 +238,9 @@ def test_claims_on_stops(passing, stopping, expected, monkeypatch):
                 words = {"variant": variant, "parameters": parameters, "task": task.name}
                 rows.append(row(stops.STOPPING, -500, run_id=f"{task.name} {variant}", **words))
                 values[task.name, f"{stops.STOPPING} {variant}"] = ticks * (0.8 + number / 17.5)
-    monkeypatch.setattr(stops, "SIGNS", {"arm": Sign("", lambda value: np.array([value]))})
+    monkeypatch.setattr(
+        stops, "SIGNS", {"arm": SimpleNamespace(of=lambda value: np.array([value]))}
+    )
     study = study_of(pd.DataFrame(rows), tasks, suite="stops")
     assert list(verdicts(MadeUp(study, trajectories=made(values))).values()) == expected
 

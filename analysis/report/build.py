@@ -17,7 +17,7 @@ import pandas as pd
 from coartic import CoarticError
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.figures.plot import Plot, picture, svg_for_page
-from coartic.analysis.report import facts
+from coartic.analysis.report import facts, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
@@ -112,7 +112,7 @@ def shown(study: Study) -> list[Section]:
 def finding(section: Section, study: Study) -> str:
     """The sentence of a section; empty where the runs say nothing."""
     if section.finding is not None:
-        return section.finding(study)
+        return text.shown(" ".join(section.finding(study).split(" ")))
     of = getattr(facts, section.id)(study) if hasattr(facts, section.id) else None
     return "" if of is None else sentence(section.id, of)
 

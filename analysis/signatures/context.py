@@ -14,13 +14,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, takewhile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic import Task
 from coartic.analysis.optima import KEPT
-from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred, slices
 from coartic.robot import Array
 
-AT_ONCE = 500  # divisions or resamples in memory
+IN_MEMORY = 500
+"""Divisions or resamples of whole runs at once: thousands of runs would fill the memory."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -34,7 +36,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     return [pair for pair in pairs if pair[2]]
 
 
-def distance(first: Array, second: Array) -> float:
+def distance_of_means(first: Array, second: Array) -> float:
     """Distance between the mean configurations of two contexts, ≥ 0.
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
@@ -43,7 +45,7 @@ def distance(first: Array, second: Array) -> float:
 
 
 def context_dependence(first: Array, second: Array) -> float:
-    """:func:`distance` in pooled within-context standard deviations, 0 to ∞.
+    """:func:`distance_of_means` in pooled within-context standard deviations, 0 to ∞.
 
     The deviation is the root of the total variance (its trace) about each context's own
     mean, with n₁ + n₂ - 2 degrees of freedom: a multivariate form of Cohen's d (Cohen
@@ -55,7 +57,7 @@ def context_dependence(first: Array, second: Array) -> float:
         return math.nan
     squares = sum((centred(group) ** 2).sum() for group in (first, second))
     spread = float(np.sqrt(squares / freedom))
-    return distance(first, second) / spread if spread else math.nan
+    return distance_of_means(first, second) / spread if spread else math.nan
 
 
 def dependence_below(
@@ -63,6 +65,8 @@ def dependence_below(
     second: Array,
     bound: float,
     rng: np.random.Generator,
+    *,
+    resamples: int = RESAMPLES,
 ) -> float:
     """Probability of so little context dependence if it were ``bound`` (pooled SDs) or more.
 
@@ -73,17 +77,16 @@ def dependence_below(
     """
     if min(len(first), len(second)) < 2:
         return math.nan
-    means, squares = [], np.zeros(RESAMPLES)
+    means, squares = [], np.zeros(resamples)
     for group in (first, second):
-        means.append(np.empty((RESAMPLES, group.shape[1])))
-        for start in range(0, RESAMPLES, AT_ONCE):  # thousands of runs would fill the memory
-            rows = slice(start, min(start + AT_ONCE, RESAMPLES))
-            drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
+        means.append(np.empty((resamples, group.shape[1])))
+        for rows in slices(resamples, IN_MEMORY):
+            drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
     pooled = np.sqrt(squares / (len(first) + len(second) - 2))
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
-    return float(1 + reached.sum()) / (RESAMPLES + 1)
+    return float(1 + reached.sum()) / (resamples + 1)
 
 
 def permutation_p(
@@ -97,7 +100,7 @@ def permutation_p(
     """Probability of so large a distance between means if the context did nothing.
 
     One-sided permutation test over runs, exact where all divisions of the runs are no more
-    than ``resamples``. The statistic is :func:`distance`, which orders permutations as
+    than ``resamples``. The statistic is :func:`distance_of_means`, which orders permutations as
     :func:`context_dependence` does; with an orthonormal ``basis`` (dof, d) it is the distance
     within its span. 0 < p ≤ 1; 1 where no run differs from another. NaN where a context has
     one run only.
@@ -130,25 +133,25 @@ def divisions(
 
     Blocks of shape ``(m, first + second)``: weights that give the first group's mean less the
     second's. All where they are no more than ``resamples``, else as many drawn at random.
-    Together they would fill the memory with thousands of runs.
     """
     runs = first + second
     exact = math.comb(runs, first) <= resamples
-    every = np.array(list(combinations(range(runs), first))) if exact else None
+    every = np.array(list(combinations(range(runs), first)), np.intp) if exact else None
 
     def blocks() -> Iterator[Array]:
-        count = resamples if every is None else len(every)
-        for start in range(0, count, AT_ONCE):
-            size = min(AT_ONCE, count - start)
-            if every is None:
-                chosen = rng.random((size, runs)).argpartition(first - 1, axis=1)[:, :first]
-            else:
-                chosen = every[start : start + size]
+        for rows in slices(resamples if every is None else len(every), IN_MEMORY):
+            size = rows.stop - rows.start
+            chosen = drawn_rows(runs, first, size, rng) if every is None else every[rows]
             weights = np.full((size, runs), -1 / second)
             np.put_along_axis(weights, chosen, 1 / first, axis=1)
             yield weights
 
     return blocks(), exact
+
+
+def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Numbers of the runs in a group, drawn without replacement ``size`` times, (size, chosen)."""
+    return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
 def p_values(null: Array, observed: Array, *, exact: bool) -> Array:
@@ -179,8 +182,8 @@ def beyond_p(
 
     ``method`` and ``placebo`` each have configurations ``(runs, dof)`` for every context. How far
     contexts lie apart is the length of the sum of their mean configurations, each times its number
-    in ``contrast``: their :func:`distance` for two, the slope for several positions. Permutation
-    test: within each context the runs of both are divided anew at random, and the statistic is the
+    in ``contrast``: their distance for two, the slope for several positions. Permutation test:
+    within each context the runs of both are divided anew at random, and the statistic is the
     method's length less the placebo's. Twice the upper tail, as wherever two methods are compared.
     0 < p ≤ 1. NaN where a method has one run in a context.
     """
@@ -194,16 +197,15 @@ def beyond_p(
         return np.asarray(np.linalg.norm(total, axis=-1))
 
     null = np.empty(resamples)
-    for start in range(0, resamples, AT_ONCE):
-        count = min(AT_ONCE, resamples - start)
+    for rows in slices(resamples, IN_MEMORY):
         of_method, of_placebo = [], []
         for pool, runs in zip(pools, method, strict=True):
             ours = len(runs)
-            rows = rng.random((count, len(pool))).argpartition(ours - 1, axis=1)[:, :ours]
-            chosen = pool[rows].sum(axis=1)
-            of_method.append(chosen / ours)
-            of_placebo.append((pool.sum(axis=0) - chosen) / (len(pool) - ours))
-        null[start : start + count] = length(of_method) - length(of_placebo)
+            chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
+            total = pool[chosen].sum(axis=1)
+            of_method.append(total / ours)
+            of_placebo.append((pool.sum(axis=0) - total) / (len(pool) - ours))
+        null[rows] = length(of_method) - length(of_placebo)
     observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, placebo))
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))
 
