@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,10 +15,10 @@ from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context, subtasks
 from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
-from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
+from coartic.analysis.signatures.manifold import motor_equivalence, movable
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.topics.coarticulation import placebo, sentences
+from coartic.analysis.topics.coarticulation import placebo, sentences, tables
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -106,17 +107,6 @@ def test_more_than_a_placebo_by_brute_force():
             total += 1
     p = context.beyond_p(method, placebo, rng(), resamples=20_000)
     assert p == pytest.approx(2 * count / total, abs=0.03)
-
-
-def test_a_context_counts_where_it_exceeds_the_placebos():
-    """Selected noise: both move apart by the same; a learner that moves by more is told apart."""
-    shift = np.array([0.5, 0.0, 0.0])
-    noise = rng(7).standard_normal((4, 20, 3)) * 0.2
-    placebo = noise[0], noise[1] + shift
-    assert permutation_p(*placebo, rng()) < 0.001  # which alone would count as a sign
-    assert context.beyond_p((noise[2], noise[3] + shift), placebo, rng()) > 0.05
-    assert context.beyond_p((noise[2], noise[3] + 2 * shift), placebo, rng()) < 0.001
-    assert math.isnan(context.beyond_p((noise[2][:1], noise[3]), placebo, rng()))
 
 
 def test_slopes_count_where_they_exceed_the_placebos():
@@ -211,24 +201,6 @@ def test_motor_equivalence_by_hand():
     assert math.isnan(motor_equivalence(np.ones(2), np.eye(2))[0])
 
 
-def test_self_motion_of_the_robot_is_motor_equivalent():
-    """A small displacement that leaves the hand in place, and one that only moves it."""
-    task = load_task("ascending")
-    q = posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
-    joints = movable(task, "right")
-    jacobian = task.robot.jacobian(q, "right")[:, joints]
-    null, complement = subspaces(jacobian)
-    still, moving = np.array(q), np.array(q)
-    still[joints] += 1e-4 * null[:, 0]
-    moving[joints] += 1e-4 * complement[:, 0]
-    at = task.robot.forward_kinematics(np.array([q, still, moving]), "right")
-    assert np.linalg.norm(at[1] - at[0]) < 1e-7
-    assert np.linalg.norm(at[2] - at[0]) > 5e-5
-    parts = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
-    assert parts[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
-    assert parts[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
-
-
 # Subtasks and hands
 
 
@@ -247,11 +219,8 @@ def test_other_hands_are_no_sacrifice():
     task = as_released("two-armed-1")  # where the left hand is the slower one
     initial, other = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     assert change_from(other, initial)[0] > 1  # the old comparison took this for a sacrifice
-    assert other.ticks < initial.ticks
-    frame = signature_values(solved_study([(task, "every", [other.movements])]))
-    rows = frame.set_index("signature")
-    assert rows.loc["first subtask against the same hands"].value == 0
-    assert rows.loc["total against the same hands"].value == 0
+    cell = Trajectories(task, "", "", (trajectory(task, other.movements),))
+    assert [SIGNS[sign].of(cell).tolist() for sign in ("first", "whole")] == [[0], [0]]
 
 
 def test_signs_are_signatures_with_one_number_a_run():
@@ -424,123 +393,111 @@ def test_a_curve_is_no_slope():
     assert slope_length(curve, places, rng()).p > 0.1
 
 
-# The driver
+# Studies
 
 
-def solved_study(solved):
-    """A study of ``(task, method, [movements of each run])``."""
-    rows, movements = [], {}
-    tasks = {task.name: task for task, _, _ in solved}
-    for task, method, solutions in solved:
-        for run, solution in enumerate(solutions):
-            run_id = f"{task.name}-{method}-{run}"
-            execution = execute(task, solution)
-            rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
-                         "status": "ok", "run": run, "reward": execution.reward,
-                         "hands": execution.hands})  # fmt: skip
-            movements[run_id] = pd.DataFrame(
-                {"order": order, "goal": m.goal, "hand": m.hand, "kind": m.kind, "ticks": m.ticks}
-                | dict(zip(task.robot.joint_names, m.target, strict=True))
-                for order, m in enumerate(execution.movements)
-            )
-        if not solutions:
-            rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
-                         "variant": "", "status": "infeasible", "run": 0})  # fmt: skip
-    study = study_of(pd.DataFrame(rows), list(tasks.values()))
-    return MadeUp(study, movements=(movements, {}))
+def cell_of(task, method, *solutions):
+    """Executed solutions of one method on one task."""
+    return Trajectories(task, method, "", tuple(trajectory(task, each) for each in solutions))
+
+
+def study_with(*cells):
+    """A study of cells, those without solutions of one failed run; no replays."""
+    rows = [
+        row(cell.method, -300 if cell.runs else None, task=cell.task.name, run=run,
+            status="ok" if cell.runs else "infeasible")
+        for cell in cells for run in range(max(1, len(cell.runs)))
+    ]  # fmt: skip
+    solved = {(cell.task.name, cell.method): cell for cell in cells}
+    replays = {key: replace(cell, runs=()) for key, cell in solved.items()}
+    study = study_of(pd.DataFrame(rows), [cell.task for cell in cells])
+    return MadeUp(study, trajectories=made(solved), replays=made(replays))
 
 
 def test_frame_of_two_contexts():
     """The learner depends on context, the corrective process does not."""
-    tasks = [load_task("ascending"), load_task("descending")]
-    solved = []
-    for task in tasks:
+    cells = []
+    for task in (load_task("ascending"), load_task("descending")):
         runs = learn_many(task, "EC1", seeds=range(5), trials=1500)
-        solved += [
-            (task, "learner", [run.solution for run in runs]),
-            (task, "corrective", [corrective_trial(task, "RRR").movements]),
-            (task, "failed", []),
-        ]
-    frame = signature_values(solved_study(solved))
-    assert frame.equals(signature_values(solved_study(solved)))  # nothing is random but by its seed
+        initial = corrective_trial(task, "RRR").movements
+        cells += [cell_of(task, EC1, *(run.solution for run in runs))]
+        cells += [cell_of(task, "corrective", initial), cell_of(task, "failed")]
+    frame = signature_values(study_with(*cells))
+    assert frame.equals(signature_values(study_with(*cells)))  # nothing is random but by its seed
 
     def one(method, signature):
         rows = frame[(frame.task == "ascending") & (frame.method == method)]
         return rows[rows.signature == signature].iloc[0]
 
-    assert one("learner", "context dependence").p < 0.02  # 2 of 252 at best
-    assert one("learner", "motor-equivalent part").value > 5 * (
-        one("learner", "non-motor-equivalent part").value
-    )
+    assert one(EC1, "context dependence").p < 0.02  # 2 of 252 at best
+    parts = [one(EC1, f"{part}motor-equivalent part").value for part in ("", "non-")]
+    assert parts[0] > 5 * parts[1]
+    shortest = min(run.hits[0] for cell in cells for run in cell.runs if cell.method == EC1)
+    assert one(EC1, "lead time").longest == shortest
     assert one("corrective", "context distance").value == 0
-    assert one("corrective", "context dependence").why_not.startswith("one run a context")
-    assert one("learner", "total against the same hands").high < 0
-    assert one("learner", "hand as in isolation").why_not == "the task has one hand"
-    assert one("failed", "total against the same hands").why_not == "no run has a solution"
-    assert one("learner", "locus slope").why_not.startswith("fewer than 3 tasks")
+    for method, signature, why in (
+        ("corrective", "context dependence", "one run a context"),
+        ("corrective", "total against the same hands", "one run: no interval"),
+        (EC1, "hand as in isolation", "the task has one hand"),
+        ("failed", "total against the same hands", "no run has a solution"),
+        (EC1, "locus slope", "fewer than 3 tasks"),
+    ):
+        assert one(method, signature).why_not.startswith(why)
+    # The mean of five runs with Student's interval, four degrees of freedom.
+    total = one(EC1, "total against the same hands")
+    values = cells[0].against_same_hands.sum(axis=1)
+    half = 2.776445 * np.std(values, ddof=1) / math.sqrt(5)
+    expected = values.mean(), values.mean() - half, values.mean() + half, 5
+    assert (total.value, total.low, total.high, total.n) == pytest.approx(expected)
     assert list(frame.signature.unique()) == [
         each.name for each in REGISTER.values() if each.meaning
     ]
     # A row has a value, or says why it has none.
     assert (frame.value.notna() | (frame.why_not != "")).all()
-    intervals = frame[frame.low.notna()]
-    assert (intervals.low <= intervals.value + 1e-9).all()
-    assert (intervals.value <= intervals.high + 1e-9).all()
-    assert set(frame.method) == {"learner", "corrective", "failed"}
+    p_holm = tables.contexts(study_with(*cells)).p_holm[f"ascending {EC1} goal 1 right"]
+    assert p_holm == one(EC1, "context dependence").p
 
 
 def test_frame_of_a_family():
     """The base is lower at goals 1 and 3 by a tenth of goal 2's height: slopes are known."""
-    solved = []
+    cells = []
     for task in family_of([1.5, 2.0, 2.5]).values():
         height = task.goals[1][1]
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
-        solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    frame = signature_values(solved_study(solved))
+        cells.append(cell_of(task, "planner", *[planned(*targets, hands="RRR")] * 2))
+    frame = signature_values(study_with(*cells))
     slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
     assert set(slopes.moving) == {2}
     norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
-    reached = {
-        goal: [
-            execute(task, solution[0]).configurations[goal - 1, 1] for task, _, solution in solved
-        ]
-        for goal in (1, 3)
-    }
     for goal in (1, 3):
-        row = slopes.loc[goal, "right", "base_y"]
-        assert row.value == pytest.approx(reached[goal][2] - reached[goal][0])  # over length 1
-        assert row.n == 6
+        reached = [cell.runs[0].execution.configurations[goal - 1, 1] for cell in cells]
+        of_base = slopes.loc[goal, "right", "base_y"]
+        assert of_base.value == pytest.approx(reached[2] - reached[0])  # over length 1
+        assert (of_base.n, of_base.unit) == (6, "1")
         every = slopes.value.loc[goal, "right"]
         assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
         assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
     assert slopes.value[1, "right", "base_y"] > 0.001
-    contexts = frame[frame.signature == "context distance"]
-    assert contexts.why_not.str.contains("locus slopes").all()
+    assert (
+        slopes["where"][3, "right", "base_y"] == "goal 3, carry-over of goal 2, right hand, base_y"
+    )
+    assert frame[frame.signature == "context distance"].why_not.str.contains("locus slopes").all()
+    assert tables.slopes(study_with(*cells)).kind.tolist() == ["anticipatory", "carry-over"]
 
 
-# Beside the placebo
-
-
-def study_beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, replayed=None):
+def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12):
     """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of the placebo."""
-    tasks = [load_task("ascending"), load_task("descending")]
-    groups = {EC1: (apart, runs), PLACEBO: (of_placebo, placebo_runs)}
-    rows, cells = [], {}
-    for label, (shift, count) in groups.items():
-        for side, task in enumerate(tasks):
-            q = np.zeros((count, len(task.goals), 10))
-            q[..., 0] = 0.1 * rng(side).standard_normal((count, 1)) * (count > 1)
-            q[..., 0] += side * shift - (q[..., 0].mean() if count else 0)
-            solutions = [SimpleNamespace(hands=["right"] * 3, execution=SimpleNamespace(
-                configurations=each, ticks_by_goal=lambda: [9, 9, 9], hands="RRR"))
-                for each in q]  # fmt: skip
-            cells[task.name, label] = Trajectories(task, label, "", tuple(solutions))
-            rows += [row(label, -300, task=task.name, run=k) for k in range(count)]
-    replays = {key: Trajectories(cell.task, cell.method, "", cell.runs if replayed else ())
-               for key, cell in cells.items()}  # fmt: skip
-    study = study_of(pd.DataFrame(rows), tasks)
-    return MadeUp(study, trajectories=made(cells), replays=made(replays))
+    cells = []
+    for label, shift, count in ((EC1, apart, runs), (PLACEBO, of_placebo, placebo_runs)):
+        noise = 0.1 * rng(2).standard_normal(count)
+        for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
+            q = np.zeros((count, 3, 10))
+            q[..., 0] = noise[:, None] + x
+            executed = [SimpleNamespace(configurations=each) for each in q]
+            solutions = tuple(SimpleNamespace(hands=["right"] * 3, execution=e) for e in executed)
+            cells.append(Trajectories(task, label, "", solutions))
+    return study_with(*cells)
 
 
 @pytest.mark.parametrize(
@@ -555,15 +512,14 @@ def study_beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, rep
     ],
 )
 def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
-    study = study_beside_placebo(**made_up)
+    study = beside_placebo(**made_up)
     found = placebo.difference(study)
     assert found.contexts.method == EC1
     assert found.contexts.apart == pytest.approx(made_up["apart"])
     assert found.seen == seen
     assert sentences.answer(study).startswith(answer)
     if found.placebo is not None:
-        p = found.contexts.p_beyond(found.placebo)
         assert found.placebo.apart == pytest.approx(made_up.get("of_placebo", 0.5))
-        assert placebo.context_beyond_p(study, found.contexts) == p or len(found.contexts.runs) < 2
-        # The placebo itself is tested against nothing.
-        assert math.isnan(placebo.context_beyond_p(study, found.placebo))
+        assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)
+        assert placebo.context_beyond_p(study, found.contexts) == found.beyond_p
+        assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself

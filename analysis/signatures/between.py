@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, product
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from coartic.analysis.signatures.locus import MovedGoal
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence
 from coartic.analysis.statistics.estimates import SEED, Estimate
 from coartic.analysis.trajectories import Trajectories, postures
-from coartic.robot import HANDS, Array
+from coartic.robot import Array
 from coartic.runs.plan import label_of
 
 
@@ -193,21 +193,15 @@ class BesideMovedGoal:
     positions: tuple[float, ...]
     """Position of the moving goal in each run's task, length unit."""
 
-
-def beside_moved_goal(
-    moved: MovedGoal, cells: Mapping[str, Trajectories]
-) -> Iterator[BesideMovedGoal]:
-    """The goals before (anticipatory) and after (carry-over) a moving one, by hand.
-
-    ``cells``: what one method did on tasks of the family, in their order. Goals that no run hits
-    with the hand are left out.
-    """
-    task = next(iter(cells.values())).task
-    beside = {moved.goal - 1, moved.goal + 1} & set(range(1, len(task.goals) + 1))
-    for goal, hand in product(sorted(beside), HANDS):
+    @classmethod
+    def of(
+        cls, moved: MovedGoal, cells: Mapping[str, Trajectories], goal: int, hand: Hand
+    ) -> BesideMovedGoal | None:
+        """What one method did at a goal with a hand, by task; None where no run hits it so."""
         runs = {name: cell.with_hand(hand, goal) for name, cell in cells.items()}
         positions = tuple(moved.positions[name] for name, of_task in runs.items() for _ in of_task)
-        if positions:
-            configurations = postures(tuple(chain.from_iterable(runs.values())), goal)
-            place = Place(goal, hand, moving=moved.goal)
-            yield BesideMovedGoal(task, place, configurations, positions)
+        if not positions:
+            return None
+        configurations = postures(tuple(chain.from_iterable(runs.values())), goal)
+        task = next(iter(cells.values())).task
+        return cls(task, Place(goal, hand, moving=moved.goal), configurations, positions)

@@ -24,9 +24,7 @@ import numpy as np
 
 from coartic.analysis.signatures import subtasks
 from coartic.analysis.signatures.between import (
-    NOWHERE,
     BesideMovedGoal,
-    Place,
     TwoContexts,
     Value,
     rng_of,
@@ -39,11 +37,6 @@ from coartic.robot import Array
 
 Scope = Literal["runs", "contexts", "moved goals"]
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def unchanged(values: Array) -> Array:
-    """The values themselves."""
-    return values
 
 
 @dataclass(frozen=True)
@@ -60,8 +53,6 @@ class Signature:
     """Meaning of a value, as Markdown. A sign without one is not in tables of signatures."""
     sources: tuple[str, ...] = ()
     """Keys of references.bib."""
-    place: Place = NOWHERE
-    """Where the values of runs belong, if they are not by goal."""
     two_hands: bool = False
     """Whether it applies to tasks with two hands alone."""
     missing: str = ""
@@ -72,7 +63,7 @@ class Signature:
     """The sign in words."""
     in_short: str = ""
     """The same for tables."""
-    of_run: Callable[[Array], Array] = unchanged
+    of_run: Callable[[Array], Array] = np.asarray
     """The signs (n,) from the values of the runs, (n,) or (n, G)."""
 
     def of(self, runs: Trajectories) -> Array:
@@ -117,7 +108,6 @@ def mean_over_goals(values: Array) -> Array:
     "first subtask against the same hands",
     unit="ticks",
     extent="ticks",
-    place=Place(goal=1),
     meaning="Ticks for the first goal, minus those of the corrective process alone with the hands "
     "of the run, so that the choice of hands does not count. If it is positive while the total is "
     "negative, the first subtask is sacrificed for the whole (Shah, Barto & Fagg 2013).",
@@ -125,10 +115,12 @@ def mean_over_goals(values: Array) -> Array:
     words="ticks by which the first movement is longer than the corrective process's with the same "
     "hands",
     in_short="ticks by which the first movement is slower",
+    of_run=lambda values: values[:, 0],
 )
 def first_subtask(runs: Trajectories) -> Array:
-    """t(i, 1) - c(i, 1), of the runs with whose hands the corrective process ends."""
-    return np.asarray(runs.against_same_hands[:, 0])
+    """t(i, 1) - c(i, 1), shape ``(n, 1)``, of the runs with whose hands the corrective process
+    ends."""
+    return np.asarray(runs.against_same_hands[:, :1])
 
 
 @signature(

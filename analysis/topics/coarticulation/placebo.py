@@ -7,13 +7,12 @@ shows, and has to exceed the placebo's.
 from __future__ import annotations
 
 import math
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from coartic.analysis.methods import PLACEBO
-from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts
 from coartic.analysis.signatures.context import beyond_p, smallest_p
 from coartic.analysis.signatures.locus import moved_goals
 from coartic.analysis.signatures.signs import SIGNS
@@ -22,8 +21,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.topics.comparison.groups import BY_TRIAL, group_of
-from coartic.analysis.trajectories import postures
-from coartic.robot import Array, Hand
+from coartic.robot import Hand
 
 
 def selects(study: Study, label: str) -> bool:
@@ -67,27 +65,21 @@ def slope_beyond_p(
     """
     if not selects(study, label):
         return math.nan
-    (positions,) = (
-        moved.positions
-        for moved in moved_goals(study.tasks)
-        if moved.goal == moving and task in moved.positions
+    (moved,) = (
+        each for each in moved_goals(study.tasks) if each.goal == moving and task in each.positions
     )
-    runs: dict[str, list[Array]] = {label: [], PLACEBO: []}
-    places = np.unique(list(positions.values()))
-    for place, method in product(places, runs):
-        at = [name for name, where in positions.items() if where == place]
-        cells = [study.cells[name, method] for name in at if (name, method) in study.cells]
-        with_hand = [
-            run
-            for cell in cells
-            for run in study.trajectories(cell.task, method).with_hand(hand, goal)
-        ]
-        if len(with_hand) < 2:
+    places, groups = np.unique(list(moved.positions.values())), []
+    for method in (label, PLACEBO):
+        names = [name for name in moved.positions if (name, method) in study.cells]
+        cells = {name: study.trajectories(name, method) for name in names}
+        beside = BesideMovedGoal.of(moved, cells, goal, hand)
+        if beside is None:
             return math.nan
-        runs[method].append(postures(tuple(with_hand), goal))
+        at = np.array(beside.positions)
+        groups.append([beside.configurations[at == place] for place in places])
     x = places - places.mean()
     rng = np.random.default_rng([SEED, goal, moving])
-    return beyond_p(runs[label], runs[PLACEBO], rng, contrast=x / (x**2).sum())
+    return beyond_p(groups[0], groups[1], rng, contrast=x / (x**2).sum())
 
 
 def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:

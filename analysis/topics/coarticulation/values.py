@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import chain
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,9 @@ from coartic.analysis.signatures.between import (
     Place,
     TwoContexts,
     Value,
-    beside_moved_goal,
 )
 from coartic.analysis.signatures.context import context_pairs
-from coartic.analysis.signatures.locus import LEAST, joined_tasks, moved_goals
+from coartic.analysis.signatures.locus import LEAST, MovedGoal, joined_tasks, moved_goals
 from coartic.analysis.signatures.register import Signature, of_kind
 from coartic.analysis.statistics.estimates import Estimate, student_mean, wilson
 from coartic.analysis.study import Study, cached
@@ -71,7 +70,7 @@ def rows(study: Study) -> Iterator[dict[str, Any]]:
         for each in here:
             cells = {name: of_method[name] for name in each.positions if name in of_method}
             if task == next(iter(cells)):
-                values += map(of_moved_goal, beside_moved_goal(each, cells))
+                values.append(of_moved_goal(each, cells))
         if not here:
             values.append(no_values(of_kind("moved goals"), NO_FAMILY))
         for signature, value in chain(*values):
@@ -104,7 +103,7 @@ def of_runs(cell: Trajectories) -> Values:
             why = why or "the corrective process alone does not complete the task"
             yield from no_values([signature], why)
         elif values.ndim == 1:
-            yield signature, over_runs(signature, values, signature.place)
+            yield signature, over_runs(signature, values, NOWHERE)
         else:
             for goal, of_goal in enumerate(values.T, 1):
                 yield signature, over_runs(signature, of_goal, Place(goal))
@@ -143,15 +142,22 @@ def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[Tw
     return [contexts for contexts in by_hand if all(contexts.runs)]
 
 
-def of_moved_goal(beside: BesideMovedGoal) -> Values:
-    """Values at a goal beside one that moves, if runs hit it at enough positions."""
-    if len(set(beside.positions)) < LEAST:
-        why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-        yield from no_values(of_kind("moved goals"), why, beside.place, len(beside.positions))
-        return
-    for signature in of_kind("moved goals"):
-        for value in signature.measure(beside):
-            yield signature, value
+def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> Values:
+    """Values at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
+
+    ``cells``: what one method did on the tasks. A goal needs runs at enough positions.
+    """
+    task = next(iter(cells.values())).task
+    numbers = (n for n in (moved.goal - 1, moved.goal + 1) if 1 <= n <= len(task.goals))
+    for goal, hand in product(numbers, HANDS):
+        beside = BesideMovedGoal.of(moved, cells, goal, hand)
+        if beside is not None and len(set(beside.positions)) < LEAST:
+            why = f"runs with that hand in fewer than {LEAST} tasks of the family"
+            yield from no_values(of_kind("moved goals"), why, beside.place, len(beside.positions))
+        elif beside is not None:
+            for signature in of_kind("moved goals"):
+                for value in signature.measure(beside):
+                    yield signature, value
 
 
 def pairs_of_contexts(study: Study) -> list[tuple[str, str, int]]:
