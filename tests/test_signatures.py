@@ -109,6 +109,19 @@ def test_more_than_a_placebo_by_brute_force():
     assert p == pytest.approx(2 * count / total, abs=0.03)
 
 
+def test_drawn_tests_count_what_was_seen():
+    """No resample comes near: p is that of the one that was seen, both tails where it has two."""
+    near = rng(9).standard_normal((2, 30, 2))
+    far = near[0], near[1] + 100.0
+    assert permutation_p(*far, rng(), resamples=9) == 0.1
+    assert context.beyond_p(far, near, rng(), resamples=19) == 2 / 20
+    assert context.beyond_p(near, far, rng(), resamples=19) == 1.0
+    assert math.isnan(context.beyond_p((far[0][:1], far[1]), near, rng()))
+    assert context.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
+    assert context.dependence_below(*far, 1.0, rng(), resamples=9) == 1.0
+    assert math.isnan(context.dependence_below(near[0][:1], near[1], 1.0, rng()))
+
+
 def test_slopes_count_where_they_exceed_the_placebos():
     """Three places of a goal: the contrast of their means is the slope, and what is tested."""
     x = np.array([-1.0, 0.0, 1.0])

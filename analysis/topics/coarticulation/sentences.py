@@ -18,18 +18,13 @@ from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import estimate, number, p_value, plural
 
 
-def in_brackets_after(p: float) -> str:
-    """A p-value in brackets with a leading space; empty for NaN."""
-    return "" if math.isnan(p) else f" ({p_value(p)})"
-
-
 def answer(study: Study) -> str:
     """Whether the posture at the goal that two tasks share depends on the next goal, in short."""
     found = difference(study)
     if found is None:
         return ""
     shared, placebo = found.contexts, found.placebo
-    goal, apart = shared.goal, number(shared.apart, 2)
+    goal, apart, p = shared.goal, number(shared.apart, 2), p_value(shared.p)
     lie = f"at goal {goal} base and joints lie {apart} apart"
     if found.too_few:
         text = (
@@ -37,8 +32,7 @@ def answer(study: Study) -> str:
             f"({plural(shared.n, 'run')})."
         )
     elif found.seen:
-        p = "" if math.isnan(shared.p) else f", {p_value(shared.p)}"
-        of_runs = f"; {number(shared.spreads, 1)} SD of the runs{p}"
+        of_runs = f"; {number(shared.spreads, 1)} SD of the runs{', ' + p if p else ''}"
         guesses = "" if placebo is None else f"; random guesses {number(placebo.apart, 2)}"
         of_runs = "" if math.isnan(shared.spreads) else of_runs
         text = f"Yes: {lie} (length units and rad{of_runs}{guesses})."
@@ -55,7 +49,7 @@ def answer(study: Study) -> str:
     else:
         text = (
             f"No significant difference: postures of the {name_of(shared.method)} at goal {goal} "
-            f"lie {apart} apart{in_brackets_after(shared.p)}."
+            f"lie {apart} apart{f' ({p})' if p else ''}."
         )
     cells = [(task.name, shared.method) for task in shared.tasks]
     return text + failed_runs(study, cells, " and are not counted")

@@ -11,6 +11,7 @@ import pandas as pd
 from coartic.analysis.methods import in_order, is_search, main_methods
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import joined_tasks, moved_goals
+from coartic.analysis.statistics.estimates import Estimate, interval
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -18,7 +19,6 @@ from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.words import marked
-from coartic.robot import Hand
 
 COLUMN_OF = {
     "first": "first subtask against the same hands",
@@ -37,21 +37,19 @@ def contexts(study: Study) -> Rows:
     frame = signature_values(study)
     frame = frame[frame.against.ne("") & frame.value.notna() & frame.moving.isna()]
     rows = []
-    keys = ["task", "label", "goal", "hand", "against"]
-    for at, group in frame.groupby(keys, sort=False):
-        task, label, goal, hand, against = map(str, at)
-        by_signature = group.set_index("signature")
-        value = by_signature.value
+    at: Any
+    for at, group in frame.groupby(["task", "label", "goal", "hand", "against"], sort=False):
+        task, label, goal, hand, against = at
+        value, p = (group.set_index("signature")[column] for column in ("value", "p"))
         first, second = (study.trajectories(name, label) for name in (task, against))
-        side: Hand = "left" if hand == "left" else "right"
-        shared = TwoContexts(first, second, int(goal), side)
+        shared = TwoContexts(first, second, goal, hand)
         row: Row = {
             "method": label,
             "place": f"goal {goal} of {task} and {against}",
             "runs": int(group.n.max()),
             "distance": value.get("context distance"),
             "dependence": value.get("context dependence"),
-            "p_holm": by_signature.p.get("context dependence", math.nan),
+            "p_holm": p.get("context dependence", math.nan),
             "p_placebo": placebo.context_beyond_p(study, shared),
             "equivalent": value.get("motor-equivalent part"),
             "other": value.get("non-motor-equivalent part"),
@@ -78,11 +76,15 @@ def slopes(study: Study) -> Rows:
     frame = signature_values(study)
     frame = frame[frame.moving.notna() & frame.value.notna()]
     rows = []
-    keys = ["task", "label", "goal", "moving", "hand"]
     at: Any
-    for at, group in frame.groupby(keys, sort=False):
+    for at, group in frame.groupby(["task", "label", "goal", "moving", "hand"], sort=False):
         task, label, goal, moving, hand = at
-        base = str(task).partition(".")[0]
+        base = task.partition(".")[0]
+        of_task = [key for key in study.cells if key[1] == label]
+        of_task = [key for key in of_task if key[0].partition(".")[0] == base]
+        norm = group[group.signature == "locus slope norm"].iloc[0]
+        by_joint = group[group.signature == "locus slope"]
+        steepest = by_joint.sort_values("value", key=abs).iloc[-1]
         row: Row = {
             "method": label,
             "place": f"goal {goal} of {base}, goal {moving} moves",
@@ -91,24 +93,13 @@ def slopes(study: Study) -> Rows:
             "kind": "anticipatory" if goal < moving else "carry-over",
             "hand": hand,
             "runs": int(group.n.max()),
-            "norm": math.nan,
-            "p_holm": math.nan,
+            "norm": norm.value,
+            "p_holm": norm.p,
             "p_placebo": placebo.slope_beyond_p(study, label, task, goal, moving, hand),
-            "joint": "",
-            **runs_of(
-                *(
-                    cell
-                    for (name, cell_label), cell in study.cells.items()
-                    if cell_label == label and name.partition(".")[0] == base
-                )
-            ),
+            "joint": steepest.joint,
+            **interval("slope", Estimate(steepest.value, steepest.low, steepest.high)),
+            **runs_of(*(study.cells[key] for key in of_task)),
         }
-        for norm in group[group.signature == "locus slope norm"].head(1).itertuples():
-            row |= {"norm": norm.value, "p_holm": norm.p}
-        by_size = group[group.signature == "locus slope"].sort_values("value", key=abs)
-        for steepest in by_size.tail(1).itertuples():
-            row |= {"joint": steepest.joint, "slope": steepest.value}
-            row |= {"slope_low": steepest.low, "slope_high": steepest.high}
         rows.append((f"{base} {label} goal {goal} of {moving} {hand}", row))
     yield from adjust_p(rows)
 
