@@ -13,11 +13,13 @@ from scipy import stats
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context, subtasks
+from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
-from coartic.analysis.signatures.manifold import motor_equivalence, movable
+from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics import hypotheses
 from coartic.analysis.topics.coarticulation import placebo, sentences, tables
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
@@ -43,6 +45,17 @@ def planned(*targets, hands):
         Movement(number, {"L": "left", "R": "right"}[letter], "planned", target)
         for number, (target, letter) in enumerate(zip(targets, hands, strict=True), 1)
     ]
+
+
+def posed(task, method, q, ticks=(0, 0, 0)):
+    """Runs that hit all goals with the right hand in one posture each, ``q`` (runs, dof)."""
+    configurations = np.repeat(np.asarray(q)[:, None], len(task.goals), axis=1)
+    runs = (
+        SimpleNamespace(configurations=each, hands="RRR", ticks_by_goal=lambda: ticks)
+        for each in configurations
+    )
+    solutions = (SimpleNamespace(hands=["right"] * 3, execution=run) for run in runs)
+    return Trajectories(task, method, "", tuple(solutions))
 
 
 # Context dependence
@@ -212,6 +225,35 @@ def test_motor_equivalence_by_hand():
     singular = motor_equivalence(np.array([1.0, 1.0, 3.0, 4.0]), JACOBIAN * [[1], [0]])
     assert singular == pytest.approx((math.sqrt(26 / 3), 1.0))
     assert math.isnan(motor_equivalence(np.ones(2), np.eye(2))[0])
+
+
+def test_parts_of_two_contexts():
+    """Mean postures that differ by self-motion: the hand stays, which its Jacobian tells."""
+    task, q = load_task("ascending"), posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
+    joints = movable(task, "right")
+    null, _ = subspaces(task.robot.jacobian(q, "right")[:, joints])
+    noise = 1e-4 * rng(3).standard_normal((6, 10))
+    moved = np.array(q)
+    moved[joints] += 0.02 * null[:, 0]
+    contexts = TwoContexts(posed(task, "", q + noise), posed(task, "", moved + noise), 1, "right")
+    parts = [REGISTER[f"{of}motor-equivalent part"].measure(contexts) for of in ("", "non-")]
+    assert parts[0].estimate.value == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
+    assert parts[1].estimate.value < 5e-4
+    assert [part.n for part in parts] == [12, 12]
+    assert parts[0].estimate.p < 0.01
+    assert contexts.hands_apart < 1e-3 < contexts.apart == pytest.approx(0.02)
+
+
+def test_a_lead_is_at_most_the_shortest_movement():
+    task = load_task("ascending")
+    cells = [posed(task, "", x + 0.01 * rng(1).standard_normal((8, 10))) for x in (0.0, 1.0)]
+    for cell in cells:
+        for number, run in enumerate(cell.runs):
+            length = 6 + number
+            run.hits = np.array([length - 1, 20, 30])
+            run.configurations = np.repeat(run.execution.configurations[:1], length, axis=0)
+    lead = REGISTER["lead time"].measure(TwoContexts(*cells, 1, "right"))
+    assert (lead.estimate.value, lead.place.longest, lead.n) == (5, 5, 16)
 
 
 # Subtasks and hands
@@ -499,18 +541,16 @@ def test_frame_of_a_family():
     assert tables.slopes(study_with(*cells)).kind.tolist() == ["anticipatory", "carry-over"]
 
 
-def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12):
+def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
     """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of the placebo."""
     cells = []
     for label, shift, count in ((EC1, apart, runs), (PLACEBO, of_placebo, placebo_runs)):
         noise = 0.1 * rng(2).standard_normal(count)
         for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
-            q = np.zeros((count, 3, 10))
-            q[..., 0] = noise[:, None] + x
-            executed = [SimpleNamespace(configurations=each) for each in q]
-            solutions = tuple(SimpleNamespace(hands=["right"] * 3, execution=e) for e in executed)
-            cells.append(Trajectories(task, label, "", solutions))
-    return study_with(*cells)
+            cells.append(posed(task, label, [posture(each) for each in noise + x]))
+    study = study_with(*cells)
+    study.runs.loc[study.runs.method == PLACEBO, "trials"] = placebo_trials
+    return study
 
 
 @pytest.mark.parametrize(
@@ -522,6 +562,7 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12):
         ({"apart": 0.0}, False, "No significant difference:"),
         ({"apart": 2.0, "runs": 2}, False, "Too few runs"),
         ({"apart": 2.0, "placebo_runs": 0}, False, "Undecided:"),
+        ({"apart": 2.0, "placebo_trials": 9}, False, "Undecided:"),  # fewer than the learner's
     ],
 )
 def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
@@ -536,3 +577,40 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
         assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)
         assert placebo.context_beyond_p(study, found.contexts) == found.beyond_p
         assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
+
+
+def test_slopes_beside_the_placebo():
+    """The learner follows a moved goal by 0.9 of its way, the placebo by 0.2."""
+    tasks, cells = family_of([1.5, 2.0, 2.5]), []
+    for label, slope in ((EC1, 0.9), (PLACEBO, 0.2)):
+        for number, task in enumerate(tasks.values()):
+            noise = 0.02 * rng(number).standard_normal(9)
+            at = slope * (task.goals[1][1] - 2.0)
+            cells.append(posed(task, label, [posture(each) for each in noise + at]))
+
+    def p_of(label, cells):
+        return placebo.slope_beyond_p(study_with(*cells), label, "v0", 1, 2, "right")
+
+    assert p_of(EC1, cells) < 0.01
+    exchanged = [replace(cell, method={EC1: PLACEBO, PLACEBO: EC1}[cell.method]) for cell in cells]
+    assert p_of(EC1, exchanged) == 1.0
+    assert math.isnan(p_of(PLACEBO, cells))
+    assert math.isnan(p_of(EC1, [*cells[:-1], replace(cells[-1], runs=cells[-1].runs[:1])]))
+    assert math.isnan(p_of(EC1, cells[:3]))
+
+
+def test_signs_beside_the_placebo():
+    """Both tails: a method may be slower or faster at first than the placebo."""
+    task = load_task("ascending")
+    reference = corrective_trial(task, "RRR").ticks_by_goal()
+    slower = {EC1: [9, 12, 10, 14], PLACEBO: [8, 9, 10, 12]}
+    runs = {
+        label: sum((posed(task, label, [posture()], np.add(reference, [ticks, 0, 0])).runs
+                    for ticks in of_label), ())
+        for label, of_label in slower.items()
+    }  # fmt: skip
+    study = study_with(*(Trajectories(task, label, "", runs[label]) for label in slower))
+    p = placebo.sign_beyond_p(study, task.name, EC1, "first")
+    assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
+    assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
+    assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))

@@ -99,14 +99,12 @@ def permutation_p(
 ) -> Array:
     """Probability of so large a distance between means if the context did nothing.
 
-    One-sided permutation test over runs, exact where all divisions of the runs are no more
-    than ``resamples``. The statistic is :func:`distance_of_means`, which orders permutations as
-    :func:`context_dependence` does; with an orthonormal ``basis`` (dof, d) it is the distance
-    within its span. 0 < p ≤ 1; 1 where no run differs from another. NaN where a context has
-    one run only.
+    One-sided permutation test over runs of :func:`distance_of_means`, with an orthonormal
+    ``basis`` (dof, d) within its span; exact where all divisions of the runs are no more than
+    ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN where a context has one run.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with
-    a p each, shape ``(k,)``: the same divisions at every tick.
+    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with a p
+    each, ``(k,)``: the same divisions at every tick.
     """
     if min(len(first), len(second)) < 2:
         return np.full(first.shape[1:-1], math.nan)
@@ -211,27 +209,19 @@ def beyond_p(
 
 
 def lead_time(
-    first: Array,
-    second: Array,
-    rng: np.random.Generator,
-    *,
-    alpha: float = LEVEL,
+    first: Array, second: Array, rng: np.random.Generator, *, alpha: float = LEVEL
 ) -> int | None:
     """How long before a hit two contexts become distinguishable, and stay so, in ticks.
 
-    ``first`` and ``second`` have shape ``(runs, k, dof)``: the last k control ticks of
-    each run up to the hit, which is entry -1. Going back from the hit, contexts count as
-    distinguishable at a tick while the test of :func:`permutation_p` gives at most
-    ``alpha`` there. The first tick that fails ends the count: tests in a fixed order (Maurer,
-    Hothorn & Lehmacher 1995), so that the error rate of the whole is ``alpha`` without
-    correction. 0 means at the hit only; None, not even there, or a context with one run. At most
-    k - 1, the whole movement.
+    ``first`` and ``second``, ``(runs, k, dof)``: the last k control ticks of each run up to the
+    hit, which is entry -1. Going back from the hit, ticks are told apart while the test of
+    :func:`permutation_p` gives at most ``alpha``; the first that fails ends the count, which keeps
+    the error rate of the whole at ``alpha`` (Maurer, Hothorn & Lehmacher 1995). 0: at the hit only;
+    None: not even there, or a context with one run. At most k - 1, the whole movement.
 
-    After Engel, Flanders & Soechting (1997), who looked for the moment at which hand
-    postures before the same piano key diverge by the notes to come. Caveat: from a common
-    start, straight movements diverge in proportion from their first tick on, so that here
-    a lead shorter than the movement speaks of noise or of different speeds, not of a late
-    decision.
+    After Engel, Flanders & Soechting (1997), on hand postures before the same piano key. Caveat:
+    from a common start, straight movements diverge from their first tick on, so that a lead shorter
+    than the movement speaks of noise or of different speeds, not of a late decision.
     """
     failed = ~(permutation_p(first, second, rng, resamples=999)[::-1] <= alpha)
     lead = int(failed.argmax()) if failed.any() else len(failed)

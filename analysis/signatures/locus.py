@@ -82,13 +82,11 @@ def _along(points: Array) -> Array:
 def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Estimate]:
     """One slope per joint, by least squares over the mean posture at each position.
 
-    Length unit (base) or rad (joint) per length unit, -∞ to ∞; 0 no dependence, of which ``p``
-    is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row
-    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Estimate and
-    test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
-    run once or often, and take what departs from the line as independent and of equal variance
-    between positions: curvature widens the interval. Joints that do not change have slope 0 and
-    p 1.
+    Length unit (base) or rad (joint) per length unit, with the two-sided test of 0.
+    ``configurations`` ``(n, dof)``: postures at a goal, a row a run; ``positions`` ``(n,)``: those
+    of the neighbouring goal. Estimate and test have positions - 2 degrees of freedom, whether
+    methods are run once or often, and take departures from the line as independent and of equal
+    variance: curvature widens the interval. Joints that do not change have slope 0 and p 1.
     """
     x, means = _by_position(configurations, positions)
     slopes = []

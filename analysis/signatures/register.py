@@ -23,12 +23,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from coartic.analysis.signatures import subtasks
-from coartic.analysis.signatures.between import (
-    BesideMovedGoal,
-    TwoContexts,
-    Value,
-    rng_of,
-)
+from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts, Value, rng_of
 from coartic.analysis.signatures.context import lead_time
 from coartic.analysis.signatures.locus import locus_slopes, slope_length
 from coartic.analysis.signatures.manifold import subspaces
@@ -43,8 +38,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 class Signature:
     """How a signature is measured, and in which words."""
 
-    kind: Scope
     name: str
+    kind: Scope
     measure: Callable[[Any], Any]
     unit: str
     extent: str = ""
@@ -84,11 +79,11 @@ def of_kind(kind: Scope) -> list[Signature]:
     return [each for each in REGISTER.values() if each.kind == kind and each.meaning]
 
 
-def signature(kind: Scope, name: str, **about: Any) -> Callable[[Function], Function]:
+def signature(name: str, kind: Scope = "runs", **about: Any) -> Callable[[Function], Function]:
     """A decorator: the function measures the signature, ``about`` are fields of it."""
 
     def enter(measure: Function) -> Function:
-        REGISTER[name] = Signature(kind, name, measure, **about)
+        REGISTER[name] = Signature(name, kind, measure, **about)
         return measure
 
     return enter
@@ -104,7 +99,6 @@ def mean_over_goals(values: Array) -> Array:
 
 
 @signature(
-    "runs",
     "first subtask against the same hands",
     unit="ticks",
     extent="ticks",
@@ -124,7 +118,6 @@ def first_subtask(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "total against the same hands",
     unit="ticks",
     extent="ticks",
@@ -148,7 +141,6 @@ def share_of_false(values: Array) -> Array:
 
 
 @signature(
-    "runs",
     "hand as in isolation",
     unit="1",
     extent="share of runs, by goal",
@@ -169,7 +161,6 @@ def hand_as_in_isolation(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "preshaping of the other arm",
     unit="1",
     extent="−∞ to ∞, by goal",
@@ -195,7 +186,6 @@ def preshaping_of_the_other_arm(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "travel of the other arm",
     unit="rad",
     extent="rad, ≥ 0, by goal",
@@ -212,7 +202,6 @@ def travel_of_the_other_arm(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "turning angle",
     unit="rad",
     extent="rad, 0 to π, by goal",
@@ -228,7 +217,6 @@ def turning_angle(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "cost at this goal",
     unit="ticks",
     sign="cost",
@@ -241,7 +229,6 @@ def cost_at_this_goal(runs: Trajectories) -> Array:
 
 
 @signature(
-    "runs",
     "gain at the next goal",
     unit="ticks",
     sign="arm",
@@ -262,8 +249,8 @@ NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
 @signature(
-    "contexts",
     "context distance",
+    "contexts",
     unit="length unit, rad",
     extent="length unit and rad mixed, ≥ 0",
     meaning="Distance between the mean postures at the same goal before two different successors.",
@@ -274,8 +261,8 @@ def context_distance(contexts: TwoContexts) -> Value:
 
 
 @signature(
-    "contexts",
     "context dependence",
+    "contexts",
     unit="pooled SD",
     extent="pooled within-context SD, ≥ 0",
     meaning="The same distance in standard deviations of the runs within a context, with a "
@@ -299,8 +286,8 @@ def part_of_the_difference(contexts: TwoContexts, name: str, number: int) -> Val
 
 
 @signature(
-    "contexts",
     "motor-equivalent part",
+    "contexts",
     unit="length unit, rad, per root of dimension",
     extent="as the distance, per root of dimension",
     meaning="The part of the difference between mean postures that leaves the hand in place "
@@ -313,8 +300,8 @@ def motor_equivalent_part(contexts: TwoContexts) -> Value:
 
 
 @signature(
-    "contexts",
     "non-motor-equivalent part",
+    "contexts",
     unit="length unit, rad, per root of dimension",
     extent="as the distance, per root of dimension",
     meaning="The part of that difference that moves the hand.",
@@ -325,8 +312,8 @@ def other_part(contexts: TwoContexts) -> Value:
 
 
 @signature(
-    "contexts",
     "lead time",
+    "contexts",
     unit="ticks",
     extent="ticks, ≥ 0",
     meaning="How long before the hit the postures of the two contexts can be told apart at every "
@@ -345,10 +332,8 @@ def lead(contexts: TwoContexts) -> Value:
         return contexts.value(math.nan, why_not=why)
     first, second = (last_ticks(group, contexts.goal, longest + 1) for group in contexts.runs)
     ticks = lead_time(first, second, rng_of("lead time", contexts.place))
-    value = contexts.value(
-        math.nan if ticks is None else ticks,
-        why_not="not distinguishable at the hit" if ticks is None else "",
-    )
+    why = "not distinguishable at the hit" if ticks is None else ""
+    value = contexts.value(math.nan if ticks is None else ticks, why_not=why)
     return value._replace(place=contexts.place._replace(longest=longest))
 
 
@@ -356,8 +341,8 @@ def lead(contexts: TwoContexts) -> Value:
 
 
 @signature(
-    "moved goals",
     "locus slope",
+    "moved goals",
     unit="rad per length unit",
     extent="rad or length unit per length unit, by joint",
     meaning="Slope of the mean posture at a goal against the position of a neighbouring goal that "
@@ -369,20 +354,16 @@ def lead(contexts: TwoContexts) -> Value:
 def slope_by_joint(beside: BesideMovedGoal) -> list[Value]:
     """b = Σ (x - mean x)(m(x) - mean m) / Σ (x - mean x)², m(x) the mean posture at position x."""
     slopes = locus_slopes(beside.configurations, beside.positions)
+    place, n = beside.place, len(beside.positions)
     return [
-        Value(
-            beside.place._replace(joint=joint),
-            slope,
-            len(beside.positions),
-            unit="1" if joint.startswith("base") else None,
-        )
+        Value(place._replace(joint=joint), slope, n, unit="1" if joint[:4] == "base" else None)
         for joint, slope in zip(beside.task.robot.joint_names, slopes, strict=True)
     ]
 
 
 @signature(
-    "moved goals",
     "locus slope norm",
+    "moved goals",
     unit="length unit, rad, per length unit",
     extent="mixed, per length unit, ≥ 0",
     meaning="Length of the vector of all joints' slopes, with a permutation test over positions. "
