@@ -235,7 +235,9 @@ def test_parts_of_two_contexts():
     noise = 1e-4 * rng(3).standard_normal((6, 10))
     moved = np.array(q)
     moved[joints] += 0.02 * null[:, 0]
-    contexts = TwoContexts(posed(task, "", q + noise), posed(task, "", moved + noise), 1, "right")
+    contexts = TwoContexts(
+        posed(task, "", q + noise), posed(task, "", moved + noise[::-1]), 1, "right"
+    )
     parts = [REGISTER[f"{of}motor-equivalent part"].measure(contexts) for of in ("", "non-")]
     assert parts[0].estimate.value == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
     assert parts[1].estimate.value < 5e-4
@@ -307,6 +309,7 @@ def test_choice_in_isolation():
     agrees = REGISTER["hand as in isolation"].measure(Trajectories(task, "", "", tuple(paths)))
     assert agrees[:, 0].tolist() == [True, False]
     assert agrees[0, 1]
+    assert SIGNS["hand"].of_run(np.array([[0.0, 1.0, 1.0]])) == 0.5  # not of the last goal
     assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
 
 
@@ -538,7 +541,11 @@ def test_frame_of_a_family():
         slopes["where"][3, "right", "base_y"] == "goal 3, carry-over of goal 2, right hand, base_y"
     )
     assert frame[frame.signature == "context distance"].why_not.str.contains("locus slopes").all()
-    assert tables.slopes(study_with(*cells)).kind.tolist() == ["anticipatory", "carry-over"]
+    steepest = tables.slopes(study_with(*cells))
+    assert steepest.kind.tolist() == ["anticipatory", "carry-over"]
+    for goal, joint, slope in zip(steepest.goal, steepest.joint, steepest.slope, strict=True):
+        of_joint = slopes.value.loc[goal, "right"]
+        assert (joint, slope) == (of_joint.abs().idxmax(), of_joint[joint])
 
 
 def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
