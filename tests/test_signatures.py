@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.methods import EC1, PLACEBO
@@ -378,14 +377,6 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     assert abs(without - now) > 0.05
 
 
-def test_waiting_arms_keep_still_under_condition_3_only():
-    for condition, moves in (("EC3", False), ("EC4", True)):
-        run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
-        path = trajectory(run.task, run.solution)
-        moved = subtasks.preshaping(path, corrective_trial(run.task, "RRRR"))
-        assert (np.nan_to_num(moved) != 0).any() == moves
-
-
 # Form
 
 
@@ -440,15 +431,6 @@ def test_locus_slopes_by_hand():
     # However many runs there are of each task, the evidence is that of three positions.
     many = np.repeat(q, 50, axis=0), np.repeat([-1, -1, 0, 1, 1], 50)
     assert locus_slopes(*many)[0] == pytest.approx(slope)
-
-
-def test_a_curve_is_no_slope():
-    """200 runs on a parabola, whose line over all runs would be "significant"."""
-    places = np.repeat([-1.5, -1.0, -0.5, 0.0, 0.5, 1.0], 40)
-    curve = (0.01 * rng(12).standard_normal(240) + 0.1 * places**2)[:, None]
-    assert stats.linregress(places, curve[:, 0]).pvalue < 1e-6
-    assert locus_slopes(curve, places)[0].p > 0.1
-    assert slope_length(curve, places, rng()).p > 0.1
 
 
 # Studies

@@ -26,7 +26,7 @@ from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import HANDS, Array
 
-Values = Iterator[tuple[Signature, Value]]
+SignatureValues = Iterator[tuple[Signature, Value]]
 NO_CONTEXT = "the method did no other task that shares the start and the first goals"
 IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
 NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
@@ -87,13 +87,13 @@ def rows(study: Study) -> Iterator[dict[str, Any]]:
 
 def no_values(
     signatures: Iterable[Signature], why: str, place: Place = NOWHERE, n: int = 0
-) -> Values:
+) -> SignatureValues:
     """Signatures none of which applies, and why."""
     for signature in signatures:
         yield signature, Value(place, n=n, why_not=why, unit="")
 
 
-def of_runs(cell: Trajectories) -> Values:
+def of_runs(cell: Trajectories) -> SignatureValues:
     """Means and shares over the runs of a cell."""
     for signature in of_kind("runs"):
         why = "the task has one hand" * (signature.two_hands and len(cell.task.hands) < 2)
@@ -123,8 +123,8 @@ def over_runs(signature: Signature, values: Array, place: Place) -> Value:
     return Value(place, estimate, n, "one run: no interval" if n == 1 else "")
 
 
-def of_contexts(first: Trajectories, second: Trajectories, shared: int) -> Values:
-    """Values at every shared goal for every hand that hit it in both contexts."""
+def of_contexts(first: Trajectories, second: Trajectories, shared: int) -> SignatureValues:
+    """SignatureValues at every shared goal for every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
         in_both = contexts_at(first, second, goal)
         for contexts in in_both:
@@ -142,8 +142,8 @@ def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[Tw
     return [contexts for contexts in by_hand if all(contexts.runs)]
 
 
-def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> Values:
-    """Values at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
+def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> SignatureValues:
+    """SignatureValues at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
 
     ``cells``: what one method did on the tasks. A goal needs runs at enough positions.
     """
