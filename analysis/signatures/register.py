@@ -90,9 +90,10 @@ def signature(name: str, kind: Scope = "runs", **about: Any) -> Callable[[Functi
 
 
 def mean_over_goals(values: Array) -> Array:
-    """Mean of the values (n, G) of each run that has some, ``(n,)``."""
+    """Mean of the values (n, G - 1) of each run that has some, ``(n,)``."""
     some = values[~np.isnan(values).all(axis=1)]
-    return np.asarray(np.nanmean(some, axis=1))
+    # The last goal counts as a missing value: the order of summation decides the last bit.
+    return np.asarray(np.nanmean(np.pad(some, ((0, 0), (0, 1)), constant_values=np.nan), axis=1))
 
 
 # One method's runs on one task

@@ -124,7 +124,7 @@ def over_runs(signature: Signature, values: Array, place: Place) -> Value:
 
 
 def of_contexts(first: Trajectories, second: Trajectories, shared: int) -> SignatureValues:
-    """SignatureValues at every shared goal for every hand that hit it in both contexts."""
+    """Values at every shared goal for every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
         in_both = contexts_at(first, second, goal)
         for contexts in in_both:
@@ -143,7 +143,7 @@ def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[Tw
 
 
 def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> SignatureValues:
-    """SignatureValues at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
+    """Values at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
 
     ``cells``: what one method did on the tasks. A goal needs runs at enough positions.
     """
