@@ -184,12 +184,12 @@ def readings() -> Iterator[str]:
 
 def signatures() -> Iterator[str]:
     """The signatures of coarticulation, from their register."""
-    from coartic.analysis.signatures.register import CONTEXTS, FAMILIES, WITHIN
+    from coartic.analysis.signatures.register import of_kind
 
     kinds = {
-        "One method's runs on one task": WITHIN,
-        "One goal before two different successors": CONTEXTS,
-        "A goal beside one that differs between tasks": FAMILIES,
+        "One method's runs on one task": of_kind("runs"),
+        "One goal before two different successors": of_kind("contexts"),
+        "A goal beside one that differs between tasks": of_kind("moved goals"),
     }
     for title, kind in kinds.items():
         yield from (f"**{title}**", "")

@@ -12,10 +12,7 @@ from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
-import numpy as np
-
 from coartic.analysis.methods import (
-    CONDITIONS,
     KNOWN_METHODS,
     LEARNER,
     is_learner,
@@ -25,10 +22,6 @@ from coartic.analysis.methods import (
     most_exploring,
     name_of,
 )
-from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.context import smallest_p
-from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
-from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import CellKey, Study, cached
 from coartic.analysis.table import TABLES
 from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
@@ -60,11 +53,6 @@ def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
     return {"failed": failed.total(), "runs": sum(runs[label] for label in who), "who": names}
 
 
-def failed_of(study: Study, label: str) -> Facts | None:
-    """:func:`failed_behind` an answer about one method."""
-    return failed_behind(study, (cell for cell in study.cells if cell[1] == label))
-
-
 def failed_compared(study: Study, *groups: str) -> Facts | None:
     """:func:`failed_behind` an answer that compares methods on tasks with a known optimum."""
     tasks = initial_and_optimum(study)
@@ -77,62 +65,6 @@ def failed_compared(study: Study, *groups: str) -> Facts | None:
             if not groups or group_of(study, label) in groups
         ),
     )
-
-
-@cached
-def coarticulation(study: Study) -> Facts | None:
-    """How the posture at the first goal that two tasks share depends on the next goal."""
-    shared = shared_goal(study)
-    if shared is None:
-        return None
-    # A method whose runs differ by chance takes a test.
-    tested = study.plan.methods[study.cells[shared.tasks[0].name, shared.method].method].stochastic
-    differ = shared.p < LEVEL if tested else shared.apart > 0
-    chosen = selects(study, shared.method)
-    placebo = placebo_of(study, shared) if chosen else None
-    beyond = math.nan if placebo is None else shared.p_beyond(placebo)
-    replays = [study.replays(task.name, shared.method) for task in shared.tasks]
-    replayed = TwoContexts(replays[0], replays[1], shared.goal, shared.hand)
-    return {
-        "goal": shared.goal,
-        "method": name_of(shared.method),
-        "runs": sum(map(len, shared.postures)),
-        "apart": shared.apart,
-        "hands_apart": shared.hands_apart,
-        "spreads": shared.spreads,
-        "p": shared.p,
-        "tested": tested,
-        "differ": differ,
-        "seen": differ and (not chosen or beyond < LEVEL),
-        "too_few": tested and not smallest_p(*map(len, shared.runs)) < LEVEL,
-        "no_placebo": chosen and placebo is None,
-        "placebo": math.nan if placebo is None else placebo.apart,
-        "beyond": beyond,
-        "replayed": replayed.apart if all(replayed.runs) else math.nan,
-        "row": f"{shared.tasks[0].name} {shared.method} goal {shared.goal} {shared.hand}",
-        "failed": failed_behind(study, [(task.name, shared.method) for task in shared.tasks]),
-    }
-
-
-@cached
-def slopes(study: Study) -> Facts | None:
-    """The joint that follows a moved goal most, at a goal before it: of the learner if it ran.
-
-    ``seen``: whether the whole posture surely follows; places where it does come first.
-    """
-    rows = TABLES["slopes"](study)
-    rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
-    # A method that selects its solution from trials has to exceed the placebo as well.
-    chosen = [selects(study, str(label)) for label in rows.method]
-    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
-    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
-    for label in (*CONDITIONS, *main_methods(rows.method)):
-        of_method = rows[rows.method == label].sort_values(["seen", "size"])
-        for row in of_method.tail(1).to_dict("records"):
-            words = {"method": name_of(label), "joint": str(row["joint"]).replace("_", " ")}
-            failed = {"failed": failed_of(study, label)}
-            return {str(key): value for key, value in row.items()} | words | failed
-    return None
 
 
 @cached
@@ -261,15 +193,6 @@ def learning(study: Study) -> list[Facts]:
         for task, row in rows
         if row in half.index and half[row] < math.inf
     ]
-
-
-@cached
-def signatures(study: Study) -> Facts | None:
-    """In how many methods the next goal changes more of what leaves the hand in place."""
-    rows = TABLES["contexts"](study)
-    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
-    larger = int((rows.equivalent > rows.other).sum())
-    return {"larger": larger, "methods": len(rows)} if len(rows) else {}
 
 
 @cached

@@ -17,6 +17,7 @@ from coartic.analysis.report import facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import COLUMNS
+from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.topics.paper.sentences import papers_claims, rewards_by_verdict
 
 MOST = 100
@@ -69,10 +70,10 @@ def numbers(study: Study) -> Iterator[Number]:
         for verdict, count in rewards_by_verdict(study).items():
             comment = f"learned rewards of the paper's cells, {verdict}: table published"
             yield f"Rewards{letters(verdict)}", str(count), comment
-    if shared := facts.coarticulation(study):
-        comment = f"postures at the shared goal: table contexts, row '{shared['row']}'"
-        yield "PosturesApart", plain(shared["apart"], 2), comment
-        yield "PosturesApartSD", plain(shared["spreads"], 1), comment
+    if shared := shared_goal(study):
+        comment = f"postures at the shared goal: table contexts, row '{shared.row}'"
+        yield "PosturesApart", plain(shared.apart, 2), comment
+        yield "PosturesApartSD", plain(shared.spreads, 1), comment
     if price := facts.price(study):
         for of, label in (("Learner", price["learner"]), (price["rival"], price["rival_label"])):
             for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):

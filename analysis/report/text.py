@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from coartic.analysis import words
 from coartic.analysis.report import facts
 from coartic.analysis.study import Study
+from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.paper import sentences as paper
 from coartic.text import one_line
 
@@ -21,10 +22,14 @@ QUESTIONS = {
     "price": ("What does it cost?", "Cost"),
 }
 """The four questions with their words on the terminal, by the facts that answer them."""
-ANSWERS = {"paper": paper.answer}
-"""Functions that answer a question."""
 INSTEAD = {"slopes": "slopes", "gain": "learning"}
 """Facts that answer the first question where no two tasks share a goal, with their sections."""
+ANSWERS = {
+    "coarticulation": coarticulation.answer,
+    "slopes": coarticulation.answer_by_slopes,
+    "paper": paper.answer,
+}
+"""Answers by the names in :data:`QUESTIONS`; the others are still macros with facts."""
 
 
 @cache

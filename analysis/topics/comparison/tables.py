@@ -24,7 +24,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, gap_share, other_tasks, task_mean
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.coarticulation.tables import corrected
+from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.comparison.groups import BY_TRIAL, method_rows
 from coartic.analysis.topics.comparison.runtimes import best_so_far, halfway, targets
 from coartic.analysis.topics.comparison.runtimes import price as price_by_method
@@ -80,7 +80,7 @@ def against_learner(study: Study) -> Rows:
             "least_p": test.least_p,
         }
         rows.append((f"{task} {label}", row | runs_of(cell, learner)))
-    yield from corrected(rows)
+    yield from adjust_p(rows)
 
 
 @table("method, knows, gap[], better, worse, on *, runs")
