@@ -13,7 +13,7 @@ from coartic import MotionModel, builtin_tasks, corrective_trial, execute, hand_
 from coartic.analysis.optima import entries
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
-from coartic.method import BudgetError, MethodError, Session
+from coartic.method import BudgetError, Information, MethodError, Session
 from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
 from coartic.runs.run import movements_from
@@ -196,8 +196,8 @@ def test_the_examples_are_methods(path, in_this_process):
     entry = registry([path])[name]
     laws = check_method(entry, tasks=[load_task("ascending")])
     assert [law for law in laws if not law.passed] == []
-    session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
-    solution = entry.with_parameters({}).solve(session).solution
+    session = Session(load_task("ascending"), 0, map(Information, entry.told), trial_budget=300)
+    solution = entry.configure({}).solve(session).solution
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute(load_task("ascending"), solution).reward
     if "coartic.agents" in text:  # what was learned, in the last trial
