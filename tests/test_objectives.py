@@ -15,7 +15,7 @@ from coartic.analysis.report.contents import TABLES
 from coartic.analysis.report.text import sentence
 from coartic.analysis.study import load
 from coartic.analysis.topics import objectives
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells

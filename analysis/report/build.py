@@ -25,8 +25,7 @@ from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
 from coartic.analysis.report.text import answers, environment, sentence
 from coartic.analysis.section import Section
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, publish
 

@@ -13,6 +13,7 @@ from shlex import quote
 from typing import Any
 
 import numpy as np
+from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
 
 from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.methods import (
@@ -30,13 +31,12 @@ from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import smallest_p
 from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
 from coartic.analysis.statistics.estimates import LEVEL
-from coartic.analysis.study import CellKey, Study, cached
+from coartic.analysis.study import CellKey, Study, cached, one_by_one
 from coartic.analysis.table import TABLES
-from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.topics.comparison.runtimes import halfway
 from coartic.analysis.topics.comparison.runtimes import price as price_by_method
 from coartic.analysis.topics.comparison.scores import initial_and_optimum, leaders
-from coartic.analysis.topics.families.sample import one_by_one, sample
+from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.topics.human import judge
 from coartic.analysis.topics.paper.published import RUNS, TRIALS
 from coartic.analysis.topics.paper.rewards import beside_paper

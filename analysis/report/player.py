@@ -20,8 +20,7 @@ from coartic.analysis.figures.robot import numbered_below
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
 from coartic.analysis.report.facts import gain
 from coartic.analysis.signatures.register import shared_goal
-from coartic.analysis.study import Study, typical_run
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, one_by_one, typical_run
 from coartic.analysis.trajectories import initial_solution
 from coartic.robot import HANDS
 

@@ -29,9 +29,8 @@ from coartic.analysis.signatures.rows import (
 )
 from coartic.analysis.signatures.within import measured_within
 from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.comparison.groups import BY_TRIAL, group_of
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.robot import HANDS, Array, Hand
 

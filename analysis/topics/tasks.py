@@ -13,8 +13,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from coartic.analysis.section import Section
-from coartic.analysis.study import Study
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, one_by_one
 
 
 @figure(

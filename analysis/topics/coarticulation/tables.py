@@ -15,9 +15,8 @@ from coartic.analysis.signatures.register import placebo_of, selects, slope_beyo
 from coartic.analysis.signatures.register import signatures as signature_values
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.words import marked
 
 _MEANS = {

@@ -8,9 +8,8 @@ from coartic.analysis.claims.ensemble import held_in_words
 from coartic.analysis.claims.judge import judged, test_in_words
 from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.statistics.estimates import interval, mean
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import CellRuns, Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.topics.paper.published import RUNS, TRIALS, published_cell, published_initial
 from coartic.analysis.topics.paper.rewards import beside_paper, published_of
 from coartic.analysis.words import marked
