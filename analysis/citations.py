@@ -14,7 +14,7 @@ from typing import Any
 from coartic import CoarticError, __version__
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.words import slugs
-from coartic.runs.plan import BUILT_IN, DeclaredMethod
+from coartic.runs.card import BUILT_IN, MethodCard
 from coartic.text import did_you_mean, one_line
 
 PAPER = "shah2013"
@@ -69,7 +69,7 @@ def behind_analysis() -> tuple[str, ...]:
 
 
 def bibliography(
-    methods: Mapping[str, DeclaredMethod],
+    methods: Mapping[str, MethodCard],
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
@@ -103,7 +103,7 @@ def bibliography(
     return "\n\n".join(entries) + "\n"
 
 
-def declared_entry(name: str, method: DeclaredMethod, key: str) -> str:
+def declared_entry(name: str, method: MethodCard, key: str) -> str:
     """A method with no more than what it declares, in BibTeX."""
     citation = " ".join(method.citation.split())
     if not citation:

@@ -156,7 +156,7 @@ def facts_of(study: Study) -> dict[str, str]:
         "cores": made_with["cores"],
     }
     for name, task in plan.tasks.items():
-        text = json.dumps({key: task[key] for key in task if key not in _WORDS}, sort_keys=True)
+        text = json.dumps(task.model_dump(mode="json", exclude=_WORDS), sort_keys=True)
         facts[f"task {name}"] = f"definition {hashlib.sha256(text.encode()).hexdigest()[:8]}"
     facts |= {f"code of {name}": method.code for name, method in plan.methods.items()}
     facts |= {f"library {name}": version for name, version in made_with["packages"].items()}

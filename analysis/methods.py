@@ -15,7 +15,7 @@ from coartic import Task
 from coartic.analysis.words import read_beside
 from coartic.inputs import FileData
 from coartic.learner import conditions
-from coartic.learner.learning import METHOD_PREFIX
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.runs.plan import SEARCH
 from coartic.text import one_line
 

@@ -1,9 +1,9 @@
 """The optimum of each task: the best reward known, and what is proven about it.
 
 ``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids and the
-solutions; ``python -m coartic.analysis.renew_optima FOLDER`` makes it from the results folder of
-that suite. Searches for the optimum in a results folder of the user's own count as well, so a
-table for the user's own task has gaps as soon as the task's optimum is among its runs.
+solutions; ``docs/scripts/renew_optima.py`` makes it from the results folder of that suite. Searches
+for the optimum in a results folder of the user's own count as well, so a table for the user's own
+task has gaps as soon as the task's optimum is among its runs.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class ShippedOptimum(FileData):
     searches: Mapping[str, int] = {}
     """Reward that each search found, by method."""
     solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.learner.rows.movements_from` reads them, in full precision."""
+    """Movements as :func:`coartic.runs.run.movements_from` reads them, in full precision."""
     infeasible: str = ""
     """Why no search has a solution."""
 

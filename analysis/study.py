@@ -15,16 +15,16 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic import MotionModel, NotApplicableError, Task, hand_sequences, parse_task, trajectory
+from coartic import MotionModel, NotApplicableError, Task, hand_sequences, trajectory
 from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.learner.rows import movements_from
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.store import FILE, PARTS, open_store
+from coartic.runs.run import PARTS, movements_from
+from coartic.runs.store import RUNS_FILE, open_store
 from coartic.tasks.task import address_of
 from coartic.text import counted
 
@@ -112,7 +112,7 @@ class Study:
     @cached_property
     def tasks(self) -> dict[str, Task]:
         """The tasks as they were run, by name."""
-        return {name: parse_task(task, str(self.folder)) for name, task in self.plan.tasks.items()}
+        return self.plan.tasks
 
     @cached_property
     def model(self) -> MotionModel:
@@ -146,13 +146,9 @@ class Study:
         names = ["task", "method", "variant"]
         groups = self.runs.groupby(names, sort=False).indices if len(self.runs) else {}
         return {
-            (cell.task, cell.label): CellRuns(
-                cell.task,
-                cell.method,
-                cell.variant,
-                self.runs.iloc[groups.get((cell.task, cell.method, cell.variant), [])],
-            )
+            (key[0], cell.label): CellRuns(*key, self.runs.iloc[groups.get(key, [])])
             for cell in self.plan.cells
+            for key in [(cell.task.name, cell.method.name, cell.variant)]
         }
 
     @cached_property
@@ -227,7 +223,7 @@ class Study:
         return known_optima(self.runs, self.tasks, self.model)
 
     def _frame(self, view: str) -> pd.DataFrame:
-        return _frame(self.folder, view, (self.folder / FILE).stat().st_mtime_ns)
+        return _frame(self.folder, view, (self.folder / RUNS_FILE).stat().st_mtime_ns)
 
 
 def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]:

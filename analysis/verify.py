@@ -35,9 +35,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-FILE = "runs.sqlite?mode=ro"
-COLUMNS = {  # of table results: what is said of each solution that is stored of a run
+Floats = NDArray[np.float64]
+DATABASE = "runs.sqlite?mode=ro"
+STATED = {  # of table results: what is said of each solution that is stored of a run
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
@@ -61,7 +61,7 @@ S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for 
 C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in range(2, 9))
 
 
-def cosine_and_sine(angles: Array) -> tuple[Array, Array]:
+def cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Cosine and sine of angles in rad: less k quarters of a turn (π/2), by the Taylor series."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
@@ -79,7 +79,7 @@ def cosine_and_sine(angles: Array) -> tuple[Array, Array]:
     return cosine, sine
 
 
-def hand_at(q: Array, arm: Any, on_path: bool = False) -> tuple[Array, Array]:
+def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
     """x and y of the hand, for configurations in columns. On paths, by NumPy's cosine and sine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -90,10 +90,11 @@ def hand_at(q: Array, arm: Any, on_path: bool = False) -> tuple[Array, Array]:
     return x, y
 
 
-def read_task(definition: str, model: str) -> Any:
+def stored_task(definition: str, model: str) -> Any:
     """A task as it is stored, with the constants of movement, and what follows from both."""
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
+    need(getattr(task.model, "arrival_tick", 1) == 1, "arrival took no tick, as in version 1.0.0")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
     robot, middle = task.robot, 2 + len(task.robot.left_links)
@@ -106,7 +107,7 @@ def read_task(definition: str, model: str) -> Any:
     return task
 
 
-class Movement(NamedTuple):
+class MoveRow(NamedTuple):
     """A movement as it is stored."""
 
     order: int  # from 0
@@ -114,23 +115,23 @@ class Movement(NamedTuple):
     hand: str
     kind: str  # learned, planned, corrective, path
     ticks: int
-    target: Array
-    waypoints: list[Array]  # of a path
+    target: Floats
+    waypoints: list[Floats]  # of a path
 
 
-def line(q: Array, target: Array, model: Any) -> Array:
+def line(q: Floats, target: Floats, model: Any) -> Floats:
     """The points of a straight movement, in columns."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
     fractions = np.arange(last + 1) * model.step / (distance or 1.0)
-    points: Array = q[:, None] + fractions * difference[:, None]
+    points: Floats = q[:, None] + fractions * difference[:, None]
     if last == 0 or not model.whole_last_step:  # another reading has the last step pass q^t
         points[:, -1] = target
     return points
 
 
-def path(q: Array, waypoints: list[Array], model: Any) -> Array:
+def path(q: Floats, waypoints: list[Floats], model: Any) -> Floats:
     """The points of a path, in columns. Point k lies k steps along it, the last at its end."""
     corners = np.array([q, *waypoints])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
@@ -145,7 +146,7 @@ def path(q: Array, waypoints: list[Array], model: Any) -> Array:
     return points
 
 
-def make(task: Any, q: Array, movement: Movement) -> tuple[Array, int, bool]:
+def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     """Make a movement from q: where it stops, after how many ticks, and whether that is a hit."""
     _, goal, hand, kind, _, target, waypoints = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
@@ -161,10 +162,10 @@ def make(task: Any, q: Array, movement: Movement) -> tuple[Array, int, bool]:
     stops[-1] = True
     stops[0] &= len(stops) == 1 or not model.first_step  # in another reading it looks later
     k = int(np.argmax(stops))  # the first
-    return points[:, k], k + model.arrival_tick, bool(hits[k])
+    return points[:, k], k + 1, bool(hits[k])
 
 
-def execute(task: Any, movements: list[Movement]) -> tuple[int, str, int, float]:
+def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Reward, hands, corrections made, and travel of the arms not chosen, from hit to hit, in rad.
     Raises ValueError where a movement breaks a rule or takes other ticks than are stored."""
     check_rules(task, movements)
@@ -190,7 +191,7 @@ def execute(task: Any, movements: list[Movement]) -> tuple[int, str, int, float]
     return reward, hands, corrections, travel
 
 
-def penalty(task: Any, goal: int, hand: str, before: Array, q: Array) -> int:
+def penalty(task: Any, goal: int, hand: str, before: Floats, q: Floats) -> int:
     """What is lost by hitting a goal in q beside the ticks, in whole ticks; the goal before was hit
     (or the task began) in another configuration. It adds up what the way of costly joints costs,
     the elbow of this arm that is deepest in a disc, and that its joints are as they were before."""
@@ -212,7 +213,7 @@ def penalty(task: Any, goal: int, hand: str, before: Array, q: Array) -> int:
     return math.floor(lost + 0.5)
 
 
-def check_rules(task: Any, movements: list[Movement]) -> None:
+def check_rules(task: Any, movements: list[MoveRow]) -> None:
     """Raises ValueError where movements break a rule, whatever comes of them."""
     goals = [movement.goal for movement in movements]
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
@@ -239,9 +240,9 @@ class Report(NamedTuple):
     unchecked: list[str]  # what was not checked, a sentence each
 
 
-def verify(folder: Path) -> Report:
+def check_runs(folder: Path) -> Report:
     """Check all runs of a folder, asked for last or not. sqlite3.Error: it cannot be read."""
-    with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{FILE}", uri=True)) as db:
+    with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
         return check_all(db)
 
@@ -257,13 +258,13 @@ def check_all(db: sqlite3.Connection) -> Report:
         run, same, bound = row["run_id"], (row["definition"], row["model"]), row["proven_bound"]
         where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
         try:
-            task, chosen = read_task(*same), json.loads(row["parameters"])
+            task, chosen = stored_task(*same), json.loads(row["parameters"])
             parts = read_parts(db, row["number"], task.columns)
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
             for part, moves in parts.items():
                 where, movements = f"Run {run}, {part}", movements + len(moves)
-                outcome = execute(task, moves) if moves else (None, None, None, None)
-                for name, now in zip(COLUMNS[part], outcome, strict=False):
+                outcome = recompute(task, moves) if moves else (None, None, None, None)
+                for name, now in zip(STATED[part], outcome, strict=False):
                     close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
                     need(close or row[name] == now, f"{name} is {now}, not {row[name]}")
                 rewards[same] += [(outcome[0], run)] if moves else []
@@ -280,7 +281,7 @@ def check_all(db: sqlite3.Connection) -> Report:
     return Report(runs, movements, wrong, [*UNCHECKED, f"Runs without a solution: {unsolved}."])
 
 
-def fingerprint(row: Any, parts: dict[str, list[Movement]]) -> str:
+def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
     """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
     rewards = np.frombuffer(zlib.decompressobj().decompress(row["rewards"] or b""), "<i4").tolist()
     content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
@@ -290,10 +291,10 @@ def fingerprint(row: Any, parts: dict[str, list[Movement]]) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
-def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[Movement]]:
+def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list[MoveRow]]:
     """The movements of a run, by the solution that they belong to."""
-    parts: dict[str, list[Movement]] = {part: [] for part in COLUMNS}
-    waypoints = defaultdict[int, list[Array]](list)
+    parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
+    waypoints = defaultdict[int, list[Floats]](list)
     where = 'WHERE result_id = ? ORDER BY "order"'
     query = f'SELECT "order", waypoint, {columns} FROM waypoints {where}, waypoint'
     for order, number, *q in db.execute(query, [run]):
@@ -302,7 +303,7 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
     query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
     for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
         points = waypoints.pop(order, []) if part == "solution" else []
-        parts[part].append(Movement(order, goal, hand, kind, ticks, np.array(q, float), points))
+        parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.array(q, float), points))
     need(not waypoints, "it has waypoints of no movement")
     return parts
 
@@ -311,7 +312,7 @@ def main() -> int:
     """Check the folder that the command names, this one if it names none; say what was found."""
     folder = Path(*sys.argv[1:])
     try:
-        report = verify(folder)
+        report = check_runs(folder)
     except sqlite3.Error as error:
         print(f"{folder} cannot be read: {error}.")
         return 2

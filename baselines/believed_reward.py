@@ -24,8 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Execution, Movement, Task, execute
-from coartic.baselines.posture_graph import Start, cheapest_chains
-from coartic.baselines.shortest_paths import TOLD, ShortestPlans, shortest_plans
+from coartic.baselines.posture_graph import Chain, cheapest_chains
+from coartic.baselines.shortest_paths import KNOWS_REWARD, ShortestPlans, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.baselines.whole_ticks import movements
 from coartic.learner.conditions import CONDITIONS
@@ -35,17 +35,11 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.penalty import penalties
 from coartic.tasks.task import WITHOUT_REACH, Penalty
 
-MOST_EXECUTED = 8
-"""Plans, one a hand sequence, that are executed in the planner's mind."""
-MOST_SEQUENCES = 64
-"""Hand sequences that are planned for each graph."""
-CITATION = "This package; docs/methods.md describes it."
-KNOWS = TOLD | {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-"""What the learner from a plan is told."""
+_PLANS_EXECUTED = 8  # one for each hand sequence, in the planner's mind
 
 
 class BeliefParameters(Parameters):
-    """What is believed, and how long is searched."""
+    """The belief, and the effort of the search."""
 
     belief: Annotated[float, Field(ge=0, le=10)] = 1.0
     """Share of the penalty that the planner takes into account."""
@@ -55,31 +49,30 @@ class BeliefParameters(Parameters):
     """Independent graphs, or more, until there are as many chains as ``starts``."""
     starts: Annotated[int, Field(ge=1)] = 12
     """Chains that are polished, the cheapest of all graphs and hand sequences."""
-    sampling_seed: Annotated[int, Field(ge=0)] = 0
 
 
 class LearnerParameters(BeliefParameters, DualProcessParameters):
-    """Those of the plan and those of the learner."""
+    """Parameters of the plan and of the learner."""
 
     belief: Annotated[float, Field(ge=0, le=10)] = 0.0
 
 
-def planned(
+def best_plan(
     session: Session, task: Task, parameters: BeliefParameters
 ) -> tuple[tuple[Movement, ...], dict[str, Any]]:
     """The plan that is best by the believed reward, and details of it."""
     believed = with_belief(task, parameters.belief)
     with session.solving():
         plain = believed.model_copy(update={"penalty": None})
-        how_long = parameters.model_dump(include={"nodes", "graphs", "starts", "sampling_seed"})
+        how_long = parameters.model_dump(include={"nodes", "graphs", "starts"})
         search = BeliefParameters(**how_long)  # the same for every belief
         plans, spent = shortest(plain.model_dump_json(), search, session.model)
         session.spend(**spent)
         if believed.penalty is not None:
-            known = [(i.hands, plan.configurations) for i, plan in plans.ranked[:MOST_EXECUTED]]
+            known = [(i.hands, plan.configurations) for i, plan in plans.ranked[:_PLANS_EXECUTED]]
             plans = cheapest(session, believed, search, known)
         best: Execution | None = None
-        for instance, plan in plans.ranked[:MOST_EXECUTED]:
+        for instance, plan in plans.ranked[:_PLANS_EXECUTED]:
             steps = np.ceil(plan.lengths(task.q0) / session.model.step).astype(int)
             solution = movements(
                 session, task, instance, plan.configurations, tuple(steps.tolist())
@@ -104,18 +97,18 @@ def planned(
 def shortest(
     task_json: str, search: BeliefParameters, model: MotionModel
 ) -> tuple[ShortestPlans, dict[str, int]]:
-    """The shortest plans of a task without a penalty, given as JSON, and what they took.
+    """The shortest plans of a task without a penalty, given as JSON, and the solver's counters.
 
     Every belief starts from them, and all variants of a task have the same: they are found once.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
-    session = Session(task, 0, TOLD, model=model, trusted=True)
+    session = Session(task, 0, KNOWS_REWARD, model=model, trusted=True)
     plans = cheapest(session, task, search, [])
     return plans, {name: getattr(session.meter, name) for name in Meter.SOLVER}
 
 
 def cheapest(
-    session: Session, believed: Task, search: BeliefParameters, known: Sequence[Start]
+    session: Session, believed: Task, search: BeliefParameters, known: Sequence[Chain]
 ) -> ShortestPlans:
     """The plans of least path length and penalty, from ``known`` starts and from chains."""
     penalty = believed.penalty
@@ -129,11 +122,10 @@ def cheapest(
     chains = cheapest_chains(
         session,
         believed,
-        np.random.default_rng(search.sampling_seed),
+        np.random.default_rng(0),
         nodes=search.nodes // len(believed.hands),
         graphs=search.graphs,
         chains=search.starts,
-        most=MOST_SEQUENCES,
         spread=len(believed.goals) > 1,
         penalty=penalty,
     )
@@ -159,8 +151,8 @@ def with_belief(task: Task, belief: float) -> Task:
     return task.model_copy(update={"penalty": penalty})
 
 
-def cost_of(believed: Task, start: Start) -> float:
-    """What a start would cost as it is by the believed reward, ticks."""
+def cost_of(believed: Task, start: Chain) -> float:
+    """Cost of a start by the believed reward, without polishing, ticks."""
     hands, configurations = start
     steps = np.diff(np.vstack([believed.q0, configurations]), axis=0)
     lost = penalties(believed, [hands], configurations[None]).sum()
@@ -172,15 +164,15 @@ class BelievedReward(Method):
 
     name = "believed-reward/plan"
     title = "Planning by a believed reward"
-    citation = CITATION
-    told = TOLD
+    citation = "This package; docs/methods.md describes it."
+    told = KNOWS_REWARD
     stochastic = False
     Parameters = BeliefParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "starts": 2}
 
     def solve(self, session: Session) -> Result:
         """Plan, and hand over the best plan."""
-        return Result(*planned(session, session.hand_over(*self.told), self.parameters))
+        return Result(*best_plan(session, session.hand_over(*self.told), self.parameters))
 
 
 class FromPlanEC1(DualProcess):
@@ -188,14 +180,14 @@ class FromPlanEC1(DualProcess):
 
     name = "believed-reward/EC1"
     title = "Dual-process learner from a plan, exploration condition 1"
-    told = KNOWS
+    told = KNOWS_REWARD | {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     condition = CONDITIONS["EC1"]
     Parameters = LearnerParameters
     quick: ClassVar[dict[str, Any]] = BelievedReward.quick
 
     def first_trial(self, sessions: Sequence[Session], task: Task) -> tuple[Movement, ...]:
         """The plan: one for all sessions, since each would find the same."""
-        plan, _ = planned(sessions[0], task, self.parameters)
+        plan, _ = best_plan(sessions[0], task, self.parameters)
         spent = {name: getattr(sessions[0].meter, name) for name in Meter.SOLVER}
         for session in sessions[1:]:
             session.spend(**spent)

@@ -7,20 +7,20 @@ movement, so that its ticks are at least
     (shortest path through such configurations) / m + (goals that are moved for).
 
 The path is bounded from below within boxes of link angles by :mod:`coartic.baselines.relaxation`;
-the narrower the intervals, the tighter the bound. Three things are split, until every part
+the narrower the intervals, the tighter the bound. Three things are split, until every subproblem
 is bounded above the ticks that are to be beaten (McCormick 1976; Horst & Tuy 1996):
 
 - an interval of a link angle, in two;
-- a goal whose hand is undecided, into one part for each hand. With five goals and more the
-  search begins with all of them undecided, so that what is found out about some goals' hands
-  serves every sequence that
-  has them so; a hand is decided where that matters more than the angles do;
-- goals that may be hit without a movement, where only their ticks are still wanting: into one
-  part for each, as the first that is. The part in which none is is bounded already.
+- a goal whose hand is undecided, into one subproblem for each hand. With five goals and more the
+  search begins with all of them undecided, so that a bound for the hands of some goals serves every
+  sequence with these hands; a hand is decided where that matters more than the angles do;
+- goals that may be hit without a movement, if only their ticks are still missing: into one
+  subproblem for each, in which it is the first such goal. The subproblem without such goals is
+  bounded already.
 
-Each of these leaves no solution out. The part with the least bound is next, so that the search
-can end at any time: the least bound of the open parts is then what is proven, or the bound from
-how fast a hand can be (:func:`ticks_for_distance`), whichever is more.
+Each of these leaves no solution out. The subproblem with the least bound is next, so that the
+search can end at any time. The proven bound is then the least bound of the open subproblems or the
+bound from the speed of the hands (:func:`ticks_for_distance`), whichever is more.
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from coartic import MotionModel, Task
-from coartic.baselines.relaxation import Hands, Lagrangian, Relaxation
+from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import too_many_sequences
 from coartic.robot import HANDS, Array, Hand
@@ -45,16 +46,15 @@ _APART = 16  # hand sequences that are bounded one by one: few are proven sooner
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """What was proven."""
+class Certificate(NamedTuple):
+    """The proven bound, and the effort."""
 
     ticks: int
     """No solution takes fewer; the reward of any is at most minus this."""
     nodes: int
     """Cone programmes solved."""
     open_nodes: int
-    """Of them, those that were neither split nor bounded when the search ended."""
+    """Subproblems that were neither split nor bounded when the search ended."""
     iterations: int
     """Iterations of the conic solver."""
 
@@ -96,11 +96,10 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
     return least or 0
 
 
-@dataclass(frozen=True)
-class Part:
+class Subproblem(NamedTuple):
     """Solutions with these hands, these goals hit without a movement, angles in a box."""
 
-    hands: Hands
+    hands: PartialSequence
     merged: tuple[int, ...]
     """Goals (0-based) that are hit without a movement."""
     open: tuple[int, ...]
@@ -116,16 +115,16 @@ class Part:
 
 @dataclass(order=True)
 class Node:
-    """A part with its bound, in the order of bounds."""
+    """A subproblem with its bound, in the order of bounds."""
 
     ticks: float
     """Bound, before it is rounded up."""
     number: int
     length: float = field(compare=False)
     """Bound on the path."""
-    part: Part = field(compare=False)
+    problem: Subproblem = field(compare=False)
     point: Array = field(compare=False)
-    """Where the relaxation has its minimum."""
+    """The relaxation's minimiser."""
     lagrangian: Lagrangian = field(compare=False)
 
 
@@ -155,7 +154,7 @@ def certify(
 
 
 class ProofSearch:
-    """The open parts, and what was spent."""
+    """The open subproblems, and the effort so far."""
 
     def __init__(self, task: Task, ticks: int, still: bool, step: float) -> None:
         self.heap: list[Node] = []
@@ -165,7 +164,7 @@ class ProofSearch:
         self._robot_hands = tuple(hand for hand in HANDS if hand in task.hands)
 
         @lru_cache(maxsize=1024)
-        def relaxation(hands: Hands, merged: tuple[int, ...]) -> Relaxation:
+        def relaxation(hands: PartialSequence, merged: tuple[int, ...]) -> Relaxation:
             return Relaxation(task, hands, merged, still)
 
         self.relaxation = relaxation
@@ -175,44 +174,46 @@ class ProofSearch:
         return max(0, self._ticks - 1 - moves) * self._step
 
     def begin(self) -> None:
-        """All solutions: a part for each hand sequence, or one part where they are many."""
+        """Add all solutions: by hand sequence, or in one subproblem if there are many sequences."""
         if not self._ticks:
             return
         goals = len(self._task.goals)
-        sequences: list[Hands] = [(None,) * goals]
+        sequences: list[PartialSequence] = [(None,) * goals]
         if len(self._robot_hands) ** goals <= _APART:
             sequences = list(itertools.product(self._robot_hands, repeat=goals))
         for hands in sequences:
             box = self.relaxation(hands, ()).first_box(self.longest(0))
-            self.add(Part(hands, (), mergeable(self._task, hands), box), 0.0)
+            self.add(Subproblem(hands, (), mergeable(self._task, hands), box), 0.0)
 
     def branch(self, node: Node) -> None:
-        """Split a part into parts that together hold every solution in it."""
-        part = node.part
-        moves = len(part.hands) - len(part.merged)
+        """Split a subproblem into others that together hold every solution in it."""
+        problem = node.problem
+        moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._ticks
         goal = self.goal_to_decide(node, bounded)
         if goal is not None:
             self.decide(node, goal)
         elif bounded:
-            for i, first in enumerate(part.open):
-                merged = (*part.merged, first)
-                self.add(Part(part.hands, merged, part.open[i + 1 :], part.box), node.length)
+            for i, first in enumerate(problem.open):
+                merged = (*problem.merged, first)
+                self.add(problem._replace(merged=merged, open=problem.open[i + 1 :]), node.length)
         else:
-            root = self.relaxation(part.hands, part.merged)
-            for box in root.split(part.box, node.point):
-                # What is known of the whole may rule a half out, without a programme.
-                if self.shortfall(node.lagrangian, box, part.moves) >= 0.0:
-                    half = Part(part.hands, part.merged, part.open, box)
-                    self.add(half, node.length)
+            root = self.relaxation(problem.hands, problem.merged)
+            for box in root.split(problem.box, node.point):
+                # The parent's Lagrangian may rule a half out, without a programme.
+                if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
+                    self.add(problem._replace(box=box), node.length)
 
     def goal_to_decide(self, node: Node, bounded: bool) -> int | None:
-        """The goal whose undecided hand is farthest off, if that is what comes first."""
-        unknown = [g for g, hand in enumerate(node.part.hands) if hand is None]
+        """The goal whose undecided hand is farthest off; None if an angle is to be split first."""
+        unknown = [g for g, hand in enumerate(node.problem.hands) if hand is None]
         if not unknown:
             return None
-        root, robot = self.relaxation(node.part.hands, node.part.merged), self._task.robot
+        root, robot = (
+            self.relaxation(node.problem.hands, node.problem.merged),
+            self._task.robot,
+        )
         q = root.configurations(node.point)
         far = {
             g: min(
@@ -228,38 +229,40 @@ class ProofSearch:
         return None
 
     def decide(self, node: Node, goal: int) -> None:
-        """One part for each hand, the new angles anywhere on a path of interest."""
-        part = node.part
+        """One subproblem for each hand, the new angles anywhere on a path of interest."""
+        problem = node.problem
         for hand in self._robot_hands:
-            hands = (*part.hands[:goal], hand, *part.hands[goal + 1 :])
-            root = self.relaxation(hands, part.merged)
+            hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
+            root = self.relaxation(hands, problem.merged)
             of_goal = root.goal_of == goal
             box = np.empty((len(of_goal), 2))
-            box[~of_goal] = part.box
-            box[of_goal] = root.first_box(self.longest(part.moves))[of_goal]
+            box[~of_goal] = problem.box
+            box[of_goal] = root.first_box(self.longest(problem.moves))[of_goal]
             able = set(mergeable(self._task, hands))
-            still_open = tuple(g for g in part.open if g in able)
-            self.add(Part(hands, part.merged, still_open, box), node.length)
+            still_open = tuple(g for g in problem.open if g in able)
+            self.add(Subproblem(hands, problem.merged, still_open, box), node.length)
 
-    def add(self, part: Part, parent: float) -> None:
-        """Bound a part, and keep what is left of it."""
-        if part.moves >= self._ticks:
+    def add(self, problem: Subproblem, parent: float) -> None:
+        """Bound a subproblem; add it to the open ones if its bound is too low."""
+        if problem.moves >= self._ticks:
             return
-        root = self.relaxation(part.hands, part.merged)
-        multipliers, point, count = root.solve(part.box)
+        root = self.relaxation(problem.hands, problem.merged)
+        multipliers, point, count = root.solve(problem.box)
         self.solved += 1
         self.iterations += count
         lagrangian = root.lagrangian(multipliers, self.longest(0))
-        slack = self.shortfall(lagrangian, part.box, part.moves)
-        length = max(parent, self.longest(part.moves) - slack)
-        if slack < 0.0 or length > self.longest(part.moves):
+        slack = self.shortfall(lagrangian, problem.box, problem.moves)
+        length = max(parent, self.longest(problem.moves) - slack)
+        if slack < 0.0 or length > self.longest(problem.moves):
             return
-        box = lagrangian.within(part.box, slack)
+        box = lagrangian.within(problem.box, slack)
         if np.any(box[:, 0] > box[:, 1]):
             return
-        part = Part(part.hands, part.merged, part.open, box)
-        ticks = length / self._step + part.moves
-        heapq.heappush(self.heap, Node(ticks, next(self._numbers), length, part, point, lagrangian))
+        problem = problem._replace(box=box)
+        ticks = length / self._step + problem.moves
+        heapq.heappush(
+            self.heap, Node(ticks, next(self._numbers), length, problem, point, lagrangian)
+        )
 
     def shortfall(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:
         """By how much a bound is short of the longest path of interest."""

@@ -2,10 +2,10 @@
 
 Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) over the
 targets of all its explored joints, which sees the total reward of each trial and nothing
-else. Its first mean is what the corrective process **A** alone makes of the sequence, which
-takes one trial; its first step size is the learner's noise; where it stops by its own
+else. Its first mean are the configurations of the corrective process **A** alone, which takes
+one trial; its first step size is the learner's noise; where it stops by its own
 criteria it begins anew there with twice the population (IPOP, Auger & Hansen 2005). A
-failed trial ranks last. What decides which strategy makes the next generation of trials:
+failed trial ranks last. Two forms differ in which strategy makes the next generation of trials:
 
 ``bandit``: UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each sequence,
 scaled by the spread of the first rewards.
@@ -37,12 +37,6 @@ from coartic.optimisers import TOLD, sequences_of
 from coartic.robot import Array
 from coartic.tasks.task import Task
 
-CITATION = (
-    "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
-    "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
-    "size. IEEE Congress on Evolutionary Computation. "
-)
-
 
 class BanditParameters(UninformedParameters):
     """Parameters of the bandit."""
@@ -69,7 +63,7 @@ class Strategy:
         self._restarts = -1
 
     def generation(self) -> None:
-        """One generation of trials, or what is left of the trials."""
+        """Make one generation of trials, or the trials that are left."""
         if self._restarts < 0 or self._evolution.stop():
             self._restart()
         values = np.array(self._evolution.ask())[: self._practice.left]
@@ -90,14 +84,14 @@ class Strategy:
         self._restarts += 1
         size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
         options = {
-            **_options(len(self._mean), size * 2**self._restarts),
+            **cma_options(len(self._mean), size * 2**self._restarts),
             "randn": lambda *shape: self._rng.standard_normal(shape),
         }
         self._evolution = cma.CMAEvolutionStrategy(self._mean, self.sigma, options)
 
 
 @cache
-def _options(joints: int, population: int) -> dict[str, Any]:
+def cma_options(joints: int, population: int) -> dict[str, Any]:
     """The options of CMA-ES as values. As the texts that they are otherwise, evaluating them
     takes as long as ten generations."""
     import cma
@@ -110,12 +104,19 @@ def _options(joints: int, population: int) -> dict[str, Any]:
     return dict(cma.CMAOptions(chosen).complement().evalall({"N": joints}))
 
 
-class _OverSequences(Method):
+class CMAES(Method):
+    """CMA-ES with a strategy for each hand sequence; base of both forms."""
+
+    citation = (
+        "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
+        "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
+        "size. IEEE Congress on Evolutionary Computation. "
+    )
     told = TOLD
     Parameters = UninformedParameters
 
     def why_not(self, task: Task) -> str | None:
-        """More sequences than can be tried one by one."""
+        """The reason why there are too many sequences to try one by one, if there are."""
         return too_many_sequences(task, len(task.hands))
 
     def solve(self, session: Session) -> Result:
@@ -138,12 +139,12 @@ class _OverSequences(Method):
         """Spend the trials that are left."""
 
 
-class Bandit(_OverSequences):
+class Bandit(CMAES):
     """The next generation goes where the upper confidence bound is highest."""
 
     name = "cma-es/bandit"
     title = "CMA-ES, a bandit over hand sequences"
-    citation = CITATION + (
+    citation = CMAES.citation + (
         "P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
         "bandit problem. Machine Learning."
     )
@@ -163,12 +164,12 @@ class Bandit(_OverSequences):
             generations += 1
 
 
-class Every(_OverSequences):
+class Every(CMAES):
     """All hand sequences, halved again and again."""
 
     name = "cma-es/every"
     title = "CMA-ES, every hand sequence, successive halving"
-    citation = CITATION + (
+    citation = CMAES.citation + (
         "Z. Karnin, T. Koren, O. Somekh (2013). Almost optimal exploration in multi-armed "
         "bandits. International Conference on Machine Learning."
     )

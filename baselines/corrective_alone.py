@@ -13,18 +13,17 @@ from coartic.method import Information, Method, MethodError, Result, Session
 from coartic.motion.initial import changes_of_hand, corrective_movements, too_many_sequences
 from coartic.tasks.task import letters_of
 
-CITATION = (
-    "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
-    "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg (2013)."
-)
-
 
 class GivenHands(Method):
     """The corrective process with the task's initial hands: trial 0 of the learner."""
 
     name = "corrective-alone/given"
     title = "Corrective process alone, the task's hands"
-    citation = CITATION
+    citation = (
+        "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
+        "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg "
+        "(2013)."
+    )
     told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
     stochastic = False
 
@@ -43,12 +42,12 @@ class EverySequence(Method):
 
     name = "corrective-alone/every"
     title = "Corrective process alone, every hand sequence"
-    citation = CITATION
-    told = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
+    citation = GivenHands.citation
+    told = GivenHands.told
     stochastic = False
 
     def why_not(self, task: Task) -> str | None:
-        """More sequences than can be tried one by one."""
+        """The reason why there are too many sequences to try one by one, if there are."""
         return too_many_sequences(task, len(task.hands))
 
     def solve(self, session: Session) -> Result:

@@ -1,45 +1,44 @@
-"""Prioritised nullspace control by quadratic programs, one method a secondary objective.
+"""Prioritised nullspace control by quadratic programmes, one method a secondary objective.
 
-It keeps a **posture** for the current goal and for each of those that it looks ahead to, and
-both what they are and how the robot gets there are answers of one cascade
-(:mod:`coartic.baselines.cascade`): level 1 is a disc that a hand has to be in, level 2 what the
-joints would rather do.
+The controller keeps a **posture** for the current goal and for each goal that it looks ahead to.
+Both the postures and the control steps are answers of one cascade (:mod:`coartic.baselines.
+cascade`): level 1 asks for a hand in a disc, level 2 for what the joints prefer. With p(q) the
+hand, J its Jacobian, c and r the centre and radius of the disc, and n_i the normals of a regular
+polygon in the unit circle, the disc is
 
-- A posture has its hand in its goal's disc, anywhere in it; of all such postures it is the one
-  that makes the way from posture to posture shortest in the metric of the reward, which is
-  Euclidean in joint space.
-- A control step has the hand in a disc about the goal that shrinks from where the hand is
-  towards the goal's own; the joints would rather go straight to the posture. So the hand comes
-  nearer all the time, on whatever path suits the joints.
+    n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ),
 
-A disc is taken as the regular polygon within it, so that it is linear in the hand's position,
-and the hand's position as linear in the change of the joints. Postures are found once for each
-goal to come and kept up by a step of the same kind at every control step.
+linear in the change x of the joints, where ρ is the distance of the polygon's sides from c.
 
-Of all postures that hit the current goal the objective decides which one it is:
+- A posture has its hand in its goal's disc. Of all such postures it is the one that makes the way
+  from posture to posture shortest in the metric of the reward, which is Euclidean in joint space.
+- A control step has the hand in a disc about the goal that shrinks from where the hand is towards
+  the goal's own; the joints prefer to go straight to the posture. So the hand comes nearer all the
+  time, on whatever path suits the joints.
+
+Postures are found once for each goal to come and kept up by a step of the same kind at every
+control step. The objective decides which posture hits the current goal:
 
 - none: the nearest to where the robot stands when the last goal is hit;
-- velocity: the same, and a share of the joint rates of the step before (smoothness);
-- next goal: the one from which the way on to the next goal's posture is shortest, too
+- velocity: the same, and half of the joint rates of the step before (smoothness);
+- next goal: the posture from which the way on to the next goal's posture is shortest, too
   (coarticulation by concurrent subgoals of lower priority). The next goal's posture is itself
-  chosen with a view to the goals after it, as far as the ``horizon`` reaches;
+  chosen with a view to the goal after it;
 - preshaping: the nearest, but for the other arm, which heeds the posture in which it hits the
   goal it is to hit next; that may lie several goals ahead.
-
-Ways are measured as the reward measures them, Euclidean in joint space, and those to come have
-the weight ``gain`` relative to the one before them.
 
 Tuned on thirty development instances (``d000`` to ``d009`` of families one-armed, two-armed and
 aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before
 that some 50 of a prototype (other first postures, 8 to 24 faces, control steps of 1 to 10 ticks,
 posture steps of 0.05 to 0.2 and gains of 0.1 to 0.7 for them, horizons, weights). Mean gap to
-``optimum/dynamic-programming`` of ``next-goal``, one setting changed at a time, * the default:
+``optimum/dynamic-programming`` of ``next-goal``, one setting changed at a time, * the value used:
 
 =========================  ====================================================================
 hand comes nearer, at      0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
 this share of even pace    1: 6.9 %
-``gain`` (share at 0.1)    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
-``horizon`` (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
+weight of ways to come     0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
+(share at 0.1)
+goals ahead (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
 =========================  ====================================================================
 
 On the same instances velocity (inertia 0.5) has 20.5 %, preshaping, of those with two hands,
@@ -47,37 +46,37 @@ On the same instances velocity (inertia 0.5) has 20.5 %, preshaping, of those wi
 level 1 moves the hand straight to the goal's centre, with the least rates at every step, had
 43.6 % with the next goal as level 2 and 60 % without one.
 
-What remains is local: postures are found by descent from where the robot is, and another branch
-of the inverse kinematics may be far shorter (35 % on the worst of the thirty). First postures
-sought from a straight arm, too, mended one instance and spoiled others as often. Smoothness is
-no part of the reward: keeping velocity does not gain any.
+The remaining gap is local: postures are found by descent from where the robot is, and another
+branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty). First
+postures sought from a straight arm, too, mended one instance and spoiled others as often.
+Smoothness is no part of the reward: keeping velocity does not gain any.
 """
 
 from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.cascade import Cascade, CascadeError
+from coartic.baselines.cascade import solve_cascade, state_cascade
+from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.initial import changes_of_hand, too_many_sequences
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
-from coartic.tasks.task import LETTERS, MOST_GOALS, beyond_reach, hands_of, letters_of
+from coartic.tasks.task import beyond_reach, letters_of
 
 FACES = 16
 """Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
+HORIZON = 2
+"""Goals after the current one that have a posture under ``next-goal``."""
 
-_ANGLES = 2 * np.pi * np.arange(FACES) / FACES
-_NORMALS = directions(_ANGLES)
+_FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
 _MARGIN = 1e-4  # length unit: the polygon is approached without end, the disc is entered
 _HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
@@ -99,82 +98,66 @@ class Aim(NamedTuple):
     """Whether postures for the goals before this one heed it with this hand's arm alone."""
 
 
-@dataclass(frozen=True)
-class Leg:
+class Leg(NamedTuple):
     """The way to one goal."""
 
     movement: Movement
     ticks: int
     q: Array
-    """Where the scorer will stop, shape ``(dof,)``."""
+    """Configuration in which the goal is hit, shape ``(dof,)``."""
     rates: Array
-    """Of the last control step, shape ``(joints,)``."""
+    """Joint rates of the last control step, shape ``(joints,)``."""
     postures: dict[Aim, Array]
-    """What is kept of the goals looked ahead to."""
+    """Postures of the goals looked ahead to."""
 
 
 class StuckError(Exception):
     """The hand does not reach the goal."""
 
 
-class UnfinishedError(StuckError):
-    """It was still on its way when the control steps ran out."""
-
-
 @dataclass
 class Controller:
-    """The control loop on one task; what it spends goes to the session."""
+    """The control loop on one task; the session counts what it spends."""
 
     session: Session
     task: Task
-    cascade: Cascade
-    """Of ``FACES`` rows."""
     period: int
     """Ticks from one control step to the next."""
-    max_steps: int
-    """Control steps for one goal after which it gives up."""
-    gain: float = 0.0
-    """Weight of each way to come relative to the one before it."""
     inertia: float = 0.0
     """Share of the rates of the step before in those preferred now."""
-    moving: Array = field(init=False)
-    """Indices of the joints that are not locked."""
+    modelling: Literal["none", "cvxpy"] = "none"
+    """Whether cvxpy states the programmes, or their matrices go to the solver as they are."""
+    solves: int = 0
+    """Quadratic programmes solved so far."""
 
     def __post_init__(self) -> None:
-        locked = [{"x": 0, "y": 1}[coordinate] for coordinate in self.task.locked_base]
+        locked = ["xy".index(coordinate) for coordinate in self.task.locked_base]
         self.moving = np.delete(np.arange(self.task.robot.dof), locked)
+        """Indices of the joints that are not locked."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """From where the leg before ended, or the start, until the first aim's goal is hit.
+        """The way to the first aim's goal, from where the leg before ended or from the start.
 
-        Raises StuckError where it does not get there, CascadeError where a solver fails.
+        Raises StuckError if the hand does not get there, MethodError if the solver fails.
         """
         (hand, goal, _), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
-        accuracy = self.session.model.correction_tolerance
-        short = beyond_reach(self.task, hand, self.task.goals[goal], accuracy)
-        if short > self.task.radius:
+        model, radius = self.session.model, self.task.radius
+        short = beyond_reach(self.task, hand, self.task.goals[goal], model.correction_tolerance)
+        if short > radius:
             raise StuckError(
                 f"{name} ends {short:.3g} short of it with the base "
                 f"locked in {' and '.join(self.task.locked_base)}"
             )
-        length = self.session.model.step * self.period
+        length = model.step * self.period
         q = start = self.session.q0 if before is None else before.q
         rates = np.zeros(len(self.moving)) if before is None else before.rates
         waypoints: list[Array] = []
-        postures = self.postures(q, aims, {} if before is None else before.postures)
+        postures = self.find_postures(q, aims, {} if before is None else before.postures)
         nearest, since = np.inf, 0
-        while True:
-            distance = float(np.hypot(*self.error_of(q, aims[0])))
-            if distance <= self.task.radius - _HIT_MARGIN:
-                break
+        while (distance := self.distance(q, aims[0])) > radius - _HIT_MARGIN:
             if distance < nearest - 0.1 * length:
                 nearest, since = distance, 0
             since += 1
-            if len(waypoints) == self.max_steps:
-                raise UnfinishedError(
-                    f"{name} is still {distance:.3g} from its centre "
-                    f"after all {self.max_steps} control steps (max_steps)"
-                )
             if since > _STALL_STEPS:
                 raise StuckError(
                     f"{name} is still {distance:.3g} from its centre "
@@ -183,27 +166,30 @@ class Controller:
             if waypoints:
                 self.sweep(q, aims, postures)
             rates = self.next_rates(q, aims[0], postures[0], rates, length)
-            q = self.moved(q, length * rates)
+            q = self.add(q, length * rates)
             waypoints.append(q)
         path = np.array(waypoints or [start])
         followed = follow(
-            self.task.robot,
-            start,
-            path,
-            hand,
-            self.task.goals[goal],
-            self.task.radius,
-            model=self.session.model,
+            self.task.robot, start, path, hand, self.task.goals[goal], radius, model=model
         )
         self.session.spend(forward_kinematics=followed.evaluations)
         movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
-        kept = dict(zip(aims[1:], postures[1:], strict=True))
-        return Leg(movement, followed.ticks, followed.q, rates, kept)
+        ahead = dict(zip(aims[1:], postures[1:], strict=True))
+        return Leg(movement, followed.ticks, followed.q, rates, ahead)
 
-    def postures(self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]) -> list[Array]:
-        """The posture of each aim, those first that the way from ``q`` passes first.
+    def try_leg(self, way: tuple[Leg, ...], aims: tuple[Aim, ...]) -> Leg | StuckError:
+        """The next leg of a way, or the error that says why there is none."""
+        try:
+            return self.leg(way[-1] if way else None, aims)
+        except StuckError as error:
+            return error
 
-        Of what is not known yet each is looked for from the one before it, as the nearest.
+    def find_postures(
+        self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
+    ) -> list[Array]:
+        """The posture of each aim, in the order of the goals.
+
+        A posture that is not known ``earlier`` is searched from the one before it, as the nearest.
         """
         postures: list[Array] = []
         for aim in aims:
@@ -219,11 +205,6 @@ class Controller:
                 break
         return postures
 
-    def nearest_hands(self, q: Array, goal: int) -> list[Hand]:
-        """The hands, the nearest to a goal first, the left one of equally near ones."""
-        hands = [hand for hand in HANDS if hand in self.session.hands]
-        return sorted(hands, key=lambda hand: float(np.hypot(*self.error_of(q, Aim(hand, goal)))))
-
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Move each posture, in place, towards where the ways to and from it are shortest.
 
@@ -235,22 +216,22 @@ class Controller:
             before = q if k == 0 else postures[k - 1]
             preferred = before.copy()
             if k + 1 < len(aims):
-                after = postures[k + 1]
+                after, (hand, _, arm_only) = postures[k + 1], aims[k + 1]
                 to = 1.0 / max(float(np.linalg.norm(postures[k] - before)), _SHORTEST)
-                on = self.gain / max(float(np.linalg.norm(after - postures[k])), _SHORTEST)
-                heeding = (
-                    self.session.joints(aims[k + 1].hand) if aims[k + 1].arm_only else slice(None)
-                )
+                on = 1.0 / max(float(np.linalg.norm(after - postures[k])), _SHORTEST)
+                heeding = self.session.joints(hand) if arm_only else slice(None)
                 preferred[heeding] += on / (to + on) * (after - before)[heeding]
             postures[k], change = self.step_nearer(postures[k], preferred, aim)
             largest = max(largest, change)
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """One Gauss-Newton step to the posture nearest to a preferred one that hits a goal."""
+        """One Gauss-Newton step to the posture nearest to a preferred one that hits a goal.
+
+        Returns the posture and the norm of the change.
+        """
         rows, outside = self.faces(posture, aim)
-        way = _POSTURE_GAIN * (preferred - posture)[self.moving]
-        change = self.cascade.solve(rows, outside, way)
+        change = self.solve(rows, outside, _POSTURE_GAIN * (preferred - posture)[self.moving])
         short = outside.max()
         if short > _MARGIN and (outside - rows @ change).max() > 0.9 * short:
             # Singular in the very direction of the goal, such as a straight arm with its goal
@@ -259,7 +240,7 @@ class Controller:
             bent = (self.moving >= arm.start) & (self.moving < arm.stop)
             change[bent] += np.resize([1.0, -1.0], bent.sum())
         length = float(np.linalg.norm(change))
-        return self.moved(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
+        return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def next_rates(self, q: Array, aim: Aim, posture: Array, last: Array, length: float) -> Array:
         """Joint rates of one control step of a ``length``, of norm 1 at most."""
@@ -268,80 +249,48 @@ class Controller:
         rows, outside = self.faces(q, aim)
         shrunk = outside.max() * (1.0 - _CLOSING / steps)
         preferred = (1.0 - self.inertia) * way / (steps * length) + self.inertia * last
-        rates = self.cascade.solve(length * rows, outside - shrunk, preferred)
+        rates = self.solve(length * rows, outside - shrunk, preferred)
         rates /= max(1.0, float(np.linalg.norm(rates)))
         return rates
 
-    def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """How changes of the joints bring a hand within each face of a goal, ``(FACES, joints)``.
+    def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
+        """The cascade's changes of the joints; the session counts the iterations."""
+        solve = solve_cascade if self.modelling == "none" else state_cascade
+        changes, iterations = solve(rows, least, preferred)
+        self.solves += 2
+        self.session.spend(solver_iterations=iterations)
+        return changes
 
-        And how far it is outside of each, ``(FACES,)``, length unit.
-        """
+    def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
+        """A, ``(FACES, joints)``, and b, ``(FACES,)``, of the module's docstring, length unit."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
-        return _NORMALS @ jacobian, _NORMALS @ self.error_of(q, aim) - radius
+        error = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
+        return _FACE_NORMALS @ jacobian, _FACE_NORMALS @ error - radius
 
-    def moved(self, q: Array, change: Array) -> Array:
-        """A configuration with the joints that are not locked changed."""
-        moved = q.copy()
-        moved[self.moving] += change
-        return moved
+    def add(self, q: Array, change: Array) -> Array:
+        """The configuration ``q`` with the joints that are not locked changed."""
+        result = q.copy()
+        result[self.moving] += change
+        return result
 
-    def error_of(self, q: Array, aim: Aim) -> Array:
-        """From a hand to its goal's centre, shape ``(2,)``, length unit."""
-        error: Array = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
-        return error
-
-
-CITATION = (
-    "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
-    "robot manipulators. International Journal of Robotics Research; as quadratic programs "
-    "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
-)
-CONCURRENT = (
-    "K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen (2004), Coarticulation in Markov "
-    "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
-    "(2004), Cascaded filter approach to multi-objective control, ICRA."
-)
-
-Modelling = Literal["cvxpy", "none"]
+    def distance(self, q: Array, aim: Aim) -> float:
+        """Distance of a hand from its goal's centre, length unit."""
+        error = self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
+        return float(np.hypot(*error))
 
 
 class NullspaceParameters(Parameters):
     """Parameters of the controller."""
 
-    hands: Annotated[str, Field(pattern=r"^(every|nearest|[LR]+)$")] = "every"
+    hands: Literal["every", "nearest"] = "every"
     """``every``: all hand sequences are simulated and the shortest is kept; ``nearest``:
     at each goal the hand that is nearest when the last one is hit, without a secondary
-    objective (the other one where it does not get there); or a sequence such as ``LRLR``."""
-    modelling: Modelling = "none"
-    """``cvxpy`` states the programs in its language, ``none`` fills in their numbers; the same
-    programs, and the same rates to the last bit."""
+    objective (the other one where it does not get there)."""
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
-    max_steps: Annotated[int, Field(ge=1)] = 5000
-    """Control steps for one goal after which the controller gives up."""
-
-
-class GainParameters(NullspaceParameters):
-    """With the gain of the secondary objective."""
-
-    gain: Annotated[float, Field(ge=0, le=10)] = 1.0
-    """Weight of the way from a goal to the next, relative to the way before it."""
-
-
-class NextGoalParameters(GainParameters):
-    """With how far it looks ahead."""
-
-    horizon: Annotated[int, Field(ge=1, le=MOST_GOALS)] = 2
-    """Goals after the current one that have a posture; the first of these is the next goal's."""
-
-
-class VelocityParameters(NullspaceParameters):
-    """The same, with an inertia."""
-
-    inertia: Annotated[float, Field(ge=0, lt=1)] = 0.5
-    """Share of the rates of the step before in the preferred ones."""
+    modelling: Literal["none", "cvxpy"] = "none"
+    """``cvxpy``: the programmes as cvxpy states them, for readers; the same, and slower."""
 
 
 class NullspaceQP(Method):
@@ -349,7 +298,11 @@ class NullspaceQP(Method):
 
     name = "nullspace-qp/none"
     title = "Prioritised nullspace QP"
-    citation = CITATION
+    citation = (
+        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
+        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
+        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
+    )
     told = frozenset(
         {
             Information.GOALS,
@@ -360,64 +313,46 @@ class NullspaceQP(Method):
     )
     stochastic = False
     Parameters = NullspaceParameters
+    inertia: ClassVar[float] = 0.0
+    """Share of the rates of the step before in those preferred now."""
     quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 20}
 
     def why_not(self, task: Task) -> str | None:
-        """Too many sequences to simulate, or a given one that does not fit."""
-        hands = self.parameters.hands
-        if hands == "every":
-            return too_many_sequences(task, len(task.hands))
-        if hands == "nearest":
-            return None
-        if len(hands) != len(task.goals):
-            return f"hands {hands!r} names {len(hands)} hands for {len(task.goals)} goals"
-        absent = sorted({LETTERS[letter] for letter in hands} - set(task.hands))
-        return f"hands {hands!r}: the robot has no {absent[0]} hand" if absent else None
+        """The reason why there are too many sequences to simulate, if there are."""
+        every = self.parameters.hands == "every"
+        return too_many_sequences(task, len(task.hands)) if every else None
 
-    def aims(self, hands: tuple[Hand, ...], goal: int) -> tuple[Aim, ...]:
-        """``goal`` (0-based), and what is prepared for on the way there."""
+    def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
+        """``goal`` (0-based), and the goals that are prepared for on the way there."""
         return (Aim(hands[goal], goal),)
 
     def solve(self, session: Session) -> Result:
         """Simulate the candidate hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
-        parameters, joints = self.parameters, task.robot.dof - len(task.locked_base)
-        try:
-            with session.building():
-                cascade = cascade_for(FACES, joints, parameters.modelling)
-        except CascadeError as error:
-            raise MethodError("solver-failed", str(error)) from None
         controller = Controller(
-            session,
-            task,
-            cascade,
-            parameters.period,
-            parameters.max_steps,
-            parameters.gain if isinstance(parameters, GainParameters) else 0.0,
-            parameters.inertia if isinstance(parameters, VelocityParameters) else 0.0,
+            session, task, self.parameters.period, self.inertia, self.parameters.modelling
         )
-        iterations = cascade.iterations
-        try:
-            with session.solving():
-                return self.search(controller)
-        except CascadeError as error:
-            raise MethodError("solver-failed", str(error)) from None
-        finally:
-            session.spend(solver_iterations=cascade.iterations - iterations)
+        with session.solving():
+            ordered = [hand for hand in HANDS if hand in task.hands]
+            candidates = (
+                list(itertools.product(ordered, repeat=len(task.goals)))
+                if self.parameters.hands == "every"
+                else [nearest_hands(controller)]
+            )
+            return self.search(controller, candidates)
 
-    def search(self, controller: Controller) -> Result:
+    def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
         """Extend the sequence with the fewest ticks so far until one is complete.
 
         No other can be better then, since ticks only add up. Of equal ones the one with
         the fewest changes of hand is kept, then the first.
         """
-        candidates = self.candidates(controller)
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)
         ]
         heapq.heapify(heap)
-        solves = controller.cascade.solves
+        solves = controller.solves
         legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
         stuck: list[StuckError] = []
         while heap:
@@ -428,56 +363,39 @@ class NullspaceQP(Method):
                     "sequences": len(candidates),
                     "stuck_sequences": len(stuck),
                     "simulated_movements": len(legs),
-                    "solves": controller.cascade.solves - solves,
+                    "solves": controller.solves - solves,
                 }
                 return Result(tuple(leg.movement for leg in way), details)
             plan = tuple(self.aims(hands, g) for g in range(goal + 1))
             if plan not in legs:
-                legs[plan] = self.leg_or_failure(controller, way, plan[-1])
+                legs[plan] = controller.try_leg(way, plan[-1])
             leg = legs[plan]
             if isinstance(leg, StuckError):
                 stuck.append(leg)
             else:
                 heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*way, leg)))
-        raise failure(str(stuck[0]), stuck)
-
-    def leg_or_failure(
-        self, controller: Controller, way: tuple[Leg, ...], aims: tuple[Aim, ...]
-    ) -> Leg | StuckError:
-        """The next leg of a way, or why there is none."""
-        try:
-            return controller.leg(way[-1] if way else None, aims)
-        except StuckError as error:
-            return error
-
-    def candidates(self, controller: Controller) -> list[tuple[Hand, ...]]:
-        """The hand sequences that are simulated."""
-        session, choice = controller.session, self.parameters.hands
-        if choice == "every":
-            ordered = [hand for hand in HANDS if hand in session.hands]
-            return list(itertools.product(ordered, repeat=session.goals_count))
-        if choice != "nearest":
-            return [hands_of(choice)]
-        way: tuple[Leg, ...] = ()
-        for goal in range(session.goals_count):
-            nearest = controller.nearest_hands(way[-1].q if way else session.q0, goal)
-            legs = [self.leg_or_failure(controller, way, (Aim(nearest[0], goal),))]
-            if isinstance(legs[0], StuckError):  # only then is it another hand's turn
-                legs += [
-                    self.leg_or_failure(controller, way, (Aim(hand, goal),)) for hand in nearest[1:]
-                ]
-            reached = [leg for leg in legs if isinstance(leg, Leg)]
-            if not reached:
-                raise failure("; ".join(map(str, legs)), legs)
-            way = (*way, reached[0])
-        return [tuple(leg.movement.hand for leg in way)]
+        raise MethodError("infeasible", str(stuck[0]))
 
 
-def failure(reason: str, legs: Sequence[object]) -> MethodError:
-    """No way to a goal; one that was only not finished says nothing of the task."""
-    if any(isinstance(leg, UnfinishedError) for leg in legs):
-        return MethodError("solver-failed", reason)
-    return MethodError("infeasible", reason)
+def nearest_hands(controller: Controller) -> HandSequence:
+    """At each goal the hand that is nearest when the last goal is hit, and gets there.
+
+    Raises MethodError if no hand gets to a goal.
+    """
+    way: tuple[Leg, ...] = ()
+    for goal in range(len(controller.task.goals)):
+        q = way[-1].q if way else controller.session.q0
+        aims = [Aim(hand, goal) for hand in HANDS if hand in controller.task.hands]
+        stuck = []
+        for aim in sorted(aims, key=lambda aim: controller.distance(q, aim)):
+            leg = controller.try_leg(way, (aim,))
+            if isinstance(leg, Leg):
+                way = (*way, leg)
+                break
+            stuck.append(str(leg))
+        else:
+            raise MethodError("infeasible", "; ".join(stuck))
+    return tuple(leg.movement.hand for leg in way)
 
 
 class KeepVelocity(NullspaceQP):
@@ -487,7 +405,7 @@ class KeepVelocity(NullspaceQP):
     title = "Prioritised nullspace QP, keeping velocity"
     told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
     secondary = ("smoothness: joint velocity is kept",)
-    Parameters = VelocityParameters
+    inertia = 0.5
 
 
 class NextGoal(NullspaceQP):
@@ -495,15 +413,17 @@ class NextGoal(NullspaceQP):
 
     name = "nullspace-qp/next-goal"
     title = "Prioritised nullspace QP, next goal as lower priority"
-    citation = CITATION + CONCURRENT
+    citation = NullspaceQP.citation + (
+        "K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen (2004), Coarticulation in Markov "
+        "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
+        "(2004), Cascaded filter approach to multi-objective control, ICRA."
+    )
     told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
     secondary = ("coarticulation: posture at the next goal",)
-    Parameters = NextGoalParameters
 
-    def aims(self, hands: tuple[Hand, ...], goal: int) -> tuple[Aim, ...]:
+    def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """As many goals as the horizon has, with their hands."""
-        end = min(goal + 1 + self.parameters.horizon, len(hands))
-        return tuple(Aim(hands[g], g) for g in range(goal, end))
+        return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + HORIZON]
 
 
 class Preshaping(NullspaceQP):
@@ -511,18 +431,17 @@ class Preshaping(NullspaceQP):
 
     name = "nullspace-qp/preshaping"
     title = "Prioritised nullspace QP, preshaping of the other arm"
-    citation = CITATION + CONCURRENT
+    citation = NextGoal.citation
     told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
     secondary = ("preshaping: the other arm's posture at the goal it hits next",)
-    Parameters = GainParameters
 
     def why_not(self, task: Task) -> str | None:
-        """Nothing to preshape, or the reasons of the others."""
+        """The reason why there is nothing to preshape, or the reason of the others."""
         if len(task.hands) < 2:
             return f"task {task.name!r} has one hand; there is no other arm to preshape"
         return super().why_not(task)
 
-    def aims(self, hands: tuple[Hand, ...], goal: int) -> tuple[Aim, ...]:
+    def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """``goal``, and the first to come that the other hand hits."""
         later = range(goal + 1, len(hands))
         others = (Aim(hands[g], g, True) for g in later if hands[g] != hands[goal])
@@ -530,13 +449,3 @@ class Preshaping(NullspaceQP):
 
 
 METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, Preshaping)
-
-
-@cache
-def cascade_for(rows: int, joints: int, modelling: Modelling = "none") -> Cascade:
-    """The one cascade of this process for such a task and statement."""
-    if modelling == "none":
-        return Cascade(rows, joints)
-    from coartic.baselines.modelled_cascade import ModelledCascade  # cvxpy is slow to import
-
-    return ModelledCascade(rows, joints)

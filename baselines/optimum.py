@@ -2,8 +2,8 @@
 
 Reward is lost in proportion to the joint-space path, so the shortest path that touches
 every disc is sought over all hand sequences: once from the chains of a posture graph
-(layered dynamic programming), once from many random starts around what the corrective
-process finds. Either way every plan is then rounded to whole control ticks in every way,
+(layered dynamic programming), once from many random starts around the configurations of the
+corrective process. Either way every plan is then rounded to whole control ticks in every way,
 with and without goals that are hit as their turn comes because the other hand is already
 there. A reference for the gaps of all other methods, not a competitor.
 """
@@ -19,17 +19,16 @@ from pydantic import Field
 
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
-from coartic.baselines.posture_graph import Start, cheapest_chains
-from coartic.baselines.shortest_paths import TOLD, check_ticks, fewest_ticks, shortest_plans
+from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
+from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.corrective import correct
 from coartic.motion.initial import hand_sequences, too_many_sequences
-from coartic.robot import Array, Hand
+from coartic.robot import Array
 from coartic.tasks.task import hands_of, letters_of
 
 MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
-CITATION = "This package; docs/model.md derives the bound on reward."
 
 
 class OptimumParameters(Parameters):
@@ -39,7 +38,6 @@ class OptimumParameters(Parameters):
     """Whether the arm that is not chosen may move."""
     base: Literal["task", "y", "xy"] = "task"
     """Base coordinates that are locked: those of the task, or these in addition."""
-    sampling_seed: Annotated[int, Field(ge=0)] = 0
 
 
 class GraphParameters(OptimumParameters):
@@ -52,13 +50,10 @@ class GraphParameters(OptimumParameters):
     chains: Annotated[int, Field(ge=1)] = 100
     """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
     three, the best path known was missed on 9 of 40 random tasks for one arm."""
-    most_sequences: Annotated[int, Field(ge=1)] = 64
-    """Hand sequences that are planned for each graph: all where there are no more, with two
-    hands up to six goals; else those that a beam of this width over the goals ends with."""
 
 
 class BoundParameters(GraphParameters):
-    """Those of the posture graph, and how long the proof may take."""
+    """Parameters of the posture graph, and the budget of the proof."""
 
     most_nodes: Annotated[int, Field(ge=1)] = 20_000
     """Cone programmes that may be solved for it, some 500 a second with five goals. The search
@@ -75,10 +70,11 @@ class MultistartParameters(OptimumParameters):
 class Optimum(Method):
     """The shortest path over all hand sequences, in whole ticks."""
 
+    citation = "This package; docs/model.md derives the bound on reward."
     stochastic = False
 
     @abstractmethod
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """Hand sequences with a configuration per goal to start from."""
 
     def solve(self, session: Session) -> Result:
@@ -121,22 +117,20 @@ class DynamicProgramming(Optimum):
 
     name = "optimum/dynamic-programming"
     title = "Optimum: dynamic programming over postures and hands, polished"
-    citation = CITATION
-    told = TOLD
+    told = KNOWS_REWARD
     Parameters = GraphParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The chain of every sequence; with a free other arm also with that arm spread out."""
         parameters: GraphParameters = self.parameters
         return cheapest_chains(
             session,
             task,
-            np.random.default_rng(parameters.sampling_seed),
+            np.random.default_rng(0),
             nodes=parameters.nodes,
             graphs=parameters.graphs,
             chains=parameters.chains,
-            most=parameters.most_sequences,
             spread=parameters.other_arm == "free",
         )
 
@@ -174,11 +168,10 @@ class BranchAndBound(DynamicProgramming):
 
 
 class Multistart(Optimum):
-    """From random starts around what the corrective process finds."""
+    """From random starts around the configurations of the corrective process."""
 
     name = "optimum/multistart"
     title = "Optimum: random starts for every hand sequence"
-    citation = CITATION
     told = frozenset(
         {
             Information.GOALS,
@@ -191,21 +184,21 @@ class Multistart(Optimum):
     quick: ClassVar[dict[str, Any]] = {"starts": 2}
 
     def why_not(self, task: Task) -> str | None:
-        """More hand sequences than can be planned one by one."""
+        """The reason why there are too many hand sequences to plan one by one, if there are."""
         return too_many_sequences(task, len(task.hands))
 
-    def starts(self, session: Session, task: Task) -> Iterator[Start]:
+    def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""
-        rng = np.random.default_rng(self.parameters.sampling_seed)
+        rng = np.random.default_rng(0)
         for letters in hand_sequences(task):
             hands = hands_of(letters)
-            start = corrected(session, task, hands)
+            start = correct_each_goal(session, task, hands)
             for number in range(self.parameters.starts):
                 spread = 0.0 if number == 0 else 0.05 * 30.0 ** rng.random()
                 yield hands, start + spread * rng.standard_normal(start.shape)
 
 
-def corrected(session: Session, task: Task, hands: tuple[Hand, ...]) -> Array:
+def correct_each_goal(session: Session, task: Task, hands: HandSequence) -> Array:
     """A configuration per goal, each from **A**; the last iterate where it does not converge."""
     q, configurations = np.array(task.q0), []
     for hand, goal in zip(hands, task.goals, strict=True):

@@ -23,9 +23,12 @@ from coartic.motion.penalty import disc_centre
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Penalty, Task
 
-Hands = tuple[Hand, ...]
-Start = tuple[Hands, Array]
+HandSequence = tuple[Hand, ...]
+Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+BEAM_WIDTH = 64
+"""Hand sequences that are planned for each graph: all where there are no more, with two hands up to
+six goals; else those that a beam of this width over the goals ends with."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first
@@ -73,9 +76,9 @@ def sample_postures(
 class Beginning:
     """The cheapest chains of nodes for the beginning of a hand sequence."""
 
-    hands: tuple[Hand, ...]
+    hands: HandSequence
     nodes: dict[Hand, Array]
-    """Of each hand, where it may be."""
+    """Nodes of the layer in which each hand was last used."""
     cost: Array
     """``cost[i, j]``: the cheapest way to node i of the hand used last and j of the other."""
     back: tuple[NDArray[np.int32], ...]
@@ -92,12 +95,12 @@ class PostureGraph:
     spent: Counter[str] = field(default_factory=Counter)
     """Kinematics evaluated while sampling."""
     costs: Array | float = 1.0
-    """What the movement of each joint costs, shape ``(dof,)``, or of all of them."""
+    """Cost of the movement of each joint, shape ``(dof,)``, or of all joints."""
     penalty: Penalty | None = None
-    """What goals cost beside the length of the path."""
+    """A penalty beside the length of the path."""
 
     @classmethod
-    def sampled(
+    def sample(
         cls,
         task: Task,
         count: int,
@@ -124,28 +127,30 @@ class PostureGraph:
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
         return cls(task, layers, spent, costs, penalty)
 
-    def chains(
-        self, only: tuple[Hand, ...] | None = None, most: int | None = None
-    ) -> Iterator[Start]:
+    def chains(self, only: HandSequence | None = None, most: int | None = None) -> list[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
-        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
-        sequences, goal by goal, as many are kept as are cheapest; none is lost while there
-        are no more than that.
+        ``only`` and ``most`` as in :meth:`sequences`.
         """
-        begun = Beginning(
-            (), dict.fromkeys(HANDS, np.array(self.task.q0)[None, :]), np.zeros((1, 1)), ()
-        )
-        kept = [begun]
+        return [self.chain_of(complete) for complete in self.sequences(only, most)]
+
+    def sequences(self, only: HandSequence | None, most: int | None) -> list[Beginning]:
+        """The cheapest chains of whole hand sequences, with their costs.
+
+        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
+        sequences, goal by goal, the cheapest are kept; none is lost while there are no more
+        than that.
+        """
+        start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
+        kept = [Beginning((), start, np.zeros((1, 1)), ())]
         for _ in range(len(self.task.goals)):
             longer = [more for beginning in kept for more in self.longer(beginning, only)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        for complete in kept:
-            yield self.chain_of(complete)
+        return kept
 
-    def why_none(self, only: tuple[Hand, ...] | None = None) -> str:
-        """Why there is no chain: the first goal without a posture; empty where there is one."""
+    def why_none(self, only: HandSequence | None = None) -> str:
+        """The reason why there is no chain, a goal without a posture; empty if there is a chain."""
         for goal in range(len(self.task.goals)):
             hands = self.task.hands if only is None else (only[goal],)
             if not any(len(self.layers[goal, hand]) for hand in hands):
@@ -155,7 +160,7 @@ class PostureGraph:
                 )
         return ""
 
-    def longer(self, begun: Beginning, only: tuple[Hand, ...] | None) -> Iterator[Beginning]:
+    def longer(self, begun: Beginning, only: HandSequence | None) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
         goal = len(hands)
@@ -187,10 +192,10 @@ class PostureGraph:
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
     def penalties(self, goal: int, hand: Hand, bases: Array, arms: Array) -> tuple[Array, Array]:
-        """What hitting a goal (0-based) in each of its nodes costs beside the way, as a length.
+        """The penalty of hitting a goal (0-based) in each of its nodes, as a length.
 
         In two parts, by the node that the base comes from and by the one that the arm comes from,
-        with what the posture alone costs: shape ``(before, after)`` each.
+        with the penalty of the posture itself: shape ``(before, after)`` each.
         """
         layer, robot, penalty = self.layers[goal, hand], self.task.robot, self.penalty
         by_base, by_arm = np.zeros((len(bases), len(layer))), np.zeros((len(arms), len(layer)))
@@ -209,7 +214,7 @@ class PostureGraph:
             by_arm += penalty.distinct * np.maximum(1.0 - way / penalty.apart, 0.0)
         return by_base * PAPER.step, by_arm * PAPER.step
 
-    def chain_of(self, complete: Beginning) -> Start:
+    def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
         hands, cost, back = complete.hands, complete.cost, complete.back
         i, j = np.unravel_index(cost.argmin(), cost.shape)
@@ -236,23 +241,23 @@ def cheapest_chains(
     nodes: int,
     graphs: int,
     chains: int,
-    most: int,
+    most: int = BEAM_WIDTH,
     spread: bool = False,
-    only: Hands | None = None,
+    only: HandSequence | None = None,
     costs: Array | float = 1.0,
     penalty: Penalty | None = None,
-) -> Iterator[Start]:
+) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
     :meth:`PostureGraph.chains`, ``costs`` of joints and ``penalty`` as in
-    :class:`PostureGraph`. The session spends what it takes.
+    :class:`PostureGraph`. The session counts the effort.
 
     With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
     MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sampled(task, nodes, rng, costs, penalty)
+        graph = PostureGraph.sample(task, nodes, rng, costs, penalty)
         session.spend(**graph.spent)
         missing = graph.why_none(only)
         if missing:
@@ -261,12 +266,12 @@ def cheapest_chains(
             yielded += 1
             yield hands, configurations
             if spread and len(task.hands) > 1:
-                yield hands, spread_out(task, hands, configurations)
+                yield hands, move_other_arm(task, hands, configurations)
         if number >= graphs and yielded >= chains:
             return
 
 
-def spread_out(task: Task, hands: Hands, chain: Array) -> Array:
+def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """A chain's configurations with each arm moving steadily between the goals it hits."""
     configurations = chain.copy()
     for hand in task.hands:

@@ -17,7 +17,7 @@ at every goal with a horizon of 0. ``path_length`` in the details has no such lo
 plans as they were before the rounding, from where the robot stood.
 
 The horizon limits choice of hand and posture alike. With ``hands`` ``optimal`` it limits postures
-alone: the hands are those of the plan with all goals. What the hands alone lose, followed by the
+alone: the hands are those of the plan with all goals. The loss by the hands alone, with the
 best postures, is in the details of the searches for the optimum, ``path_lengths`` by hand
 sequence.
 
@@ -37,9 +37,9 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task, execute
-from coartic.baselines.posture_graph import Hands, Start, cheapest_chains
+from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
 from coartic.baselines.shortest_paths import (
-    TOLD,
+    KNOWS_REWARD,
     PlanInTicks,
     ShortestPlans,
     check_ticks,
@@ -51,12 +51,11 @@ from coartic.baselines.whole_ticks import movements
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.motion.costs import CostlyJoints, joint_costs, segment_lengths
 from coartic.robot import BASE_DOF, HANDS, Array
-from coartic.tasks.task import MOST_GOALS, hands_of
-from coartic.tasks.task import Start as Posture
+from coartic.tasks.task import MOST_GOALS, Start, hands_of
 
 
 class RecedingHorizonParameters(Parameters):
-    """How far it looks ahead, what it minimises, and how long it searches."""
+    """The horizon, the cost, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Goals in view beyond the one to be hit; all where there are no more."""
@@ -76,10 +75,6 @@ class RecedingHorizonParameters(Parameters):
     starts: Annotated[int, Field(ge=1)] = 24
     """Starts of each window that are polished, the shortest: all chains, and all of them with the
     other arm spread out, are ranked by length."""
-    most_sequences: Annotated[int, Field(ge=1)] = 64
-    """Hand sequences that are planned for each graph: all where there are no more, with two
-    hands up to six goals; else those that a beam of this width over the goals ends with."""
-    sampling_seed: Annotated[int, Field(ge=0)] = 0
 
 
 class RecedingHorizon(Method):
@@ -92,7 +87,7 @@ class RecedingHorizon(Method):
         "predictive control: stability and optimality. Automatica; C. E. Garcia, D. M. Prett, "
         "M. Morari (1989). Model predictive control: theory and practice. Automatica."
     )
-    told = TOLD
+    told = KNOWS_REWARD
     stochastic = False
     Parameters = RecedingHorizonParameters
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
@@ -100,111 +95,104 @@ class RecedingHorizon(Method):
     def solve(self, session: Session) -> Result:
         """Plan, make a movement, and plan again, until the last goal is in view."""
         check_ticks(session.model)
-        return Planner(session, session.hand_over(*self.told), self.parameters).solve()
+        task, parameters = session.hand_over(*self.told), self.parameters
+        costs = joint_costs(task.robot, parameters.costs, parameters.cost_factor)
+        rng = np.random.default_rng(0)  # the same graphs for all seeds
+        windows: list[PlanInTicks] = []
 
+        def plan(window: Task, hands: HandSequence | None) -> PlanInTicks:
+            windows.append(plan_window(session, window, hands, parameters, costs, rng))
+            return windows[-1]
 
-METHODS = (RecedingHorizon,)
-
-
-class Planner:
-    """The planner at work on one task."""
-
-    def __init__(self, session: Session, task: Task, parameters: RecedingHorizonParameters) -> None:
-        self.session, self.task, self.parameters = session, task, parameters
-        self.costs = joint_costs(task.robot, parameters.costs, parameters.cost_factor)
-        self.rng = np.random.default_rng(parameters.sampling_seed)
-        self.windows = self.solves = self.failed = 0
-
-    def solve(self) -> Result:
-        """A window after another, until one reaches the last goal."""
-        goals, ahead = len(self.task.goals), self.parameters.horizon + 1
-        hands: Hands | None = None
-        if self.parameters.hands == "optimal":
-            hands = hands_of(self.plan(self.task, None).execution.hands)
+        hands = None
+        if parameters.hands == "optimal":
+            hands = hands_of(plan(task, None).execution.hands)
         solution: list[Movement] = []
-        length, q = 0.0, np.array(self.task.q0)
-        while (goal := len(solution)) < goals:
-            end = min(goal + ahead, goals)
-            window = self.plan(
-                remaining(self.task, q, goal, end), None if hands is None else hands[goal:end]
-            )
-            followed = 1 if end < goals else end - goal
+        length, q = 0.0, np.array(task.q0)
+        while (goal := len(solution)) < len(task.goals):
+            end = min(goal + parameters.horizon + 1, len(task.goals))
+            window = plan(remaining(task, q, goal, end), hands and hands[goal:end])
+            followed = 1 if end < len(task.goals) else end - goal
             solution += [
                 replace(movement, goal=goal + movement.goal)
                 for movement in window.movements[:followed]
             ]
             planned = np.vstack([q, window.plan.configurations[:followed]])
-            length += float(segment_lengths(planned, self.costs).sum())
+            length += float(segment_lengths(planned, costs).sum())
             q = window.execution.configurations[followed - 1]
         details = {
             "path_length": length,
-            "windows": self.windows,
-            "solves": self.solves,
-            "failed_solves": self.failed,
+            "windows": len(windows),
+            "solves": sum(window.solves for window in windows),
+            "failed_solves": sum(window.failed for window in windows),
         }
         return Result(tuple(solution), details)
 
-    def plan(self, task: Task, only: Hands | None) -> PlanInTicks:
-        """The shortest movements through all goals of a task, or of what remains of one."""
-        weighted = self.parameters.costs != "none"
-        costs = tuple(self.costs.tolist()) if weighted else None
-        with self.session.building():
-            problem = trajectory_problem(
-                task.robot, task.hands, len(task.goals), "path-length", costs
-            )
-        with self.session.solving():
-            plans = shortest_plans(
-                self.session,
-                task,
-                problem,
-                self.shortest_starts(task, only),
-                still=False,
-                radius=task.radius - (self.session.model.arrival_tolerance if weighted else 0.0),
-            )
-            self.windows += 1
-            self.solves += plans.solves
-            self.failed += plans.failed
-            if weighted:
-                return shortest_as_it_is(self.session, task, plans)
-            return fewest_ticks(self.session, task, problem, plans)
 
-    def shortest_starts(self, task: Task, only: Hands | None) -> list[Start]:
-        """The starts that are polished."""
+METHODS = (RecedingHorizon,)
+
+
+def plan_window(
+    session: Session,
+    task: Task,
+    only: HandSequence | None,
+    parameters: RecedingHorizonParameters,
+    costs: Array,
+    rng: np.random.Generator,
+) -> PlanInTicks:
+    """The shortest movements through all goals of a task, or through those that remain of one."""
+    weighted = parameters.costs != "none"
+    with session.building():
+        problem = trajectory_problem(
+            task.robot,
+            task.hands,
+            len(task.goals),
+            "path-length",
+            tuple(costs.tolist()) if weighted else None,
+        )
+    with session.solving():
         starts = cheapest_chains(
-            self.session,
+            session,
             task,
-            self.rng,
-            nodes=self.parameters.nodes // len(task.hands),
-            graphs=self.parameters.graphs,
-            chains=self.parameters.chains,
-            most=self.parameters.most_sequences,
+            rng,
+            nodes=parameters.nodes // len(task.hands),
+            graphs=parameters.graphs,
+            chains=parameters.chains,
             spread=len(task.goals) > 1,  # with one goal it is the chain itself
             only=only,
-            costs=self.costs,
+            costs=costs,
         )
-        ranked = sorted(starts, key=lambda start: self.length_from(task, start))
-        return ranked[: self.parameters.starts]
 
-    def length_from(self, task: Task, start: Start) -> float:
-        """Weighted path length of a start as it is."""
-        _, configurations = start
-        return float(segment_lengths(np.vstack([task.q0, configurations]), self.costs).sum())
+        def weighted_length(start: Chain) -> float:
+            return float(segment_lengths(np.vstack([task.q0, start[1]]), costs).sum())
+
+        plans = shortest_plans(
+            session,
+            task,
+            problem,
+            sorted(starts, key=weighted_length)[: parameters.starts],
+            still=False,
+            radius=task.radius - (session.model.arrival_tolerance if weighted else 0.0),
+        )
+        if weighted:
+            return without_rounding(session, task, plans)
+        return fewest_ticks(session, task, problem, plans)
 
 
 def remaining(task: Task, q: Array, first: int, end: int) -> Task:
     """The goals from ``first`` (0-based) up to ``end``, from a configuration ``q``, ``(dof,)``."""
     angles = {hand: tuple(q[task.robot.joints(hand)].tolist()) for hand in HANDS}
-    start = Posture(base=tuple(q[:BASE_DOF].tolist()), **angles)
+    start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
     goals = task.goals[first:end]
     return task.model_copy(update={"goals": goals, "start": start})
 
 
-def shortest_as_it_is(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
-    """The shortest plan without rounding; its movements end with the first step inside a disc."""
+def without_rounding(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
+    """The shortest plan as it is; its movements end with the first step inside a disc."""
     instance, plan = plans.ranked[0]
     planned = movements(session, task, instance, plan.configurations)
     execution = execute(task, planned, model=session.model)
     session.spend(forward_kinematics=execution.evaluations)
     if not execution.completed:
         raise MethodError("solver-failed", f"a movement missed its goal: {execution.reason}")
-    return PlanInTicks(planned, execution, plan)
+    return PlanInTicks(planned, execution, plan, plans.solves, plans.failed)

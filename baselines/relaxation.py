@@ -1,11 +1,16 @@
 """A lower bound on the path within a box of link angles: relaxation and Lagrangian.
 
-The relaxation is a second-order cone programme. Its variables are the configurations and,
-for the chosen arm at each goal, the direction (c, s) of every link. What is not convex is
-that (c, s) are the cosine and sine of the link's absolute angle φ; for φ within an interval
-the points (c, s, φ) lie within a set of half-spaces, whose offsets are exact maxima.
+The relaxation is a second-order cone programme over the configurations q_g and, for the chosen arm
+at each goal, the direction u_gk = (c, s) of every link::
 
-The bound itself is not the solver's word. With any multipliers p_g of the movements,
+    min   Σ_g |q_g - q_(g-1)|
+    s.t.  |base_g + shoulder + Σ_k l_k u_gk - goal_g| <= r,   |u_gk| <= 1
+          (u_gk, φ_gk) in the half-spaces of its interval,    φ_gk = Σ_(j<=k) q_gj
+
+The only part that is not convex, u = (cos φ, sin φ), is replaced by half-spaces that hold all
+points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima.
+
+The bound does not rest on the solver. With any multipliers p_g of the movements,
 ‖p_g‖ <= 1, and λ_g of the hands at their goals, every path obeys
 
     ‖Δq_g‖ >= p_g · Δq_g   and   0 >= λ_g · (hand_g − goal_g) − radius ‖λ_g‖,
@@ -14,7 +19,7 @@ so that it is at least as long as the least value of the sum of the right sides.
 separable: a linear term of each joint, and for each link ``slope φ + l λ · (cos φ, sin φ)``,
 whose least value over an interval has a closed form. Joints that no link angle stands for
 change by no more than the path is long. The solver's dual point is one choice of multipliers,
-a good one; whatever it returns, what is computed from it holds.
+a good one; a bound computed from any other choice holds as well.
 
 The same sum says more. Where its least value is short of the longest path of interest by
 ``slack``, an angle at which one link's term exceeds its least by more lies on no such path,
@@ -39,9 +44,11 @@ from scipy import sparse
 from coartic import Task
 from coartic.robot import BASE_DOF, HANDS, Arm, Array, Hand, directions
 
-Hands = tuple[Hand | None, ...]
+PartialSequence = tuple[Hand | None, ...]
 """A hand per goal, None where it is undecided."""
 
+HALF_SPACES = 9
+"""Half-spaces of each link."""
 _TURN = 2.0 * math.pi
 _TOWARDS_POINT = 0.25  # of the way from an interval's middle to the relaxation's angle
 _PARABOLAS = 10  # steps by which an interval's end moves inwards
@@ -55,7 +62,9 @@ class Relaxation:
     rad, of the chosen arms at the goals whose hand is decided, goal by goal.
     """
 
-    def __init__(self, task: Task, hands: Hands, merged: tuple[int, ...], still: bool) -> None:
+    def __init__(
+        self, task: Task, hands: PartialSequence, merged: tuple[int, ...], still: bool
+    ) -> None:
         dof, goals = task.robot.dof, len(hands)
         chosen = [None if hand is None else task.robot.arm(hand) for hand in hands]
         arms = {g: arm for g, arm in enumerate(chosen) if arm is not None}
@@ -124,8 +133,7 @@ class Relaxation:
         self._right = np.array(cones.right)
         self._cones = cones.closed
         if links:
-            self._cones.append(clarabel.NonnegativeConeT(_NORMALS * len(links)))
-        self._quadratic = sparse.csc_matrix((self._size, self._size))
+            self._cones.append(clarabel.NonnegativeConeT(HALF_SPACES * len(links)))
         self.lay_out(np.array(cones.rows))
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
@@ -147,7 +155,7 @@ class Relaxation:
         """Multipliers for a box, the relaxation's minimiser, iterations of the solver."""
         matrix, offsets = self.with_half_spaces(box)
         solution = clarabel.DefaultSolver(
-            self._quadratic,
+            sparse.csc_matrix((self._size, self._size)),
             self._objective,
             matrix,
             np.concatenate([self._right, offsets]),
@@ -164,7 +172,7 @@ class Relaxation:
         return multipliers, np.nan_to_num(np.array(solution.x)), solution.iterations
 
     def lagrangian(self, multipliers: Multipliers, longest: float) -> Lagrangian:
-        """What multipliers say of the paths that are no longer than ``longest``."""
+        """The Lagrangian of multipliers, for paths that are no longer than ``longest``."""
         weights = multipliers.pulls.copy()
         weights[:-1] -= multipliers.pulls[1:]
         turns = weights.ravel()[self._joint_columns]
@@ -184,7 +192,7 @@ class Relaxation:
         return Lagrangian(constant, slopes, sizes, towards)
 
     def wrong(self, point: Array) -> Array:
-        """How far each link's end is from where its angle puts it, ``(links,)``, length unit."""
+        """Error of each link's end against its angle, shape ``(links,)``, length unit."""
         relaxed = np.stack([point[self._directions], point[self._directions + 1]], axis=1)
         error = np.linalg.norm(relaxed - directions(self._angles @ point), axis=1)
         return np.asarray(error * self._lengths)
@@ -192,7 +200,7 @@ class Relaxation:
     def split(self, box: Array, point: Array) -> tuple[Array, Array]:
         """Two halves, across the angle whose direction the relaxation has most wrong.
 
-        Weighting what is wrong by the forces, or by what it costs the Lagrangian, took up to
+        Weighting the errors by the forces, or by their cost in the Lagrangian, took up to
         fifty times as many nodes.
         """
         wrong, width = self.wrong(point), box[:, 1] - box[:, 0]
@@ -206,25 +214,25 @@ class Relaxation:
         return below, above
 
     def configurations(self, point: Array) -> Array:
-        """Those of a minimiser, shape ``(G, dof)``."""
+        """The configurations of a minimiser, shape ``(G, dof)``."""
         return point[: self._stiff.size].reshape(self._stiff.shape)
 
     def lay_out(self, fixed: Array) -> None:
-        """Where the entries of the half-spaces stand, below the rows that are fixed."""
+        """Store the places of the half-spaces' entries, below the rows that are fixed."""
         links = len(self._directions)
         turned, angle_columns = np.nonzero(self._angles)  # of each link, its angle's joints
         self._turned = turned
         link = np.concatenate([np.arange(links), np.arange(links), turned])
         column = np.concatenate([self._directions, self._directions + 1, angle_columns])
-        below = np.arange(_NORMALS)[:, None] * links + len(fixed)
+        below = np.arange(HALF_SPACES)[:, None] * links + len(fixed)
         at = np.nonzero(fixed)
         self._fixed = fixed[at]
         rows = np.concatenate([at[0], (below + link).ravel()])
-        columns = np.concatenate([at[1], np.tile(column, _NORMALS)])
+        columns = np.concatenate([at[1], np.tile(column, HALF_SPACES)])
         self._order = np.lexsort((rows, columns))
         self._rows = rows[self._order]
         self._ends = np.searchsorted(columns[self._order], np.arange(self._size + 1))
-        self._matrix = sparse.csc_matrix((len(fixed) + _NORMALS * links, self._size))
+        self._matrix = sparse.csc_matrix((len(fixed) + HALF_SPACES * links, self._size))
 
     def with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
         """All rows, and the right sides of the half-spaces ``A x <= b``.
@@ -249,12 +257,12 @@ class Relaxation:
 
 
 class Multipliers(NamedTuple):
-    """What the relaxation's constraints are weighted with."""
+    """Weights of the relaxation's constraints."""
 
     pulls: Array
-    """Of the movements, shape ``(G, dof)``, each of norm at most 1 over what may move."""
+    """p of the movements, shape ``(G, dof)``, of norm at most 1 over the joints that may move."""
     forces: Array
-    """Of the hands at their goals, shape ``(G, 2)``."""
+    """λ of the hands at their goals, shape ``(G, 2)``."""
 
 
 @dataclass(frozen=True)
@@ -310,7 +318,7 @@ class Lagrangian:
 
 
 def disc_of(task: Task, arm: Arm | None) -> tuple[Array, float]:
-    """Where the shoulder is from the base, and the radius of the goal for that arm's hand.
+    """Position of the shoulder from the base, and the radius of the goal for that arm's hand.
 
     For an undecided hand (None): the middle of the shoulders, and how far it may be from the
     goal while either hand is within the goal.
@@ -360,18 +368,15 @@ class Cones:
 
 def stiff_joints(task: Task, hand: Hand | None, still: bool) -> list[int]:
     """Joints that cannot move on the way to a goal of this hand, or of an undecided one."""
-    stiff = {{"x": 0, "y": 1}[axis] for axis in task.locked_base}
+    stiff = {"xy".index(axis) for axis in task.locked_base}
     for other in HANDS:
         if other not in task.hands or (still and hand is not None and other != hand):
             stiff |= set(range(task.robot.dof)[task.robot.joints(other)])
     return sorted(stiff)
 
 
-_NORMALS = 9  # half-spaces of each link
-
-
 def half_space_normals(half: Array) -> Array:
-    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, _NORMALS, links)``.
+    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, HALF_SPACES, links)``.
 
     The interval's ends; the chord; tangents to cosine and sine; the chord of the sine. Any
     normal is valid: the offsets make it so. More of them bound no better in the same time.

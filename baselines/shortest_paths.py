@@ -1,6 +1,6 @@
 """The shortest path over all hand sequences, in whole control ticks.
 
-What the searches for the optimum and the planner with a receding horizon share: each start is
+Shared by the searches for the optimum and the planner with a receding horizon: each start is
 polished by IPOPT, the shortest plan of each hand sequence is kept, and every plan that may be
 the best one is rounded to whole ticks in every way, with and without goals that are hit as their
 turn comes because the other hand is already there.
@@ -12,34 +12,26 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from coartic import Execution, MotionModel, Movement, Task, execute
-from coartic.baselines.posture_graph import Hands, Start
-from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic.baselines.posture_graph import Chain, HandSequence
+from coartic.baselines.trajectory_problem import MODEL_BASED, Instance, PathPlan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 from coartic.tasks.task import Penalty
 
-TOLD = frozenset(
-    {
-        Information.GOALS,
-        Information.FORWARD_KINEMATICS,
-        Information.JACOBIAN,
-        Information.KINEMATIC_MODEL,
-        Information.REWARD_FORMULA,
-    }
-)
-"""What a method is told that starts from posture graphs and rounds to whole ticks."""
+KNOWS_REWARD = MODEL_BASED | {Information.REWARD_FORMULA}
+"""Information of a method that starts from posture graphs and rounds to whole ticks."""
 
 
 class ShortestPlans(NamedTuple):
-    """What polishing many starts came to."""
+    """The plans that many starts led to."""
 
-    by_hands: dict[Hands, tuple[Instance, Plan]]
+    by_hands: dict[HandSequence, tuple[Instance, PathPlan]]
     """The shortest plan of each hand sequence that has one."""
     solves: int
     failed: int
 
     @property
-    def ranked(self) -> list[tuple[Instance, Plan]]:
+    def ranked(self) -> list[tuple[Instance, PathPlan]]:
         """The plans, the shortest first."""
         return sorted(self.by_hands.values(), key=lambda entry: entry[1].cost)
 
@@ -49,22 +41,24 @@ class PlanInTicks(NamedTuple):
 
     movements: tuple[Movement, ...]
     execution: Execution
-    plan: Plan
+    plan: PathPlan
     """The plan that was rounded."""
+    solves: int
+    failed: int
 
 
 def check_ticks(model: MotionModel) -> None:
     """MethodError for a motion model whose ticks the rounding does not know."""
-    if (model.arrival_tick, model.whole_last_step) != (1, False):
-        raise MethodError("infeasible", "proof and rounding need a tick for each arrival "
-                          "and a last step that ends at the target")  # fmt: skip
+    if model.whole_last_step:
+        needed = "proof and rounding need a last step that ends at the target"
+        raise MethodError("infeasible", needed)
 
 
 def shortest_plans(
     session: Session,
     task: Task,
     problem: TrajectoryProblem,
-    starts: Iterable[Start],
+    starts: Iterable[Chain],
     *,
     still: bool,
     radius: float,
@@ -75,7 +69,7 @@ def shortest_plans(
     Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
     penalised problem. Raises MethodError where no solve finds a path.
     """
-    best: dict[Hands, tuple[Instance, Plan]] = {}
+    best: dict[HandSequence, tuple[Instance, PathPlan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
@@ -120,10 +114,8 @@ def fewest_ticks(
                 planned = movements(session, task, instance, rounded.configurations, rounded.steps)
                 execution = execute(task, planned, model=session.model)
                 session.spend(forward_kinematics=execution.evaluations)
-                if execution.completed and (
-                    fewest is None or price(execution) < price(fewest.execution)
-                ):
-                    fewest = PlanInTicks(planned, execution, shortest)
+                if execution.completed and (fewest is None or fewer(execution, fewest.execution)):
+                    fewest = PlanInTicks(planned, execution, shortest, plans.solves, plans.failed)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
     if fewest is None:
@@ -131,6 +123,6 @@ def fewest_ticks(
     return fewest
 
 
-def price(execution: Execution) -> tuple[int, int]:
-    """Ticks, and of as many ticks the corrections."""
-    return execution.ticks, execution.corrections
+def fewer(one: Execution, other: Execution) -> bool:
+    """Whether one takes fewer ticks than the other, or as many and fewer corrections."""
+    return (one.ticks, one.corrections) < (other.ticks, other.corrections)

@@ -17,11 +17,12 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import cheapest_chains
+from coartic.baselines.posture_graph import BEAM_WIDTH, HandSequence, cheapest_chains
 from coartic.baselines.trajectory_problem import (
+    MODEL_BASED,
     Cost,
     Instance,
-    Plan,
+    PathPlan,
     TrajectoryProblem,
     spline,
     trajectory_problem,
@@ -29,33 +30,19 @@ from coartic.baselines.trajectory_problem import (
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.movement import follow
-from coartic.robot import Array, Hand
-from coartic.tasks.task import hands_of, letters_of
+from coartic.robot import Array
+from coartic.tasks.task import letters_of
 
 _REST = 1e-6  # rates below this are none: IPOPT fixes a variable whose bounds are equal
 SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
 
 
-PLANNER = frozenset(
-    {
-        Information.GOALS,
-        Information.FORWARD_KINEMATICS,
-        Information.JACOBIAN,
-        Information.KINEMATIC_MODEL,
-    }
-)
-"""What every plan is told, beside its cost."""
-
-
 class TrajectoryParameters(Parameters):
-    """What is planned over, and how it is started."""
+    """The hand sequences that are planned, and the starts of each."""
 
-    hands: Annotated[str, Field(pattern="^(every|given|[LR]+)$")] = "every"
-    """Every hand sequence; the one that the task names; or one such as ``LRLR``."""
-    most_sequences: Annotated[int, Field(ge=1)] = 64
-    """Hand sequences of ``every`` that are planned for: all where there are no more, with two
-    hands up to six goals; else those that a beam of this width over the goals ends
-    with in some graph."""
+    most_sequences: Annotated[int, Field(ge=1)] = BEAM_WIDTH
+    """Hand sequences that are planned for: all where there are no more, with two hands up to six
+    goals; else those that a beam of this width over the goals ends with in some graph."""
     other_arm: Literal["free", "still"] = "free"
     nodes: Annotated[int, Field(ge=10, le=1000)] = 150
     """Postures per goal and hand in a graph."""
@@ -68,7 +55,6 @@ class TrajectoryParameters(Parameters):
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first. With
     equal times jerk has many local minima, and on the two-armed tasks with the other arm
     still cheaper plans than these starts lead to were seen, on paths as long."""
-    sampling_seed: Annotated[int, Field(ge=0)] = 0
 
 
 class PathLengthParameters(TrajectoryParameters):
@@ -86,11 +72,11 @@ class SmoothParameters(TrajectoryParameters):
     """Times at which the goals are hit: free at a constant total, or equal intervals."""
     stop: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     """From passing through a goal (0) to a full stop at it (1): velocities there, for jerk
-    accelerations too, are at most 1 - ``stop`` of what they are in the cheapest plan of the
+    accelerations too, are at most 1 - ``stop`` of those in the cheapest plan of the
     same hands that passes through, joint by joint. The model is kinematic. Its plans have no
     torques, inertia, delays, feedback or limit of speed, its score counts steps along the
     path whatever their times, and it cannot say when a person stops, or why: a stop here is
-    given, and shows only what is left to a plan that makes it."""
+    given, and shows only the effect on a plan that makes it."""
     stop_every: Annotated[int, Field(ge=1)] = 1
     """The plan stops at each goal whose number is a multiple of this; it passes the others."""
 
@@ -103,7 +89,7 @@ def cheapest_plan(
     *,
     free_times: bool = False,
     most_rates: Array | None = None,
-) -> Plan:
+) -> PathPlan:
     """The cheapest plan that starts lead to; where none converges the last one.
 
     ``free_times`` and ``most_rates`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
@@ -124,31 +110,15 @@ class TrajectoryOptimisation(Method):
     cost: ClassVar[Cost]
     stochastic = False
     Parameters = TrajectoryParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "hands": "given"}
-
-    def why_not(self, task: Task) -> str | None:
-        """A sequence that does not fit the task."""
-        hands = self.parameters.hands
-        if hands == "given" and task.initial_is_policy:
-            return f"task {task.name!r} names no hand sequence but {task.initial_hands!r}"
-        if hands not in ("given", "every") and (
-            len(hands) != len(task.goals) or not set(hands_of(hands)) <= set(task.hands)
-        ):
-            return f"hands {hands!r} do not fit task {task.name!r}"
-        return None
+    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
         """Plan every sequence, keep the cheapest, hand over its movements."""
-        parameters: TrajectoryParameters = self.parameters
         task = session.hand_over(*self.told - {Information.SECONDARY_OBJECTIVES})
-        only: tuple[Hand, ...] | None = None
-        if parameters.hands != "every":
-            named = parameters.hands == "given"
-            only = hands_of(task.initial_hands if named else parameters.hands)
         with session.building():
             self.problem(task)
         with session.solving():
-            plans, failed = self.plans(session, task, only)
+            plans, failed = self.plans(session, task)
             if not plans:
                 raise MethodError(
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
@@ -168,11 +138,11 @@ class TrajectoryOptimisation(Method):
         return trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
 
     def plans(
-        self, session: Session, task: Task, only: tuple[Hand, ...] | None
-    ) -> tuple[list[tuple[Instance, Plan]], dict[str, str]]:
+        self, session: Session, task: Task
+    ) -> tuple[list[tuple[Instance, PathPlan]], dict[str, str]]:
         """The plan of each hand sequence, and the reason of each that has none."""
         plans, failed = [], {}
-        for hands, starts in self.starts(session, task, only).items():
+        for hands, starts in self.starts(session, task).items():
             instance = Instance.of(
                 task,
                 hands,
@@ -188,22 +158,19 @@ class TrajectoryOptimisation(Method):
 
     def cheapest(
         self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
-    ) -> Plan:
+    ) -> PathPlan:
         """The cheapest plan that starts lead to; where none converges the last one."""
         return cheapest_plan(session, problem, instance, starts)
 
-    def starts(
-        self, session: Session, task: Task, only: tuple[Hand, ...] | None
-    ) -> dict[tuple[Hand, ...], list[Array]]:
-        """Starts for every hand sequence, or for ``only`` one.
+    def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
+        """Starts for every hand sequence.
 
         The cheapest chain of each graph; with the other arm free also the chain with that arm
-        spread out; noise on the first. Raises MethodError where a goal has no posture.
+        in steady motion; noise on the first. Raises MethodError if a goal has no posture.
         """
         parameters: TrajectoryParameters = self.parameters
-        rng = np.random.default_rng(parameters.sampling_seed)
-        starts: dict[tuple[Hand, ...], list[Array]] = {}
-        for hands, configurations in cheapest_chains(
+        rng = np.random.default_rng(0)  # the same starts for all seeds
+        chains = cheapest_chains(
             session,
             task,
             rng,
@@ -212,8 +179,9 @@ class TrajectoryOptimisation(Method):
             chains=parameters.chains,
             most=parameters.most_sequences,
             spread=parameters.other_arm == "free",
-            only=only,
-        ):
+        )
+        starts: dict[HandSequence, list[Array]] = {}
+        for hands, configurations in chains:
             starts.setdefault(hands, []).append(configurations)
         for starts_of_hands in starts.values():
             first = starts_of_hands[0]
@@ -227,9 +195,9 @@ class TrajectoryOptimisation(Method):
         return task.radius - session.model.arrival_tolerance
 
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: Plan
+        self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         return movements(session, task, instance, plan.configurations)
 
 
@@ -242,7 +210,7 @@ class PathLength(TrajectoryOptimisation):
         "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
         "Journal of Guidance, Control, and Dynamics."
     )
-    told = PLANNER | {Information.REWARD_FORMULA}
+    told = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
     Parameters = PathLengthParameters
 
@@ -253,9 +221,9 @@ class PathLength(TrajectoryOptimisation):
         return super().target_radius(session, task)
 
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: Plan
+        self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         if not self.parameters.whole_ticks:
             return super().movements_of(session, task, instance, plan)
         problem = self.problem(task)
@@ -280,7 +248,7 @@ class SquaredChanges(TrajectoryOptimisation):
         "Psychology; M. I. Jordan (1986). Serial order: a parallel distributed processing "
         "approach."
     )
-    told = PLANNER | {Information.SECONDARY_OBJECTIVES}
+    told = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
     secondary = ("sum of squared configuration changes",)
     cost = "squared-changes"
 
@@ -294,14 +262,14 @@ class Acceleration(TrajectoryOptimisation):
         "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
         "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
     )
-    told = PLANNER | {Information.SECONDARY_OBJECTIVES}
+    told = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
     secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
 
     def cheapest(
         self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
-    ) -> Plan:
+    ) -> PathPlan:
         """The cheapest plan that passes the goals or, with stops, that one with its stops.
 
         A plan with stops starts from the plan that passes and from every other start.
@@ -318,9 +286,9 @@ class Acceleration(TrajectoryOptimisation):
         )
 
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: Plan
+        self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session spends what they take."""
+        """The movements of a plan; the session counts the effort."""
         return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
 
 
@@ -371,6 +339,6 @@ def path_movements(
         paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
         steps = np.diff(np.vstack([here, ahead]), axis=0)
         ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
-        steps_made = followed.ticks - session.model.arrival_tick
+        steps_made = followed.ticks - 1
         here, rest = followed.q, ahead[ends > steps_made * session.model.step]
     return tuple(paths)

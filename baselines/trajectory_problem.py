@@ -1,9 +1,25 @@
 """The trajectory problem: one configuration per goal, its hand inside the goal's disc.
 
-One nonlinear programme per robot, number of goals and cost, compiled once. The start, the
-goals and the hand sequence are its parameters; whatever a task or a restriction holds
-still (a locked base, the arm that is not chosen) is a variable bound, so a single solver
-serves every hand sequence of a task. Solved by IPOPT (Wächter & Biegler 2006) with exact
+With the changes Δ_g of the configurations from goal to goal, q_g = q_0 + Δ_1 + ... + Δ_g, and the
+position p of the chosen hand h_g, the nonlinear programme is::
+
+    min   f(Δ, ...)
+    s.t.  |p_{h_g}(q_g) - c_g|² <= r²        the hand is in the disc of goal g
+          Δ_gj = 0                           for joints j that are held on the way to goal g
+
+where f is one of the costs
+
+    path length        Σ_g l_g  with  |W Δ_g|² <= l_g²,  W the costs of the joints
+    squared changes    Σ_g |Δ_g|²
+    acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
+    jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
+
+The integrals are written out in the rates at the goals (:func:`segment_cost`), which are variables
+beside Δ. A penalty adds terms to the path length (:class:`PenaltyTerms`).
+
+One programme per robot, number of goals and cost is compiled once. The start, the goals and the
+hand sequence are its parameters. A locked base or an arm that is held is a variable bound, so that
+one solver serves every hand sequence of a task. Solved by IPOPT (Wächter & Biegler 2006) with exact
 derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe:
 parallelise over processes.
 """
@@ -21,27 +37,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
+from coartic.method import Information
 from coartic.model import PAPER
 from coartic.motion.costs import joint_costs as costs_of
 from coartic.motion.penalty import disc_centre
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Penalty, Task
 
+MODEL_BASED = frozenset(
+    {
+        Information.GOALS,
+        Information.FORWARD_KINEMATICS,
+        Information.JACOBIAN,
+        Information.KINEMATIC_MODEL,
+    }
+)
+"""Information of a planner with a model of the kinematics, besides its cost."""
+
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
 
-_FARTHEST = 1e3  # length unit and rad: beyond any way of costly joints
+_LONGEST_WAY = 1e3  # length unit and rad: beyond any way of costly joints
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
 # goals at once. Acceleration on two-armed-2 gets -322, -317, -315, -314 with 0.1, 0.05, 0.02,
 # 0.01; jerk gets -352 with any, and below 0.05 fails to converge for many hand sequences.
 _SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05}
-_DERIVATIVES: dict[Cost, int] = {
-    "path-length": 0,
-    "squared-changes": 0,
-    "acceleration": 1,
-    "jerk": 2,
-}
-_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_RATES: dict[Cost, int] = {"acceleration": 1, "jerk": 2}  # derivatives that are variables
+_SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
@@ -58,9 +80,13 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
+Bounds = tuple[Array, Array, Array]
+"""A start of some variables, with their least and most values."""
+
+
 @dataclass(frozen=True)
 class Instance:
-    """What one solve is about: a task, a hand per goal, a restriction."""
+    """The parameters and bounds of one solve: a task, a hand per goal, a restriction."""
 
     q0: Array
     goals: Array
@@ -75,7 +101,7 @@ class Instance:
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
         """The instance of a task; ``still`` holds the arm that is not chosen."""
         held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
-        held[:, [{"x": 0, "y": 1}[axis] for axis in task.locked_base]] = True
+        held[:, ["xy".index(axis) for axis in task.locked_base]] = True
         for goal, hand in enumerate(hands):
             for other in HANDS:
                 if other != hand and (still or other not in task.hands):
@@ -84,12 +110,12 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What a solve came to."""
+class PathPlan:
+    """The outcome of a solve."""
 
     converged: bool
     reason: str
-    """IPOPT's word."""
+    """IPOPT's return status."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
@@ -126,7 +152,7 @@ class TrajectoryProblem:
         self.robot, self.goals, self.cost = robot, goals, cost
         self._penalised = penalised
         self._joint_costs = 1.0 if joint_costs is None else np.array(joint_costs)
-        self._order = _DERIVATIVES[cost]
+        self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
         lengths = casadi.SX.sym("lengths", goals)
@@ -193,45 +219,45 @@ class TrajectoryProblem:
         most_rates: Array | None = None,
         deep: Sequence[int] | None = None,
         penalty: Penalty | None = None,
-    ) -> Plan:
+    ) -> PathPlan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
 
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
         segments' durations vary at a constant total (smoothness costs only). No rate exceeds
-        ``most_rates``, shape as :attr:`Plan.rates`, in size. ``penalty`` is that of a penalised
+        ``most_rates``, shape as :attr:`PathPlan.rates`, in size. ``penalty`` is that of a penalised
         problem. A solve that fails is a plan that has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
-        step_bound = np.where(instance.held, 0.0, np.inf).ravel()
-        rate_bound = self.rate_bound(instance, most_rates)
-        first_lengths, low, high = self.length_bounds(steps, lengths)
-        times, shortest, longest = self.time_bounds(steps, free_times)
+        at, of_penalty = self.penalty_bounds(instance, steps, penalty)
+        free = np.where(instance.held, 0.0, np.inf).ravel()
+        rates = self.rate_bound(instance, most_rates)
         rim = instance.radius - _RIM
+        deepest = 0.0 if deep is None else rim
+        # A start, a least and a most value of each variable, in the order of the programme's.
+        blocks = [
+            (steps.ravel(), -free, free),
+            self.length_bounds(steps, lengths),
+            self.time_bounds(steps, free_times),
+            (np.zeros(1), np.zeros(1), np.full(1, deepest)),
+            (np.zeros(rates.size), -rates, rates),
+            at,
+        ]
+        first, least, most = (np.concatenate(column) for column in zip(*blocks, strict=True))
         chosen = np.zeros(self.goals)
         chosen[[] if deep is None else list(deep)] = 1.0
-        deepest = 0.0 if deep is None else rim
-        paid, least_paid, most_paid, of_penalty = self.penalty_bounds(instance, steps, penalty)
+        right = [float(hand == "right") for hand in instance.hands]
+        weights = [1.0, 0.0] if deep is None else [0.0, 1.0]
         solution = self._solver(
-            x0=np.concatenate(
-                [steps.ravel(), first_lengths, times, [0.0], np.zeros(rate_bound.size), paid]
-            ),
-            lbx=np.concatenate([-step_bound, low, shortest, [0.0], -rate_bound, least_paid]),
-            ubx=np.concatenate([step_bound, high, longest, [deepest], rate_bound, most_paid]),
+            x0=first,
+            lbx=least,
+            ubx=most,
             lbg=self._lower,
             ubg=self._upper,
             p=np.concatenate(
-                [
-                    instance.q0,
-                    instance.goals.ravel(),
-                    [float(hand == "right") for hand in instance.hands],
-                    [rim],
-                    chosen,
-                    [1.0, 0.0] if deep is None else [0.0, 1.0],
-                    of_penalty,
-                ]
+                [instance.q0, instance.goals.ravel(), right, [rim], chosen, weights, of_penalty]
             ),
         )
         return self.plan_from(instance, solution)
@@ -244,10 +270,10 @@ class TrajectoryProblem:
         bound = np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
         return bound if most_rates is None else np.minimum(bound, most_rates.ravel())
 
-    def length_bounds(self, steps: Array, lengths: Array | None) -> tuple[Array, Array, Array]:
-        """Lengths of the segments to start from, with their least and most."""
+    def length_bounds(self, steps: Array, lengths: Array | None) -> Bounds:
+        """Lengths of the segments."""
         if self.cost != "path-length":
-            return np.zeros(self.goals), np.zeros(self.goals), np.zeros(self.goals)
+            return (np.zeros(self.goals),) * 3
         at = np.sqrt(((steps * self._joint_costs) ** 2).sum(axis=1))
         low, high = np.zeros(self.goals), np.full(self.goals, np.inf)
         if lengths is not None:
@@ -255,11 +281,11 @@ class TrajectoryProblem:
             at[given] = low[given] = high[given] = lengths[given]
         return at, low, high
 
-    def time_bounds(self, steps: Array, free: bool) -> tuple[Array, Array, Array]:
-        """Durations of the segments to start from, with their least and most."""
+    def time_bounds(self, steps: Array, free: bool) -> Bounds:
+        """Durations of the segments."""
         goals = self.goals
         if not (free and self._order):
-            return np.ones(goals), np.ones(goals), np.ones(goals)
+            return (np.ones(goals),) * 3
         times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
         times = np.maximum(times * (goals / times.sum()), 0.1)
         times *= goals / times.sum()
@@ -267,35 +293,36 @@ class TrajectoryProblem:
 
     def penalty_bounds(
         self, instance: Instance, steps: Array, penalty: Penalty | None
-    ) -> tuple[Array, Array, Array, Array]:
-        """What is paid of a penalty to start from, with its least and most; its parameters.
+    ) -> tuple[Bounds, Array]:
+        """The part of each term of a penalty that is paid, and the penalty's parameters.
 
-        Of a term without weight it is held where it limits nothing.
+        A term without weight is held where it limits nothing.
         """
         if not self._penalised:
-            return (np.zeros(0),) * 4
+            return (np.zeros(0),) * 3, np.zeros(0)
         assert penalty is not None
         weights = np.array([penalty.joints, penalty.region, penalty.distinct])
         costly = costs_of(self.robot, penalty.costly, 2.0) > 1.0
-        most = np.tile([_FARTHEST, 1.0, 1.0], (self.goals, 1))
+        most = np.tile([_LONGEST_WAY, 1.0, 1.0], (self.goals, 1))
         least = np.where(weights > 0.0, 0.0, most)
         paid = most.copy()
         if weights[0] > 0.0:
             paid[:, 0] = np.sqrt(((steps * costly) ** 2).sum(axis=1))
         centre = disc_centre([(x, y) for x, y in instance.goals.tolist()], penalty)
         parameters = [*(weights * PAPER.step), *centre, penalty.radius, penalty.apart, *costly]
-        return paid.ravel(), least.ravel(), most.ravel(), np.array(parameters, dtype=np.float64)
+        bounds = paid.ravel(), least.ravel(), most.ravel()
+        return bounds, np.array(parameters, dtype=np.float64)
 
-    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> Plan:
-        """What IPOPT gave; its word is checked: every limit it was given holds."""
+    def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
+        """The plan of a solution; it has converged only if every constraint holds as well."""
         goals, dof = self.goals, self.robot.dof
         x = np.asarray(solution["x"]).ravel()
         limits = np.asarray(solution["g"]).ravel()
         statistics = self._solver.stats()
         end = goals * dof
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
-        return Plan(
-            converged=statistics["return_status"] in _CONVERGED
+        return PathPlan(
+            converged=statistics["return_status"] in _SOLVED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
             configurations=instance.q0 + np.cumsum(x[:end].reshape(goals, dof), axis=0),
@@ -316,7 +343,7 @@ class TrajectoryProblem:
 
 @dataclass(frozen=True)
 class PenaltyTerms:
-    """The terms of a penalty in the programme: smooth limits of what is paid of each.
+    """The terms of a penalty in the programme: smooth constraints of the part that is paid of each.
 
     A way u of costly joints is at least their distance; a share r of the costly disc is so large
     that no elbow is farther inside than R (1 - r) from its centre lets it; a share a of likeness so
@@ -341,13 +368,13 @@ class PenaltyTerms:
         return cls(**{name: casadi.SX.sym(name, *shape) for name, shape in shapes.items()})
 
     def cost(self) -> Any:
-        """What is paid in all."""
+        """The sum that is paid."""
         return casadi.sum1(casadi.sum2(self.shares) * self.weights)
 
     def limits(
         self, g: int, q: Any, step: Any, right: Any, robot: Robot, hands: tuple[Hand, ...]
     ) -> list[Any]:
-        """What has to be at most 0 at goal ``g``, which is hit in ``q`` after ``step``."""
+        """Expressions that are at most 0 at goal ``g``, which is hit in ``q`` after ``step``."""
         way, share, alike = (self.shares[k, g] for k in range(3))
         limits = [casadi.sumsqr(self.costly * step) - way**2]
         for hand in hands:
@@ -405,7 +432,7 @@ def trajectory_problem(
     return TrajectoryProblem(robot, hands, goals, cost, joint_costs, penalised=penalised)
 
 
-def spline(plan: Plan, q0: Array, samples: int) -> list[Array]:
+def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:
     """Configurations along a smooth plan, one piece ``(samples, dof)`` per goal.
 
     Hermite cubics (one rate) or quintics (two) between start and goals.

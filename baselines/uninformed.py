@@ -1,7 +1,7 @@
 """The learner's trials for methods that see nothing of them but the total reward.
 
 As in the learner, a trial moves towards one target configuration per goal, the
-corrective process **A** finishes what that misses, and the configurations in which the
+corrective process **A** corrects the goals that are missed, and the configurations in which the
 goals were hit are known afterwards.
 """
 
@@ -23,7 +23,7 @@ from coartic.robot import Array
 
 
 class UninformedParameters(Parameters):
-    """What the uninformed methods have in common; the defaults are the learner's."""
+    """Parameters of all uninformed methods; the defaults are the learner's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05

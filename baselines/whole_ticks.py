@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coartic import Movement, Task
-from coartic.baselines.trajectory_problem import Instance, Plan, TrajectoryProblem
+from coartic.baselines.trajectory_problem import Instance, PathPlan, TrajectoryProblem
 from coartic.method import Session
 from coartic.motion.movement import move
 from coartic.robot import Array, Hand
@@ -39,12 +39,12 @@ class TickPlan:
 
     @property
     def ticks(self) -> int:
-        """What it costs: a movement of k steps takes k + 1 ticks, none takes none."""
+        """Number of ticks: k + 1 for a movement of k steps, 0 for none."""
         return sum(steps + 1 for steps in self.steps if steps)
 
 
 class Rounding:
-    """Rounds plans of one problem and instance; the session spends what the solver takes.
+    """Rounds plans of one problem and instance; the session counts the solver's effort.
 
     ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
     """
@@ -53,16 +53,16 @@ class Rounding:
         self._session, self._problem, self._instance = session, problem, instance
         self._step = session.model.step
 
-    def nearest(self, plan: Plan) -> TickPlan | None:
+    def nearest(self, plan: PathPlan) -> TickPlan | None:
         """Every segment but the last rounded to the nearest step, the last one up.
 
         At a shortest path the total does not change with the division to first order, so
         this is nearly always the least number of ticks. None where a solve fails.
         """
         exact = plan.lengths(self._instance.q0)[:-1] / self._step
-        return self.divided(plan, [round(length) for length in exact], ())
+        return self.divide(plan, [round(length) for length in exact], ())
 
-    def every(self, plan: Plan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
+    def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Roundings up and down of all but the last segment, the nearest first.
 
         All of them with up to seven goals, else the nearest ``MOST_ROUNDINGS``.
@@ -74,19 +74,19 @@ class Rounding:
             key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
         )
         for steps in ranked[:MOST_ROUNDINGS]:
-            rounded = self.divided(plan, list(steps), merged)
+            rounded = self.divide(plan, list(steps), merged)
             if rounded is not None:
                 yield rounded
 
-    def least(self, plan: Plan, merged: tuple[int, ...] = ()) -> int:
-        """Ticks that no rounding of a plan as long as this one can go below."""
+    def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
+        """Least number of ticks of any rounding of a plan as long as this one."""
         length = float(plan.lengths(self._instance.q0).sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
 
     def plans(
-        self, plan: Plan, task: Task, worth: Callable[[int], bool]
-    ) -> Iterator[tuple[tuple[int, ...], Plan]]:
+        self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
+    ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """The plan itself, and shortest plans in which some goals are hit as their turn comes.
 
         Worth it where the path grows by less than the ticks it saves. It only grows with
@@ -95,7 +95,7 @@ class Rounding:
         """
         goals = len(self._instance.hands)
         able = mergeable(task, self._instance.hands)
-        waiting: deque[tuple[tuple[int, ...], Plan]] = deque([((), plan)])
+        waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
         while waiting:
             merged, shortest = waiting.popleft()
             yield merged, shortest
@@ -108,7 +108,7 @@ class Rounding:
                 if merger.converged:
                     waiting.append((more, merger))
 
-    def divided(self, plan: Plan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
+    def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
         """The plan with these steps to all goals but the last, and as few as can be to that."""
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
@@ -133,7 +133,7 @@ class Rounding:
         merged: tuple[int, ...],
         *,
         deep: Sequence[int] | None = None,
-    ) -> Plan:
+    ) -> PathPlan:
         """The shortest plan near another one, with these lengths and mergers."""
         instance = self._instance
         if merged:
@@ -177,7 +177,7 @@ def movements(
     Joints that are held on the way to a goal stay where they are, also where an earlier
     movement hit before it was where the plan has it. With ``steps``, each movement aims
     through the rim to hit after so many; where no target beyond does, it aims at the plan's
-    own configuration. The session spends what that takes.
+    own configuration. The session counts the effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

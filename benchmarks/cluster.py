@@ -6,16 +6,18 @@ import logging
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.provenance import environment
-from coartic.benchmarks.registry import current_code, error_line
-from coartic.benchmarks.worker import Answer, Job, failed
+from coartic.benchmarks.provenance import current_environment
+from coartic.benchmarks.registry import current_code
+from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.errors import CoarticError
+from coartic.text import error_line
 
 WORKERS_S = 600.0  # that runs wait while no worker is connected
-_LOOK_S = 0.05  # between looks at what is done
+_PAUSE_S = 0.05  # between looks at what is done
 _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
@@ -24,10 +26,10 @@ class Dask:
 
     def __init__(self, address: str, *, say: Callable[[str], None] = print) -> None:
         self.address, self.say = address, say
-        self.workers = 1  # it may have any number: lots are as large as methods take them
+        self.workers = 1  # it may have any number: batches are as large as methods take them
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
-        """The number of each job with its answer, as they come; another worker takes over the
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The number of each job with its outcomes, as they come; another worker takes over the
         jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, or it
         has no workers of this version."""
         client = self._client()
@@ -36,23 +38,23 @@ class Dask:
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
             numbers = {future.key: number for number, future in enumerate(futures)}
-            answers = as_completed(futures, loop=client.loop)
-            while not answers.is_empty():
+            finished = as_completed(futures, loop=client.loop)
+            while not finished.is_empty():
                 self._wait_for_workers(client)
-                time.sleep(0.0 if answers.has_ready() else _LOOK_S)
-                for future in answers.next_batch(block=False):
+                time.sleep(0.0 if finished.has_ready() else _PAUSE_S)
+                for future in finished.next_batch(block=False):
                     number = numbers[future.key]
-                    yield number, self._answer(future, jobs[number])
+                    yield number, self._outcomes(future, jobs[number])
         finally:
             client.close(timeout=3)
 
-    def _answer(self, future: Any, job: Job) -> Any:
+    def _outcomes(self, future: Any, job: Job) -> Any:
         from distributed import CancelledError, KilledWorker
 
         try:
             return future.result()
         except KilledWorker:
-            return failed(job, "crashed", "every worker that tried this run died")
+            return fail(job, "crashed", "every worker that tried this run died")
         except (Exception, CancelledError) as error:
             raise error if isinstance(error, CoarticError) else self._lost(error) from None
 
@@ -64,7 +66,7 @@ class Dask:
             return Client(self.address, set_as_default=False)
         except ImportError:
             raise CoarticError("a Dask cluster needs: pip install 'coartic[cluster]'") from None
-        except Exception as error:  # Dask's, of many kinds: who answers may be anybody
+        except Exception as error:  # Dask's, of many kinds: who finished may be anybody
             words = (
                 f"no Dask scheduler at {self.address} ({error_line(error)}). Give the address that "
             )
@@ -86,13 +88,13 @@ class Dask:
         return CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}")
 
 
-def _remote(job: Job) -> Answer:
+def _remote(job: Job) -> list[Outcome]:
     """Perform a job on a worker's machine, in a process that ends with its limit."""
-    here = current_code(job.where, job.method)
-    if here != job.code:
-        words = f"method {job.method!r} has code {here} on a Dask worker and {job.code} where the "
-        raise CoarticError(f"{words}suite was started; install the same version everywhere")
+    method = job.method
+    here = current_code(method.where, method.name)
+    if here != method.code:
+        words = f"method {method.name!r} has code {here} on a Dask worker and {method.code} where "
+        raise CoarticError(f"{words}the suite was started; install the same version everywhere")
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    ((_, answer),) = Local(1).perform([job])
-    answer.environment = environment()
-    return answer
+    ((_, outcomes),) = Local(1).perform([job])
+    return [replace(outcome, environment=current_environment()) for outcome in outcomes]

@@ -20,20 +20,20 @@ def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
     package, and the data files that it reads. Raises OSError or SyntaxError."""
     root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
     within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
-    model, files, waiting = model_essences(), dict[Path, None](), [method]
+    model, files, waiting = model_texts(), dict[Path, None](), [method]
     while waiting:
         if (path := waiting.pop()) not in files and path not in model:
             files[path] = None
             waiting += [file for file in imported_files(path, root) if within in file.parents]
-    texts = [*model.values(), *map(essence, sorted(files, key=lambda path: path.name))]
+    texts = [*model.values(), *map(code_text, sorted(files, key=lambda path: path.name))]
     content = [text.encode() for text in texts] + [path.read_bytes() for path in data]
     return hashlib.sha256(b"".join(content)).hexdigest()[:12]
 
 
 @cache
-def model_essences() -> dict[Path, str]:
+def model_texts() -> dict[Path, str]:
     """What counts of the model, and of the worker that hands it to methods, file by file."""
-    return {p: essence(p) for p in [*model_files(), Path(__file__).with_name("worker.py")]}
+    return {p: code_text(p) for p in [*model_files(), Path(__file__).with_name("worker.py")]}
 
 
 def imported_files(path: Path, root: Path) -> Iterator[Path]:
@@ -46,7 +46,7 @@ def imported_files(path: Path, root: Path) -> Iterator[Path]:
             yield from filter(Path.is_file, (place.with_suffix(".py"), place / "__init__.py"))
 
 
-def essence(path: Path) -> str:
+def code_text(path: Path) -> str:
     """What counts of a module: its syntax tree without docstrings and ``__version__``."""
     return syntax(path.read_bytes())[0]
 

@@ -21,12 +21,15 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.benchmarks.registry import Entry, Registry
-from coartic.benchmarks.reproduce import differences, performed
-from coartic.benchmarks.worker import Job, job_of
+from coartic.benchmarks.registry import Registry
+from coartic.benchmarks.reproduce import compare_runs, perform_in_order
+from coartic.benchmarks.worker import Job
 from coartic.method import METERED
-from coartic.runs.store import Run
-from coartic.tasks.task import checked_task
+from coartic.model import PAPER
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import RunKey, Setting
+from coartic.runs.run import Run
+from coartic.tasks.task import check_task
 from coartic.text import counted
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
@@ -48,19 +51,20 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
     return Law(name, problem is None, problem or finding)
 
 
-def check_method(entry: Entry, tasks: Sequence[Task] | None = None) -> list[Law]:
+def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[Law]:
     """Every law of a method, in order, on the shipped tasks or on others."""
-    trials = {"trials": CHECK_TRIALS} if "trials" in entry.defaults else {}
-    parameters = trials | dict(entry.method.quick)
+    trials = {"trials": CHECK_TRIALS} if "trials" in card.defaults else {}
+    parameters = trials | dict(card.load().quick)
 
     def applies(task: Task) -> bool:
-        return entry.why_not(task, parameters) is None
+        return card.why_not(task, parameters) is None
 
-    def job(task: Task, seed: int = 1, **how: Any) -> Job:
-        content, complete = task.model_dump(mode="json"), entry.complete(parameters)
-        return job_of(entry, content, complete, (seed,), time_limit_s=CHECK_LIMIT_S, **how)
+    def job(task: Task, seed: int = 1, trial_budget: int | None = None) -> Job:
+        complete = card.complete(parameters)
+        setting = Setting(task, card.name, card.code, card.told, complete, PAPER, trial_budget)
+        return Job(setting, card, (RunKey("check", 0, 0, seed),), CHECK_LIMIT_S)
 
-    laws = [declaration(entry), keeps_parameters(entry)]
+    laws = [declaration_law(card), parameters_law(card)]
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
     if not tasks:
         problem = "it applies to none of the shipped tasks, so nothing can be checked"
@@ -68,16 +72,16 @@ def check_method(entry: Entry, tasks: Sequence[Task] | None = None) -> list[Law]
     hopeless = list(filter(applies, [hopeless_task(tasks[0])]))
     jobs, others = [job(task) for task in tasks], [job(task, seed=2) for task in tasks]
     bounded = [job(task, trial_budget=BUDGET) for task in tasks]
-    last = [job(task, within_reach=False) for task in hopeless]
-    runs = performed([*jobs, *jobs, *others, *jobs, *bounded, *last], [*tasks * 5, *hopeless])
+    last = [job(task) for task in hopeless]
+    runs = perform_in_order([*jobs, *jobs, *others, *jobs, *bounded, *last])
     names = [task.name for task in tasks]
     first, again, other, after, budget = (dict(zip(names, runs, strict=False)) for _ in range(5))
     ends = list(runs)
-    elsewhere = dict(zip(names[-1:], performed(jobs[-1:], tasks[-1:]), strict=True))
-    seed_matters = entry.method.stochastic
+    elsewhere = dict(zip(names[-1:], perform_in_order(jobs[-1:]), strict=True))
+    seed_matters = card.stochastic
     return [
         *laws,
-        solution(first, parameters),
+        solution_law(first, parameters),
         law(
             "determinism",
             chain(
@@ -97,79 +101,76 @@ def check_method(entry: Entry, tasks: Sequence[Task] | None = None) -> list[Law]
             changes(first, after, "after other runs, {} with the same seed"),
             "other runs in between change nothing",
         ),
-        limits(budget),
-        information(entry, first),
-        failure(ends),
+        budget_law(budget),
+        information_law(card, first),
+        failure_law(ends),
     ]
 
 
 def changes(before: dict[str, Run], runs: dict[str, Run], how: str) -> Iterator[str]:
     """In what runs, by task, differ from earlier ones."""
     for task, run in runs.items():
-        for difference in differences(before[task], run):
+        for difference in compare_runs(before[task], run):
             yield f"{how.format(task)}: {difference}"
 
 
-def declaration(entry: Entry) -> Law:
+def declaration_law(card: MethodCard) -> Law:
     """It says what it is."""
-    method = entry.method
-    empty = [name for name in ("title", "citation") if not getattr(method, name).strip()]
-    finding = f"{method.title}; told: {', '.join(entry.told) or 'nothing'}"
+    empty = [name for name in ("title", "citation") if not getattr(card, name).strip()]
+    finding = f"{card.title}; told: {', '.join(card.told) or 'nothing'}"
     return law("declaration", (f"{name} is empty" for name in empty), finding)
 
 
-def keeps_parameters(entry: Entry) -> Law:
+def parameters_law(card: MethodCard) -> Law:
     """Its parameters survive JSON, are checked and cannot be changed."""
-    parameters = entry.complete({})
+    parameters = card.complete({})
 
     def problems() -> Iterator[str]:
-        again = entry.complete(parameters)
+        again = card.complete(parameters)
         if again != parameters:
             yield f"written as JSON and read back, they change: {parameters} became {again}"
-        config = entry.method.Parameters.model_config
+        config = card.load().Parameters.model_config
         if config.get("extra") != "forbid":
             yield "an unknown parameter is accepted; forbid extra keys"
         if config.get("frozen") is not True:
             yield "they can be changed after validation; freeze them"
 
-    return law("parameters", problems(), in_words(parameters) or "none")
+    return law("parameters", problems(), list_values(parameters) or "none")
 
 
-def in_words(parameters: dict[str, Any]) -> str:
+def list_values(parameters: dict[str, Any]) -> str:
     """Parameters with their values."""
     return ", ".join(f"{key}={value}" for key, value in parameters.items())
 
 
-def solution(runs: dict[str, Run], parameters: dict[str, Any]) -> Law:
+def solution_law(runs: dict[str, Run], parameters: dict[str, Any]) -> Law:
     """Its solutions can be executed and hit every goal."""
     problems = (
-        f"on {task}: {run.status}: {run.row['reason']}"
-        for task, run in runs.items()
-        if run.status != "ok"
+        f"on {task}: {run.status}: {run.reason}" for task, run in runs.items() if run.status != "ok"
     )
-    rewards = ", ".join(f"{task} {run.row['reward']}" for task, run in runs.items())
-    checked_with = f" (checked with {in_words(parameters)})" if parameters else ""
+    rewards = ", ".join(f"{task} {run.reward}" for task, run in runs.items())
+    checked_with = f" (checked with {list_values(parameters)})" if parameters else ""
     return law("solution", problems, f"executed and scored on {rewards}{checked_with}")
 
 
-def limits(runs: dict[str, Run]) -> Law:
+def budget_law(runs: dict[str, Run]) -> Law:
     """It keeps to its budget of trials."""
     problems = (
-        f"a budget of {BUDGET} trials on {task}: {run.row['reason'] or run.row['trials']}"
+        f"a budget of {BUDGET} trials on {task}: {run.reason or (run.meter and run.meter.trials)}"
         for task, run in runs.items()
-        if run.status not in ("ok", "infeasible") or (run.row["trials"] or 0) > BUDGET
+        if run.status not in ("ok", "infeasible") or (run.meter and run.meter.trials > BUDGET)
     )
     return law("limits", problems, f"keeps to a budget of {BUDGET} trials")
 
 
-def information(entry: Entry, runs: dict[str, Run]) -> Law:
+def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
     """It uses what it declares, and nothing else."""
-    declared = {item.value for item in entry.method.told if item in METERED}
-    used = {name for run in runs.values() for name in run.row["used"].split(", ") if name}
+    declared = {item.value for item in METERED if item.value in card.told}
+    used = {name for run in runs.values() for name in run.used}
     problems = [
-        f"on {task}: {run.row['reason']}"
+        f"on {task}: {run.reason}"
         for task, run in runs.items()
-        if any(words in run.row["reason"] for words in ("does not declare", "own compiled"))
+        if any(words in run.reason for words in ("does not declare", "own compiled"))
     ]
     if declared - used:
         problems.append(f"declared but never used: {', '.join(sorted(declared - used))}")
@@ -178,17 +179,17 @@ def information(entry: Entry, runs: dict[str, Run]) -> Law:
     )
 
 
-def failure(runs: Sequence[Run]) -> Law:
+def failure_law(runs: Sequence[Run]) -> Law:
     """It says so where a task cannot be completed."""
     problems = (
-        f"on a task that nobody can complete it gives {run.status} {run.row['reason']}; it should "
+        f"on a task that nobody can complete it gives {run.status} {run.reason}; it should "
         "give infeasible, with a reason"
         for run in runs
         if run.status not in ("infeasible", "solver-failed")
     )
     finding = "says beforehand that it does not apply to a task without a solution"
     for run in runs:
-        finding = f"a task that nobody can complete gives {run.status}: {run.row['reason']}"
+        finding = f"a task that nobody can complete gives {run.status}: {run.reason}"
     return law("failure", problems, finding)
 
 
@@ -220,7 +221,7 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
         if dist(goal, after) <= task.radius
     )
     unsourced = [key for key in ("goals", "start") if key not in task.provenance]
-    methods = [name for name, entry in registered.items() if entry.why_not(task) is None]
+    methods = [name for name, card in registered.items() if card.why_not(task) is None]
     return [
         Law("valid", True, f"{task.name}, {goals}, {' and '.join(task.hands)} hand"),
         law(
@@ -229,7 +230,7 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
             f"name {task.name!r} is its own",
         ),
         law("distinct goals", near, "successive goals lie apart"),
-        solvable(task),
+        solvable_law(task),
         law(
             "provenance",
             [f"no source and status for {' and '.join(unsourced)} ([provenance])"]
@@ -240,10 +241,10 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
     ]
 
 
-def solvable(task: Task) -> Law:
+def solvable_law(task: Task) -> Law:
     """The corrective process alone completes it."""
     try:
-        hands = initial_hands(checked_task(task))
+        hands = initial_hands(check_task(task))
     except (NotApplicableError, TaskError) as error:
         return Law("solvable", False, str(error))
     execution = corrective_trial(task, hands)

@@ -28,14 +28,14 @@ from typing import Any, Protocol
 
 from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.worker import Answer, Job, failed, learns, perform, prepare
+from coartic.benchmarks.worker import Job, Outcome, fail, learns, perform_job, prepare
 from coartic.errors import CoarticError
-from coartic.learner.learning import threads_for
-from coartic.text import plain
-from coartic.threads import begin_worker, one_thread_each
+from coartic.tasks.task import Task
+from coartic.text import error_line, plain
+from coartic.threads import begin_worker, one_thread_each, threads_for
 
-_LOOK_S = 1.0  # between looks at the pool
-_AHEAD = 2  # jobs a worker that wait for it
+_POLL_S = 1.0  # between looks at the pool
+_QUEUED = 2  # jobs a worker that wait for it
 _LEAST_MEMORY = 2**30  # bytes of a worker, four times what this project's take
 _LAST_WORDS = 3  # lines of what a worker that died has printed
 _COUNTS_CPU = hasattr(signal, "setitimer")
@@ -51,8 +51,8 @@ class Executor(Protocol):
         """How many at once."""
         ...
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
-        """The number of each job with its answer, as they come, in any order."""
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The number of each job with its outcomes, as they come, in any order."""
         ...
 
 
@@ -66,25 +66,25 @@ class Local:
         self.workers = threads_for(jobs)
         self.wall_times = wall_times
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Answer]]:
-        """The number of each job with its answer, as they come."""
+    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The number of each job with its outcomes, as they come."""
         numbered = sorted(enumerate(jobs), key=lambda pair: owner_of(pair[1]))
         for owner, jobs_of_owner in groupby(numbered, key=lambda pair: owner_of(pair[1])):
-            yield from self.perform_together(list(jobs_of_owner), foreign=bool(owner))
+            yield from self.perform_in_pool(list(jobs_of_owner), foreign=bool(owner))
 
-    def perform_together(
+    def perform_in_pool(
         self, jobs: list[tuple[int, Job]], *, foreign: bool
-    ) -> Iterator[tuple[int, Answer]]:
-        """Numbers and answers of jobs that share workers; foreign ones begin in a new folder."""
+    ) -> Iterator[tuple[int, list[Outcome]]]:
+        """Numbers and outcomes of jobs that share workers; foreign ones begin in a new folder."""
         workers = min(self.workers, len(jobs))
-        kernels = {(str(job.task["robot"]), learns(job.method)): job.task for _, job in jobs}
-        tasks = [(task, learned) for (_, learned), task in kernels.items()]
+        of_jobs = [(job.setting.task, learns(job.setting.method)) for _, job in jobs]
+        tasks = list({(task.robot, learned): (task, learned) for task, learned in of_jobs}.values())
         with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
             pool = ProcessPool(
                 workers, initializer=begin_job_worker, initargs=(folder, foreign, workers, tasks),
-                context=context(),
+                context=worker_context(),
             )  # fmt: skip
-            running: dict[Future[Answer], tuple[int, Job]] = {}
+            running: dict[Future[list[Outcome]], tuple[int, Job]] = {}
             waiting = iter(jobs)
             try:
                 while True:
@@ -93,20 +93,20 @@ class Local:
                             perform_within_limit, args=(job,), timeout=self.wall_limit(job)
                         )
                         running[future] = number, job
-                        if len(running) == (1 + _AHEAD) * workers:
+                        if len(running) == (1 + _QUEUED) * workers:
                             break
                     # While a worker compiles the learner: what it hands over is executed here.
-                    with contextlib.suppress(CoarticError):  # workers say the same
+                    with contextlib.suppress(Exception):  # workers say the same
                         prepare((task, False) for task, _ in tasks)
                     tasks = []
                     if not running:
                         break
-                    done, _ = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+                    done, _ = wait(running, timeout=_POLL_S, return_when=FIRST_COMPLETED)
                     if not done and not pool.active:
                         raise BrokenProcessPool  # which leaves what waits as it is
                     for future in done:
                         number, job = running.pop(future)
-                        yield number, self.answer_of(future, job, Path(folder))
+                        yield number, self.outcomes_of(future, job, Path(folder))
             except RuntimeError:  # the pool's own
                 messages = sorted({last_words(file) for file in Path(folder).glob("*.txt")})
                 raise CoarticError(
@@ -120,42 +120,42 @@ class Local:
         """Seconds of wall time after which a job is ended, if it has a limit."""
         return None if job.time_limit_s is None else self.wall_times * job.time_limit_s
 
-    def answer_of(self, future: Future[Answer], job: Job, folder: Path) -> Answer:
-        """The answer to a job, or that it failed."""
+    def outcomes_of(self, future: Future[list[Outcome]], job: Job, folder: Path) -> list[Outcome]:
+        """The outcomes of a job, or that it failed."""
         try:
             return future.result()
         except TimeoutError:
             limit = self.wall_limit(job) or math.inf  # there is one
-            return failed(job, "timeout", f"wall time limit of {limit:g} s exceeded", wall_s=limit)
+            return fail(job, "timeout", f"wall time limit of {limit:g} s exceeded", wall_s=limit)
         except ProcessExpired as error:
             if _COUNTS_CPU and error.exitcode == -signal.SIGPROF and job.time_limit_s is not None:
                 reason = f"CPU time limit of {job.time_limit_s:g} s exceeded"
-                return failed(job, "timeout", reason, cpu_s=job.time_limit_s)
+                return fail(job, "timeout", reason, cpu_s=job.time_limit_s)
             how = f"exit code {error.exitcode}"
             if error.exitcode is not None and error.exitcode < 0:
                 with contextlib.suppress(ValueError):
                     how = f"killed by {signal.Signals(-error.exitcode).name}"
             reason = f"the worker process ended ({how}): {last_words(folder / f'{error.pid}.txt')}"
-            return failed(job, "crashed", reason)
+            return fail(job, "crashed", reason)
         except BrokenProcessPool:
             raise
-        except Exception as error:  # its answer cannot be read
-            return failed(job, "crashed", plain(f"{type(error).__name__}: {error}"))
+        except Exception as error:  # its outcomes cannot be read
+            return fail(job, "crashed", error_line(error))
 
 
 def owner_of(job: Job) -> str:
     """Whose workers perform a job: this project's methods share theirs."""
-    return "" if job.is_ours else f"{job.method} {job.code}"
+    return "" if job.method.is_ours else f"{job.method.name} {job.method.code}"
 
 
-def perform_within_limit(job: Job) -> Answer:
+def perform_within_limit(job: Job) -> list[Outcome]:
     """Perform a job in a worker, which is killed by SIGPROF after as much CPU time as the limit."""
     if not _COUNTS_CPU or job.time_limit_s is None:
-        return perform(job)
+        return perform_job(job)
     signal.signal(signal.SIGPROF, signal.SIG_DFL)  # whatever a method before has set
     signal.setitimer(signal.ITIMER_PROF, job.time_limit_s)
     try:
-        return perform(job)
+        return perform_job(job)
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
 
@@ -170,7 +170,7 @@ def last_words(file: Path) -> str:
 
 
 def begin_job_worker(
-    folder: str, foreign: bool, workers: int, tasks: list[tuple[dict[str, Any], bool]]
+    folder: str, foreign: bool, workers: int, tasks: list[tuple[Task, bool]]
 ) -> None:
     """What a worker does first."""
     printed = os.open(f"{folder}/{os.getpid()}.txt", os.O_WRONLY | os.O_CREAT)
@@ -213,7 +213,7 @@ class WorkerProcess(_Ordinary):  # type: ignore[misc]
             sys.modules["__main__"] = main
 
 
-def context() -> Any:
+def worker_context() -> Any:
     """How workers begin: forked from a server that has imported what they need, where there is
     such a thing."""
     context: Any = copy(multiprocessing.get_context(_START))

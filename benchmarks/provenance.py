@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import coartic
-from coartic.learner.learning import threads_for
 from coartic.motion.compiled import PACKAGE, source_fingerprint
 from coartic.text import LONGEST_LINE, plain
-from coartic.threads import ONE_THREAD
+from coartic.threads import ONE_THREAD, threads_for
 
 _LIBRARIES = (
     "casadi",
@@ -36,7 +35,7 @@ _LIBRARIES = (
 
 
 @cache
-def environment() -> dict[str, Any]:
+def current_environment() -> dict[str, Any]:
     """With what this process makes results: versions, platform, commit."""
     return {
         "coartic": coartic.__version__,

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from coartic.benchmarks.outcome import facts_of, kept
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
-from coartic.benchmarks.worker import Job, job_of
+from coartic.benchmarks.scoring import score
+from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.method import Meter
 from coartic.motion.ticks import Trajectory, trajectory
-from coartic.runs.store import FILE, PARTS, Run, StoredRun, open_store
-from coartic.tasks.task import Task
+from coartic.runs.run import PARTS, Run
+from coartic.runs.store import RUNS_FILE, open_store
 from coartic.text import unknown
 
 
-def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
+def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
     """The one run whose id starts with ``prefix``, in a results folder or any below it, and that
     folder.
 
@@ -30,7 +31,7 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
             f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c."
         )
     folder_of: dict[str, Path] = {}
-    for path in sorted(folder.rglob(FILE)):
+    for path in sorted(folder.rglob(RUNS_FILE)):
         with open_store(path.parent) as store:
             folder_of |= dict.fromkeys(store.ids(prefix), path.parent)
     if not folder_of:
@@ -45,79 +46,70 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, StoredRun]:
         return place, store.run(run_id)
 
 
-def trajectory_of(stored: StoredRun) -> Trajectory:
+def trajectory_of(run: Run) -> Trajectory:
     """The solution of a run tick by tick. Raises CoarticError where it has none."""
-    run = stored.run
-    if "solution" not in run.movements:
-        raise CoarticError(
-            f"run {run.run_id} has no solution to show: {run.status}, {run.row['reason']}"
-        )
-    return trajectory(stored.task, run.movements["solution"], stored.model)
+    if "solution" not in run.scores:
+        raise CoarticError(f"run {run.key.id} has no solution to show: {run.status}, {run.reason}")
+    movements = run.scores["solution"].movements
+    return trajectory(run.setting.task, movements, run.setting.model)
 
 
-def performed(jobs: Sequence[Job], tasks: Sequence[Task]) -> Iterator[Run]:
+def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:
     """Runs of one method, each a job of one seed, in this order, in one process of their own."""
-    answers = dict(Local(1).perform(jobs))
-    for number, (job, task) in enumerate(zip(jobs, tasks, strict=True)):
-        name = {
-            "run_id": "", "suite_seed": 0, "run": 0, "seed": job.seeds[0],
-            "time_limit_s": job.time_limit_s,
-        }  # fmt: skip
-        yield kept([name], answers[number], task, job.model)[0]
+    outcomes = dict(Local(1).perform(jobs))
+    for number, job in enumerate(jobs):
+        yield from score(job, outcomes[number])
 
 
-def performed_again(stored: StoredRun, registered: Registry) -> Run:
+def perform_again(run: Run, registered: Registry) -> Run:
     """A stored run, performed anew by the code that is here now."""
-    if stored.method not in registered:
-        raise CoarticError(unknown("method", stored.method, registered))
-    entry = registered[stored.method]
-    job = job_of(
-        entry,
-        stored.task.model_dump(mode="json"),
-        stored.parameters,
-        (stored.run.row["seed"],),
-        model=stored.model,
-        trial_budget=stored.trial_budget,
-        time_limit_s=stored.run.row["time_limit_s"],
-    )
-    return next(performed([job], [stored.task]))
+    if run.setting.method not in registered:
+        raise CoarticError(unknown("method", run.setting.method, registered))
+    method = registered[run.setting.method]
+    setting = replace(run.setting, code=method.code, told=method.told)
+    return next(perform_in_order([Job(setting, method, (run.key,), run.time_limit_s)]))
 
 
-def some_again(folder: Path, count: int, registered: Registry) -> Iterator[tuple[str, list[str]]]:
+def perform_some_again(
+    folder: Path, count: int, registered: Registry
+) -> Iterator[tuple[str, list[str]]]:
     """Perform ``count`` runs of a folder anew, spread over its cells, those of known methods; the
-    id of each, and in what it differs from what is stored."""
+    id of each, and in what it differs from the stored run."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
-            run_id
+            plan.key(position, number).id
             for position, cell in enumerate(plan.cells)
-            if cell.method in registered
-            and registered[cell.method].code == plan.methods[cell.method].code
-            for run_id in plan.run_ids(position)
+            if cell.method.name in registered
+            and registered[cell.method.name].code == cell.method.code
+            for number in range(cell.runs)
         ]
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
-    for stored in chosen:
-        yield stored.run.run_id, differences(stored.run, performed_again(stored, registered))
+    for run in chosen:
+        yield run.key.id, compare_runs(run, perform_again(run, registered))
 
 
-def differences(a: Run, b: Run) -> list[str]:
+def compare_runs(a: Run, b: Run) -> list[str]:
     """In what the results of two runs differ; times and surroundings apart."""
+    first, second = a.to_row(), b.to_row()
     changes = [
-        f"{name}: {brief_value(a.row[name])} against {brief_value(b.row[name])}"
+        f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
         for name in ("status", "reason", "proven_bound", "details", *Meter.COUNTS)
-        if a.row[name] != b.row[name]
+        if first[name] != second[name]
     ]
-    for part, prefix in zip(PARTS, ("", "initial_", "replay_"), strict=True):
-        first, second = ([*map(facts_of, run.movements.get(part, ()))] for run in (a, b))
-        if first != second:
-            scores = [
-                f"{run.row[f'{prefix}reward']} with {run.row[f'{prefix}hands']}" for run in (a, b)
-            ]
-            changes.append(f"{part}: {scores[0]} against {scores[1]}")
+    for part in PARTS:
+        if a.movement_data(part) != b.movement_data(part):
+            changes.append(f"{part}: {describe_score(a, part)} against {describe_score(b, part)}")
     if a.rewards != b.rewards:
         changes.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
     return changes
+
+
+def describe_score(run: Run, part: str) -> str:
+    """Reward and hands of a part in words."""
+    found = run.scores.get(part)
+    return f"{found.reward} with {found.hands}" if found else "nothing"
 
 
 def first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:

@@ -16,8 +16,9 @@ import numpy as np
 import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
 from coartic.baselines.cma_es import Every
-from coartic.benchmarks.run import plan_suite
-from coartic.learner.learning import METHOD_PREFIX, TRIALS, warm_up
+from coartic.benchmarks.planning import plan_suite
+from coartic.learner.conditions import METHOD_PREFIX
+from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Session
 from coartic.motion.lanes import LANES
 from coartic.motion.trials import movements_of
@@ -31,8 +32,8 @@ def main() -> None:
         print(f"{way:32}{rate:18,.0f}")
     warm_up(load_task("ascending"))
     print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
-    for cell in plan_suite("paper").plan.cells:
-        task, condition = load_task(cell.task), cell.method.removeprefix(METHOD_PREFIX)
+    for cell in plan_suite("paper").cells:
+        task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
 

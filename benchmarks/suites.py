@@ -6,7 +6,6 @@ import itertools
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +14,7 @@ from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from coartic import CONDITIONS, VARIANTS, CoarticError, Task, builtin_tasks, load_task, parse_task
-from coartic.benchmarks.registry import Entry, Registry
+from coartic.benchmarks.registry import Registry
 from coartic.inputs import (
     MOST_CELLS,
     MOST_RUNS,
@@ -23,20 +22,20 @@ from coartic.inputs import (
     MOST_TRIALS,
     FileData,
     brief_value,
+    error_saying,
     problems,
     read_toml,
-    sentence,
 )
-from coartic.learner.learning import METHOD_PREFIX
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
-from coartic.runs.plan import label_of, variant_of
+from coartic.runs.plan import Cell
 from coartic.tasks.catalogue import members, task_of
 from coartic.tasks.families import named_by
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, Penalty, address_of
 from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
-ALL = "*"
+WILDCARD = "*"
 _MEMBERS = "-*"
 Scalar = bool | int | float | str
 
@@ -87,12 +86,14 @@ class Block(FileData):
         """Refuses a parameter that is there twice, or has a value twice."""
         for name, values in self.grid.items():
             if name in self.parameters:
-                raise sentence(f"{brief_value(name)} stands among the parameters and in the grid")
+                raise error_saying(
+                    f"{brief_value(name)} stands among the parameters and in the grid"
+                )
             if len(set(values)) < len(values):
-                raise sentence(f"{brief_value(name)} has the same value twice in the grid")
+                raise error_saying(f"{brief_value(name)} has the same value twice in the grid")
         return self
 
-    def tasks_among(self, user_tasks: Iterable[str]) -> list[str]:
+    def task_names(self, user_tasks: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
         ``TASK-*`` are the members of a task (:mod:`coartic.tasks.catalogue`),
@@ -101,7 +102,7 @@ class Block(FileData):
         every = [*builtin_tasks(), *user_tasks]
         names: dict[str, None] = {}
         for name in dict.fromkeys(self.tasks):
-            if name == ALL:
+            if name == WILDCARD:
                 stands_for = every
             elif name.endswith(_MEMBERS):
                 stands_for = list(members(name.removesuffix(_MEMBERS)))
@@ -122,36 +123,10 @@ class Suite(FileData):
     trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
     """Trials per run, for methods that have this parameter."""
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
-    """CPU time of a run; runs that are performed side by side have it together."""
+    """CPU time of a run; the runs of a batch have it together."""
     readings: tuple[Line, ...] = ()
     """How the paper is read, as ``ties=right``; what is not named is the default."""
     cells: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One method with parameters on one task."""
-
-    task: Task
-    entry: Entry
-    parameters: tuple[tuple[str, Scalar], ...] = ()
-    runs: int | None = None
-    """Where the suite asks for another number of runs than of its other cells."""
-
-    @property
-    def method(self) -> str:
-        """Id of the method."""
-        return self.entry.name
-
-    @property
-    def variant(self) -> str:
-        """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-        return variant_of(dict(self.parameters), self.entry.defaults)
-
-    @property
-    def label(self) -> str:
-        """The method with its variant."""
-        return label_of(self.method, self.variant)
 
 
 def suites() -> dict[str, Suite]:
@@ -208,37 +183,47 @@ def select_cells(
     cells that would go by one name, and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
-    files = [Path(name) for name in tasks if name.endswith(".toml")]
-    named = [name for name in tasks if not name.endswith(".toml")]
-    user_tasks = tasks_of_files([*task_files, *files])
-    tasks = [*itertools.chain(*map(named_by, named)), *(load_task(path).name for path in files)]
-    there = {name for block in suite.cells for name in block.tasks_among(user_tasks)}
-    user_tasks |= {
-        name: load_task(name)
-        for name in tasks
-        if (address_of(name) or task_of(name)) and name not in there | set(user_tasks)
-    }
+    user_tasks, wanted = resolve_tasks(suite, tasks, task_files)
     cells = cells_of_suite(suite, registered, user_tasks)
-    added, refused = added_cells(cells, registered, methods, user_tasks)
-    cells = distinct([*cells, *added])
+    extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
+    cells = drop_repeats([*cells, *extra])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    for name in tasks:
+    for name in wanted:
         if name not in task_names:
             raise CoarticError(unknown("task", name, task_names))
     chosen = [
         cell
         for cell in cells
-        if (not tasks or cell.task.name in tasks) and (not methods or cell.method in methods)
+        if (not wanted or cell.task.name in wanted) and (not methods or cell.method.name in methods)
     ]
     # A user's own task that nothing applies to is an error, not a silent gap.
     busy = {cell.task.name for cell in chosen}
-    idle = [name for name in user_tasks if name not in busy and (not tasks or name in tasks)]
+    idle = [name for name in user_tasks if name not in busy and (not wanted or name in wanted)]
     if idle or not chosen:
         pairs = ", ".join(f"{cell.task.name} x {cell.label}" for cell in cells)
-        why = "; ".join(refused) if refused else f"suite {suite.name!r} has {pairs}"
+        why = "; ".join(refusals) if refusals else f"suite {suite.name!r} has {pairs}"
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen
+
+
+def resolve_tasks(
+    suite: Suite, names: Sequence[str], task_files: Sequence[Path]
+) -> tuple[dict[str, Task], list[str]]:
+    """The user's tasks by name, and the names of all tasks that were asked for.
+
+    The user's tasks are those of files, and the instances and members that ``names`` has and the
+    suite has not.
+    """
+    files = [Path(name) for name in names if name.endswith(".toml")]
+    user_tasks = read_tasks([*task_files, *files])
+    wanted = [*itertools.chain(*(named_by(name) for name in names if not name.endswith(".toml")))]
+    wanted += list(user_tasks)[len(task_files) :]
+    in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
+    for name in wanted:
+        if name not in in_suite and (address_of(name) or task_of(name)):
+            user_tasks.setdefault(name, load_task(name))
+    return user_tasks, wanted
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
@@ -254,10 +239,10 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     return named
 
 
-def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
-    """The user's tasks by name, which no other task may have."""
+def read_tasks(paths: Iterable[Path]) -> dict[str, Task]:
+    """The tasks of files by name, which no other task may have."""
     files: dict[str, Path] = {}
-    user_tasks: dict[str, Task] = {}
+    tasks: dict[str, Task] = {}
     for path in map(Path, paths):
         task = load_task(path)
         taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
@@ -265,41 +250,43 @@ def tasks_of_files(paths: Iterable[Path]) -> dict[str, Task]:
             raise CoarticError(f"{path}: the same task file is given twice")
         if taken is not None:
             raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
-        files[task.name], user_tasks[task.name] = path, task
-    return user_tasks
+        files[task.name], tasks[task.name] = path, task
+    return tasks
 
 
-def added_cells(
+def extra_cells(
+    suite: Suite,
     cells: Sequence[Cell],
     registered: Registry,
     methods: Sequence[str],
     user_tasks: Mapping[str, Task],
 ) -> tuple[list[Cell], list[str]]:
-    """What named methods and the user's tasks add to a suite's cells, and why not more."""
+    """Cells that named methods and the user's tasks add, and why they do not add more."""
     there = {(cell.task.name, cell.label) for cell in cells}
-    of_suite = list(dict.fromkeys(cell.method for cell in cells))
+    of_suite = list(dict.fromkeys(cell.method.name for cell in cells))
     others = [name for name in methods if name not in of_suite]
     shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
     wanted = [(task, name) for task in shipped.values() for name in others]
     wanted += [(task, name) for task in user_tasks.values() for name in methods or of_suite]
-    added, refused = [], []
+    extra, refusals = [], []
     for task, name in wanted:
         reason = registered[name].why_not(task)
         if reason is not None:
-            refused.append(reason)
+            refusals.append(reason)
         elif (task.name, name) not in there:
-            added.append(Cell(task, registered[name]))
-    return added, refused
+            extra.append(Cell(task, registered[name], runs=suite.runs))
+    return extra, refusals
 
 
-def distinct(cells: Iterable[Cell]) -> list[Cell]:
+def drop_repeats(cells: Iterable[Cell]) -> list[Cell]:
     """Every cell once. Results are told apart by names, so one name is one thing only.
 
-    What asks for other numbers of runs stays: :func:`coartic.benchmarks.run.plan_suite` knows
-    which of them hold. Raises CoarticError where different tasks have the same name.
+    A cell that is there with another number of runs stays:
+    :func:`coartic.benchmarks.planning.plan_suite` knows which of them hold. Raises CoarticError
+    where different tasks have the same name.
     """
     tasks: dict[str, Task] = {}
-    by_name: dict[tuple[str, str, int | None], Cell] = {}
+    by_name: dict[tuple[str, str, int], Cell] = {}
     for cell in cells:
         task = tasks.setdefault(cell.task.name, cell.task)
         if task is not cell.task and task != cell.task:
@@ -329,11 +316,11 @@ def cells_of_block(
 ) -> Iterator[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     for name in block.methods:
-        if name not in registered and name != ALL:
+        if name not in registered and name != WILDCARD:
             raise CoarticError(unknown(f"method of suite {suite.name!r}", name, registered))
-    methods = registered if ALL in block.methods else block.methods
-    for name in block.tasks_among(user_tasks):
-        if block.move is not None and ALL in block.tasks and name in user_tasks:
+    methods = registered if WILDCARD in block.methods else block.methods
+    for name in block.task_names(user_tasks):
+        if block.move is not None and WILDCARD in block.tasks and name in user_tasks:
             continue
         task = user_tasks.get(name) or load_task(name)
         if block.goals is not None and len(task.goals) not in block.goals:
@@ -345,7 +332,7 @@ def cells_of_block(
             variants = [with_penalty(suite, v, p) for v in variants for p in block.penalties]
         for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
-            if reason is not None and ALL not in (*block.methods, *block.tasks):
+            if reason is not None and WILDCARD not in (*block.methods, *block.tasks):
                 raise CoarticError(f"suite {suite.name!r}: {reason}")
             if reason is not None:
                 continue  # "all that applies"
@@ -353,7 +340,7 @@ def cells_of_block(
                 point = dict(zip(block.grid, values, strict=True))
                 parameters = {**block.parameters, **point}
                 registered[method].complete(parameters)
-                yield Cell(variant, registered[method], tuple(parameters.items()), block.runs)
+                yield Cell(variant, registered[method], parameters, runs=block.runs or suite.runs)
 
 
 def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:

@@ -10,65 +10,43 @@ import json
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from coartic.benchmarks.provenance import process_peak_mb
-from coartic.benchmarks.registry import Entry, error_line, method_at
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.learner.learning import METHOD_PREFIX, warm_up
+from coartic.learner.conditions import METHOD_PREFIX
+from coartic.learner.learning import warm_up
 from coartic.method import (
     BudgetError,
     Information,
+    Meter,
     MethodError,
     Result,
     Session,
     UndeclaredError,
 )
-from coartic.model import PAPER, MotionModel
 from coartic.motion.solution import Movement
-from coartic.runs.plan import SEARCH
-from coartic.runs.store import PARTS
-from coartic.tasks.task import Task, parse_task
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import SEARCH, RunKey, Setting
+from coartic.runs.run import PARTS, Times
+from coartic.tasks.task import Task
+from coartic.text import error_line
 
 
 @dataclass(frozen=True)
 class Job:
-    """Runs of one cell that are performed side by side: they differ in their seeds alone."""
+    """A batch of runs of one cell, which are performed side by side."""
 
-    task: dict[str, Any]
-    method: str
-    where: str
-    """What is imported: the name of a module, or the path of a method file."""
-    is_ours: bool
-    """Whether the method is one of this project's."""
-    code: str
-    told: tuple[str, ...]
-    parameters: dict[str, Any]
-    seeds: tuple[int, ...]
-    model: MotionModel = PAPER
-    trial_budget: int | None = None
+    setting: Setting
+    method: MethodCard
+    keys: tuple[RunKey, ...]
     time_limit_s: float | None = None
     """CPU time of all its runs together."""
-    within_reach: bool = True
-    """Whether goals out of reach are refused; how methods cope is checked with such."""
 
 
-def job_of(
-    entry: Entry,
-    task: dict[str, Any],
-    parameters: dict[str, Any],
-    seeds: tuple[int, ...],
-    **how: Any,
-) -> Job:
-    """Runs of a method with all its parameters on a task; ``how`` are further fields of a job."""
-    method = (entry.name, entry.where, entry.is_ours, entry.code, entry.told)
-    return Job(task, *method, parameters, seeds, **how)
-
-
-@dataclass
+@dataclass(frozen=True)
 class Outcome:
     """What a method states of one run."""
 
@@ -79,68 +57,60 @@ class Outcome:
     bound: int | None = None
     details: dict[str, Any] = field(default_factory=dict)
     used: tuple[str, ...] = ()
-    meter: dict[str, Any] = field(default_factory=dict)
+    meter: Meter | None = None
+    """None where the worker died."""
     rewards: list[int | None] = field(default_factory=list)
-
-
-@dataclass
-class Answer:
-    """What a worker states of a job."""
-
-    outcomes: list[Outcome]
-    wall_s: float | None
-    """Of all runs together; None where the worker died and nobody knows when it began."""
-    cpu_s: float | None = None
-    warm: bool | None = None
-    """Whether the process had run the method before."""
-    process_peak_mb: float | None = None
+    times: Times = field(default_factory=Times)
     environment: dict[str, Any] | None = None
     """Where this is not that of the parent process."""
 
 
-def failed(
+def fail(
     job: Job,
     status: str,
     reason: str,
     wall_s: float | None = None,
     cpu_s: float | None = None,
-) -> Answer:
-    """The answer of a job whose worker gave none: ``timeout`` or ``crashed``."""
-    return Answer([Outcome(status, reason)] * len(job.seeds), wall_s, cpu_s)
+) -> list[Outcome]:
+    """The outcomes of a job whose worker gave none: ``timeout`` or ``crashed``."""
+    runs = len(job.keys)
+    times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
+    return [Outcome(status, reason, times=times) for _ in job.keys]
 
 
-def perform(job: Job) -> Answer:
+def perform_job(job: Job) -> list[Outcome]:
     """Perform a job. Whatever the method does is an outcome, not an error."""
-    task = parse_task(job.task, "a job", reach=job.within_reach)
+    setting = job.setting
     sessions = [
         Session(
-            task,
-            seed,
-            map(Information, job.told),  # as declared, whatever became of the class since
-            model=job.model,
-            trial_budget=job.trial_budget,
-            trusted=job.is_ours,
+            setting.task,
+            key.seed,
+            map(Information, setting.told),  # as declared, whatever became of the class since
+            model=setting.model,
+            trial_budget=setting.trial_budget,
+            trusted=job.method.is_ours,
         )
-        for seed in job.seeds
+        for key in job.keys
     ]
-    warm = job.method in _performed
-    _performed.add(job.method)
+    warm = setting.method in _seen
+    _seen.add(setting.method)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        results = results_of(job, task, sessions)
+        results = solve(job, sessions)
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    outcomes = [outcome_of(job, *pair) for pair in zip(results, sessions, strict=True)]
-    return Answer(outcomes, wall, cpu, warm, process_peak_mb())
+    runs = len(sessions)
+    times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
+    pairs = zip(results, sessions, strict=True)
+    return [outcome_of(setting.method, result, session, times) for result, session in pairs]
 
 
-def prepare(tasks: Iterable[tuple[dict[str, Any], bool]]) -> None:
+def prepare(tasks: Iterable[tuple[Task, bool]]) -> None:
     """Compile the kernels for these tasks, or load them, on no run's clock; of each, whether the
     learner is run on it."""
     done = set()
-    for definition, learns in tasks:
-        task = parse_task(definition, "a job", reach=False)
+    for task, learns in tasks:
         if (kernels := (task.robot.most_links, learns)) not in done:
             done.add(kernels)
             warm_up(task, learns=learns)
@@ -151,17 +121,14 @@ def learns(method: str) -> bool:
     return method.startswith(METHOD_PREFIX)
 
 
-_performed: set[str] = set()
-_method = cache(method_at)
+_seen: set[str] = set()
+"""Methods that this process has run."""
 
 
-def results_of(
-    job: Job, task: Task, sessions: Sequence[Session]
-) -> Sequence[Result | BaseException]:
+def solve(job: Job, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
     """What the method returns in each session."""
-    method_class = _method(job.where, job.method)
-    method = method_class(method_class.Parameters(**job.parameters))
-    reason_not = method.why_not(task)
+    method = job.method.configure(job.setting.parameters)
+    reason_not = method.why_not(job.setting.task)
     if reason_not is not None:
         raise MethodError("infeasible", str(reason_not))
     if len(sessions) == 1:
@@ -169,12 +136,13 @@ def results_of(
     return method.solve_together(sessions)
 
 
-def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
+def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outcome:
     """A result as plain data, or how the run failed."""
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
-        "meter": vars(session.meter),
+        "meter": session.meter,
         "rewards": session.rewards,
+        "times": times,
     }
     try:
         if isinstance(result, MethodError):
@@ -185,7 +153,7 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **stated(job.method, result, session))
+        return Outcome("ok", **spent, **statement(method, result, session))
     except UndeclaredError as error:
         return Outcome("crashed", str(error), **spent)
     except BudgetError as error:
@@ -199,7 +167,7 @@ def outcome_of(job: Job, result: Any, session: Session) -> Outcome:
         return Outcome("crashed", error_line(error), **spent)
 
 
-def stated(method: str, result: Any, session: Session) -> dict[str, Any]:
+def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
     """What a method's result says, as plain data. Raises SolutionError for what cannot be kept."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
-    from coartic.learner.learning import LearningRun, learn, learn_many
+    from coartic.learner.learning import learn, learn_many
+    from coartic.learner.run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.model import PAPER, MotionModel
     from coartic.motion.corrective import Correction, correct
@@ -71,7 +72,8 @@ __all__ = [
 _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
-    "learner.learning": ("LearningRun", "learn", "learn_many"),
+    "learner.learning": ("learn", "learn_many"),
+    "learner.run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
     "motion.corrective": ("Correction", "correct"),

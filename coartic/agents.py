@@ -1,7 +1,7 @@
 """Agents of Stable-Baselines3 as methods of the benchmark. Needs the extra ``coartic[rl]``.
 
-:class:`SessionEnvs` makes the trials of a session environments; an :class:`Agent` is a method that
-trains on them and is judged by what it has learned: one trial of its policy without noise.
+:class:`SessionEnvs` presents the trials of a session as environments. An :class:`Agent` is a method
+that trains on them; its result is one trial of the learned policy without noise.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from pydantic import Field
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
+from coartic.gym import LETTERS, Arms
 from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
 from coartic.motion.initial import too_many_sequences
 from coartic.motion.solution import Movement
 from coartic.motion.trials import Trials, movements_of
 from coartic.optimisers import TOLD, Objective
-from coartic.robot import HANDS, Array
-from coartic.tasks.task import Task, hands_of
+from coartic.robot import Array
+from coartic.tasks.task import Task
 
 WORST = -100.0
 """Reward of a trial that fails or takes twice as long as the first one, or longer."""
@@ -49,128 +50,104 @@ class AgentParameters(Parameters):
 
 
 class SessionEnvs(VecEnv):
-    """Trials of a session, side by side, as environments of Stable-Baselines3.
+    """The robots of :class:`coartic.gym.Arms` as environments of Stable-Baselines3.
 
-    A step is a subtask. An action has, where the agent chooses hands, an entry for the left hand
-    (below 0) or the right one, and one for each joint that can move: its target, from -1 to 1 in
-    a box around the configuration in which the corrective process alone hits the goal. An arm
-    that hits neither this goal nor a later one keeps its posture. An observation has an entry for
-    each goal, 1 for the next one, and two for the hand that hit the goal before; with
-    ``sees_targets`` also the last action for each joint.
-
-    The observations do not depend on how the movements end, so the trials are made when their
-    last actions are known. The last step then has the reward: by how many per cent the trial was
-    better than the corrective process alone; the others have 0.
+    Their trials count as trials of the session. The box of targets is around the configurations in
+    which the corrective process alone hits the goals. With ``sees_targets`` an observation also has
+    the last action for each joint. The last step of a trial has the reward: by how many per cent
+    the trial was better than the corrective process alone; the other steps have 0.
     """
 
     def __init__(self, session: Session, parameters: AgentParameters) -> None:
         trials, left = parameters.trials, session.trials_left
         if left is not None:
             trials = min(trials, left)
-        first = Objective(session, trials=trials - 1)  # the last one is the policy's
-        self._session, self._scale = session, parameters.scale
+        first = Objective(session, trials=trials - 1)  # the last trial is the policy's
+        self._session, self._first_hands, self._first_cost = session, first.hands, first.best_cost
+        self._scale, self._sees_targets = parameters.scale, parameters.sees_targets
         self._trials_left = trials - 1 - session.meter.trials
-        self._first_cost = first.best_cost
         self.best_reward = -first.best_cost
         """Reward of the best trial, those in which hands were tried among them."""
-        self._postures = first.postures
-        self._hands = np.array([HANDS.index(hand) for hand in hands_of(first.hands)])
-        self._chooses_hands = parameters.chooses_hands and len(session.hands) == 2
-        self._free = np.asarray(first.joints.any(axis=0))
-        for hand in session.hands if self._chooses_hands else ():
-            self._free[session.joints(hand)] = True
-        size = int(self._chooses_hands) + int(self._free.sum())
+        self._arms = Arms(
+            parameters.envs,
+            session._task,
+            around=first.postures,
+            hands=None if parameters.chooses_hands else first.hands,
+            model=session.model,
+        )
+        actions, seen = self._arms.action_space, self._arms.observation_space.high
+        if self._sees_targets:
+            seen = np.append(seen, np.full(len(self._arms.free), np.inf, dtype=np.float32))
         self.render_mode = None
-        seen = np.ones(session.goals_count + 2 + parameters.sees_targets * self._free.sum())
-        seen[session.goals_count + 2 :] = np.inf
-        observed = Box(-seen.astype(np.float32), seen.astype(np.float32))
-        super().__init__(parameters.envs, observed, Box(-1.0, 1.0, (size,), np.float32))
-        self._begin()
-
-    def _begin(self) -> None:
-        """Put all robots back to the start."""
-        count, goals = self.num_envs, self._session.goals_count
-        self._goal = 0
-        self._chosen = np.tile(self._hands, (count, 1))
-        self._targets = np.full((count, goals, self._session.dof), np.nan)
-        self._moved: Array = np.zeros((count, int(self._free.sum())))
+        super().__init__(parameters.envs, Box(-seen, seen), actions)
+        self._actions: Array = np.zeros((self.num_envs, *actions.shape), dtype=np.float32)
 
     def _observations(self) -> NDArray[np.float32]:
-        seen = np.zeros((self.num_envs, *self.observation_space.shape), dtype=np.float32)
-        goals = self._session.goals_count
-        seen[:, self._goal] = 1.0
-        if self._goal > 0:
-            rows = np.arange(self.num_envs)
-            seen[rows, goals + self._chosen[:, self._goal - 1]] = 1.0
-        if seen.shape[1] > goals + 2:
-            seen[:, goals + 2 :] = self._moved
+        seen = self._arms.observations()
+        if self._sees_targets:
+            moved = self._actions[:, -len(self._arms.free) :]
+            moved = np.where(self._arms.goal[:, None] > 0, moved, 0.0)
+            seen = np.hstack([seen, moved], dtype=np.float32)
         return seen
 
     def reset(self) -> NDArray[np.float32]:
         """Begin all trials."""
-        self._begin()
+        self._arms.reset(np.ones(self.num_envs, dtype=np.bool_))
         return self._observations()
 
     def step_async(self, actions: Array) -> None:
         """Take the actions of the next subtask."""
-        if self._chooses_hands:
-            self._chosen[:, self._goal] = actions[:, 0] > 0
-        self._moved = actions[:, int(self._chooses_hands) :]
-        target = self._postures[self._goal, self._free] + self._scale * self._moved
-        self._targets[:, self._goal, self._free] = target
-        self._goal += 1
+        self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
-        """Make the trials, where all subtasks have their actions. Raises BudgetError where no
-        trials are left."""
+        """Make the next subtask of all trials. Raises BudgetError where no trial is left."""
+        ended = self._step(np.ones(self.num_envs, dtype=np.bool_))
         rewards: Array = np.zeros(self.num_envs)
         infos: list[dict[str, Any]] = [{} for _ in rewards]
-        ended: NDArray[np.bool_] = np.full(self.num_envs, self._goal == self._session.goals_count)
-        if ended.all():
-            rewards = self._rewards_of_trials()
+        if ended.any():
+            rows = np.flatnonzero(ended)
+            costs = -self._count(rows[: self._trials_left])
+            self._trials_left -= len(costs)
+            if len(costs) < len(rows):
+                raise BudgetError("all trials are made")
+            rewards[rows] = np.maximum(100.0 * (1.0 - costs / self._first_cost), WORST)
             # An agent that looks at the last observation finds that nothing follows.
             last = np.zeros(self.observation_space.shape, dtype=np.float32)
-            infos = [
-                {"terminal_observation": last, "episode": {"r": float(r), "l": self._goal, "t": 0}}
-                for r in rewards
-            ]
-            self._begin()
+            for row in rows:
+                steps = np.count_nonzero(self._arms.hands[row] >= 0)
+                episode = {"r": float(rewards[row]), "l": steps, "t": 0}
+                infos[row] = {"terminal_observation": last, "episode": episode}
+            self._arms.reset(ended)
         return self._observations(), rewards.astype(np.float32), ended, infos
 
-    def _rewards_of_trials(self) -> Array:
-        """Rewards of the trials, in per cent of what the first one took."""
-        count = min(self.num_envs, self._trials_left)
-        if count == 0:
-            raise BudgetError("all trials are made")
-        costs = -self._make_trials(count).rewards
-        self._trials_left -= count
-        self.best_reward = max(self.best_reward, -float(costs.min()))
-        if count < self.num_envs:
-            raise BudgetError("all trials are made")
-        gains = np.asarray(100.0 * (1.0 - costs / self._first_cost))
-        return np.maximum(gains, WORST)
-
-    def _make_trials(self, count: int) -> Trials:
-        """Make the trials of the first ``count`` robots."""
-        for number, hand in enumerate(HANDS):
-            if hand in self._session.hands:  # an arm keeps its posture when its last goal is hit
-                later = np.flip(np.flip(self._chosen == number, 1).cumsum(axis=1), 1) > 0
-                self._targets[..., self._session.joints(hand)][~later] = np.nan
-        return self._session.trials(self._chosen[:count], self._targets[:count])
-
     def trial_of(self, policy: Callable[[NDArray[np.float32]], Array]) -> tuple[Movement, ...]:
-        """Make the last trial, which no training may take: the movements that a policy makes.
+        """Make the last trial, which is not part of the training; its movements are returned.
 
         ``policy`` gives actions ``(envs, A)`` for observations ``(envs, O)``.
         """
         observations = self.reset()
-        for _ in range(self._session.goals_count):
+        first, ended = np.arange(self.num_envs) == 0, False
+        while not ended:
             self.step_async(policy(observations))
+            ended = bool(self._step(first)[0])
             observations = self._observations()
-        trials = self._make_trials(1)
-        self.best_reward = max(self.best_reward, float(trials.rewards[0]))
-        letters = "".join(HANDS[code][0].upper() for code in self._chosen[0])
-        return movements_of(letters, trials.targets[0])
+        self._count(np.array([0]))
+        made, given = LETTERS[self._arms.hands[0]], self._first_hands  # of goals after a failure
+        hands = "".join(one or other for one, other in zip(made, given, strict=True))
+        return movements_of(hands, self._arms.trials.targets[0])
+
+    def _step(self, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Make the next subtask of these robots; returns whose trials have ended."""
+        actions = self._actions.copy()
+        actions[:, -len(self._arms.free) :] *= self._scale
+        return self._arms.step(actions, which)[1]
+
+    def _count(self, rows: NDArray[np.int64]) -> Array:
+        """Count the trials of these robots; returns their rewards."""
+        trials = Trials._make(each[rows] for each in self._arms.trials)
+        self._session._count_batch(trials)
+        self.best_reward = max([self.best_reward, *trials.rewards])
+        return trials.rewards
 
     # What Stable-Baselines3 wants of its environments beside this.
 

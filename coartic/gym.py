@@ -17,7 +17,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.model import PAPER, MotionModel
-from coartic.robot import HANDS, LARGEST, Array, Hand
+from coartic.robot import LARGEST_FIGURE, Array, Hand
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,24 +26,47 @@ if TYPE_CHECKING:
 
     from coartic.tasks.task import Task
 
-Flags = NDArray[np.bool_]
-LETTERS = np.array(["L", "R"])
+LETTERS = np.array(["L", "R", ""])  # of hands 0 and 1; -1 is no hand yet
 
 
 class Arms:
-    """N robots, each at some subtask of a trial of its own: what the environments consist of.
+    """N robots, each at a subtask of its own trial.
 
-    ``task`` is a task, the name of one (``"long/v1/i017"``) or a file. An action has, where the
-    robot has two hands, an entry that chooses the left one (below 0) or the right one, and then
-    one for each joint that can move. The box from -1 to 1 is ``scale`` (length unit or rad) to
-    either side of the present posture, or of the posture for the goal in ``around``, shape
-    ``(G, dof)``; a hand sequence (``"RLRL"``) stands for those in which the corrective process
-    alone hits the goals with it. Actions beyond the box are taken as they are. Where all joints of
-    an action are NaN, no movement is made to a target: the corrective process acts alone, and the
-    step takes 0 ticks if the hand is inside the goal already.
+    Parameters
+    ----------
+    count : int
+        Number of robots.
+    task : Task, str or Path
+        A task, the name of a task (``"long/v1/i017"``) or a task file.
+    scale : float
+        Half the width of the box of targets, length unit (base) and rad (joints).
+    around : str or array_like, shape (G, dof), optional
+        Middle of the box: a configuration for each goal, or a hand sequence (``"RLRL"``), which
+        means the configurations in which the corrective process alone hits the goals. By default
+        the present configuration.
+    observe : {"learner", "posture"}
+        What is observed.
+    hands : str, optional
+        Hand sequence of all trials; by default the actions choose.
+    model : MotionModel
+        Constants of movement.
 
-    An observation has an entry for each goal, 1 for the next one, and two for the hand that hit
-    the one before; with ``observe="posture"`` also the configuration ``(dof,)`` and the goals
+    Raises
+    ------
+    ValueError
+        An option does not fit the task.
+
+    Notes
+    -----
+    An action has an entry that chooses the left hand (below 0) or the right one, unless the robot
+    has one hand or ``hands`` are given, and an entry for each joint that can move. The box is
+    from -1 to 1; actions beyond it are taken as they are. Where the entries of all joints are NaN,
+    no movement is made to a target: the corrective process acts alone, and the step takes 0 ticks
+    if the hand is inside the goal already. With ``hands``, an arm that hits neither this goal nor
+    a later one keeps its posture.
+
+    An observation has an entry for each goal, 1 for the next goal, and two for the hand that hit
+    the goal before; with ``observe="posture"`` also the configuration ``(dof,)`` and the goals
     ``(G, 2)``.
     """
 
@@ -55,16 +78,18 @@ class Arms:
         scale: float = 1.0,
         around: str | ArrayLike | None = None,
         observe: Literal["learner", "posture"] = "learner",
+        hands: str | None = None,
         model: MotionModel = PAPER,
     ) -> None:
         from coartic import corrective_trial  # the compiler takes a while
-        from coartic.tasks.task import as_task
+        from coartic.motion.trials import Trials, hand_codes
+        from coartic.tasks.task import as_task, hands_of
 
         self.task = as_task(task)
         self.scale, self.model = scale, model
         goals, dof = len(self.task.goals), self.task.robot.dof
         if isinstance(around, str):
-            if {*around} - {*LETTERS} or len(around) != goals:
+            if {*around} - {"L", "R"} or len(around) != goals:
                 raise ValueError(
                     f"around is {around!r}; it must have L or R for each of {goals} goals"
                 )
@@ -75,35 +100,47 @@ class Arms:
         if observe not in ("learner", "posture"):
             raise ValueError(f"observe is {observe!r}; it is 'learner' or 'posture'")
         self.sees_posture = observe == "posture"
-        moves = np.zeros(dof, dtype=np.bool_)
-        moves[:2] = [coordinate not in self.task.locked_base for coordinate in "xy"]
-        for hand in self.task.hands:
-            moves[self.task.robot.joints(hand)] = True
-        self.free = np.flatnonzero(moves)
-        self.two_hands = len(self.task.hands) == 2
-        self.action_space = Box(-1.0, 1.0, (self.two_hands + len(self.free),), np.float32)
+        if hands is None and len(self.task.hands) == 1:
+            hands = goals * self.task.hands[0][0].upper()
+        self.chooses_hands = hands is None
+        self._hands = (
+            np.zeros(goals, np.int64) if hands is None else hand_codes(self.task, hands, 1)[0]
+        )
+        self.moves = np.zeros((goals, dof), dtype=np.bool_)
+        """Joints that can move at each goal, shape ``(G, dof)``."""
+        self.moves[:, :2] = [coordinate not in self.task.locked_base for coordinate in "xy"]
+        for goal in range(goals):
+            for hand in self.task.hands if hands is None else hands_of(hands)[goal:]:
+                self.moves[goal, self.task.robot.joints(hand)] = True
+        self.free = np.flatnonzero(self.moves.any(axis=0))
+        """Joints that have an entry in an action."""
+        self.action_space = Box(-1.0, 1.0, (self.chooses_hands + len(self.free),), np.float32)
         seen = np.ones(goals + 2 + (dof + 2 * goals) * self.sees_posture, dtype=np.float32)
-        seen[goals + 2 :] = LARGEST
+        seen[goals + 2 :] = LARGEST_FIGURE
         low = np.where(np.arange(len(seen)) < goals + 2, 0.0, -seen).astype(np.float32)
         self.observation_space = Box(low, seen, dtype=np.float32)
         self.q = np.empty((count, dof))
         self.goal = np.empty(count, dtype=np.int64)
-        self.hands = np.empty((count, goals), dtype="U1")
-        self.corrections = np.empty(count, dtype=np.int64)
-        self.is_success = np.empty(count, dtype=np.bool_)
+        self.hands = np.empty((count, goals), dtype=np.int64)
+        counts = np.empty((5, count), dtype=np.int64)
+        places = np.empty((2, count, goals, dof))
+        completed = np.empty(count, dtype=np.bool_)
+        self.trials = Trials._make([counts[0], completed, *counts[1:4], *places, counts[4]])
+        """The trials as far as they are made."""
         self.reset(np.ones(count, dtype=np.bool_))
 
-    def reset(self, which: Flags) -> None:
+    def reset(self, which: NDArray[np.bool_]) -> None:
         """Put these robots back to the start."""
         self.q[which] = self.task.q0
-        self.goal[which], self.corrections[which] = 0, 0
-        self.hands[which], self.is_success[which] = "", False
+        self.goal[which], self.hands[which] = 0, -1
+        for each in self.trials:
+            each[which] = np.nan if each.dtype.kind == "f" else 0
 
     def centre(self, rows: NDArray[np.int64]) -> Array:
         """The middle of the box of targets of these robots, shape ``(n, dof)``."""
         return self.q[rows] if self.around is None else self.around[self.goal[rows]]
 
-    def step(self, actions: Array, which: Flags) -> tuple[Array, Flags]:
+    def step(self, actions: Array, which: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Make the next subtask of these robots: rewards ``(N,)``, and whose trials have ended.
 
         Raises ValueError for actions of another shape, and for entries that are not finite, unless
@@ -118,53 +155,54 @@ class Arms:
         shape = len(which), *self.action_space.shape
         if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        chosen = chosen[rows]
-        hands = np.full(len(rows), HANDS.index(self.task.hands[0]))
-        if self.two_hands:
+        chosen, goal, trials = chosen[rows], self.goal[rows], self.trials
+        hands, joints = self._hands[goal], chosen[:, int(self.chooses_hands) :]
+        if self.chooses_hands:
             hands = (chosen[:, 0] > 0).astype(np.int64)
-        joints = chosen[:, int(self.two_hands) :]
-        targets = self.centre(rows).copy()
-        targets[:, self.free] += self.scale * joints
+        targets = np.full((len(rows), self.task.robot.dof), np.nan)
+        targets[:, self.free] = self.centre(rows)[:, self.free] + self.scale * joints
         without = np.isnan(joints).all(axis=1)
-        no_hand = self.two_hands and np.isnan(chosen[:, 0]).any()
-        if no_hand or not (np.abs(targets[~without]) <= LARGEST).all():
+        no_hand = self.chooses_hands and np.isnan(chosen[:, 0]).any()
+        if no_hand or not (np.abs(targets[~without][:, self.free]) <= LARGEST_FIGURE).all():
             raise ValueError(
                 "an action is not finite, or far beyond the box; NaN is for all joints, not for "
                 "some, and not for the hand"
             )
-        targets[without] = np.nan  # of joints that cannot move, too
+        targets = np.where(self.moves[goal], targets, self.q[rows])
+        targets[without] = np.nan
         reached = reach_unchecked(
             self.task.robot,
             self.q[rows],
             hands,
-            self.task.goal_array[self.goal[rows]],
+            self.task.goal_array[goal],
             self.task.radius,
             targets,
             locked_base=self.task.locked_base,
             model=self.model,
         )
-        penalties = penalties_of_movements(
-            self.task, self.q[rows], reached.q, hands, self.goal[rows] == 0
-        )
+        penalties = penalties_of_movements(self.task, self.q[rows], reached.q, hands, goal == 0)
         self.q[rows] = reached.q
-        self.hands[rows, self.goal[rows]] = LETTERS[hands]
+        self.hands[rows, goal] = hands
         self.goal[rows] += reached.hit
-        self.corrections[rows] += reached.corrections
-        completed = self.goal[rows] == len(self.task.goals)
-        self.is_success[rows] = completed
+        trials.targets[rows, goal] = targets
+        trials.reached[rows[reached.hit], goal[reached.hit]] = reached.q[reached.hit]
+        trials.completed[rows] = self.goal[rows] == len(self.task.goals)
+        trials.penalties[rows] += penalties
+        for name in ("ticks", "corrections", "iterations", "evaluations"):
+            getattr(trials, name)[rows] += getattr(reached, name)
         rewards, ended = np.zeros(len(which)), np.zeros(len(which), dtype=np.bool_)
         rewards[rows] = np.where(reached.hit, -(reached.ticks + penalties), -FAILED)
-        ended[rows] = completed | ~reached.hit
+        ended[rows] = trials.completed[rows] | ~reached.hit
         return rewards, ended
 
     def observations(self) -> NDArray[np.float32]:
-        """What is to be seen of each, float32."""
+        """Observations ``(N, O)``."""
         count, goals = self.hands.shape
         seen = np.zeros((count, *self.observation_space.shape), dtype=np.float32)
         rows = np.flatnonzero(self.goal < goals)
         seen[rows, self.goal[rows]] = 1.0
         rows = np.flatnonzero(self.goal > 0)
-        seen[rows, goals + (self.hands[rows, self.goal[rows] - 1] == "R")] = 1.0
+        seen[rows, goals + self.hands[rows, self.goal[rows] - 1]] = 1.0
         if self.sees_posture:
             seen[:, goals + 2 :] = np.hstack(
                 [self.q, np.broadcast_to(self.task.goal_array.ravel(), (count, 2 * goals))]
@@ -173,10 +211,11 @@ class Arms:
 
     def infos(self) -> dict[str, Any]:
         """Hands used so far (``"RL"``), corrective movements made, whether all goals are hit."""
+        made, letters = self.trials, LETTERS[self.hands]
         return {
-            "hands": self.hands.copy().view(f"U{self.hands.shape[1]}")[:, 0],
-            "corrections": self.corrections.copy(),
-            "is_success": self.is_success.copy(),
+            "hands": letters.view(f"U{letters.shape[1]}")[:, 0],
+            "corrections": made.corrections.copy(),
+            "is_success": made.completed.copy(),
         }
 
 
@@ -226,7 +265,7 @@ class TaskEnv(gymnasium.Env):
         centre = self.arms.centre(np.array([0]))[0]
         given = np.full_like(centre, np.nan) if target is None else target
         away = (given - centre)[self.arms.free] / self.arms.scale
-        return np.array([-1.0 if hand == "left" else 1.0, *away][not self.arms.two_hands :])
+        return np.array([-1.0 if hand == "left" else 1.0, *away][not self.arms.chooses_hands :])
 
     def render(self) -> NDArray[np.uint8] | None:
         """Show the robot and the goals in a window, or as a picture ``(height, width, 3)``."""
@@ -239,13 +278,24 @@ class TaskEnv(gymnasium.Env):
         if self.render_mode == "rgb_array":
             figure = Figure(figsize=(6, 4))
             canvas: Any = FigureCanvasAgg(figure)
-            draw(figure, self.arms)
+            self._draw(figure)
             canvas.draw()
             return np.asarray(canvas.buffer_rgba())[..., :3].copy()
         self._figure = self._figure or pyplot.figure(figsize=(6, 4))
-        draw(self._figure, self.arms)
+        self._draw(self._figure)
         pyplot.pause(1 / self.metadata["render_fps"])
         return None
+
+    def _draw(self, figure: Figure) -> None:
+        from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
+
+        arms, task = self.arms, self.arms.task
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure.clear()
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, arms.q[0], weight=1.5)
+        number_goals(axes, task, weight=1.5)
+        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[0])
 
     def close(self) -> None:
         """Close the window."""
@@ -290,7 +340,7 @@ class TaskVectorEnv(VectorEnv):
 
     def step(
         self, actions: Array
-    ) -> tuple[NDArray[np.float32], Array, Flags, Flags, dict[str, Any]]:
+    ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Make the next subtask of each trial that goes on; begin the others anew."""
         self.arms.reset(self._ended)
         rewards, self._ended = self.arms.step(actions, ~self._ended)
@@ -300,28 +350,6 @@ class TaskVectorEnv(VectorEnv):
     def _infos(self) -> dict[str, Any]:
         infos = self.arms.infos()
         return infos | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in infos}
-
-
-def draw(figure: Figure, arms: Arms) -> None:
-    """Draw the first robot and the goals; those that are hit are filled."""
-    from matplotlib.patches import Circle
-
-    task, q = arms.task, arms.q[0]
-    shown = [task.goal_array]
-    shown += [task.robot.joint_positions(task.q0, hand) for hand in task.hands]
-    (left, bottom), (right, top) = np.min(np.vstack(shown), 0), np.max(np.vstack(shown), 0)
-    figure.clear()
-    axes = figure.add_subplot(
-        aspect="equal", xlim=(left - 1, right + 1), ylim=(bottom - 1, top + 1)
-    )
-    axes.fill(*task.robot.base_outline(q).T, color="0.8")
-    for hand in task.hands:
-        axes.plot(*task.robot.joint_positions(q, hand).T, "k-o", markersize=3)
-    for number, (x, y) in enumerate(task.goals):
-        next_color = "tab:red" if number == arms.goal[0] else "0.5"
-        is_hit = bool(number < arms.goal[0])
-        axes.add_patch(Circle((x, y), task.radius, color=next_color, fill=is_hit))
-        axes.annotate(str(number + 1), (x, y + task.radius), ha="center", va="bottom")
 
 
 TASKS = {

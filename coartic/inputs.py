@@ -96,7 +96,7 @@ def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> s
     ``keys`` are the keys that it may have, wherever they belong.
     """
     details, shown, keys = causes(error), plain(source), list(keys)
-    sentences = (plain(explained(detail, keys)) for detail in details[:_SHOWN])
+    sentences = (plain(explain(detail, keys)) for detail in details[:_SHOWN])
     lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
     if len(details) > _SHOWN:
         lines.append(f"{shown}: has {len(details) - _SHOWN} more problems")
@@ -105,7 +105,7 @@ def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> s
 
 def problems_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """The same as part of a sentence."""
-    return "; ".join(plain(explained(detail, keys)) for detail in causes(error)[:_SHOWN])
+    return "; ".join(plain(explain(detail, keys)) for detail in causes(error)[:_SHOWN])
 
 
 def causes(error: ValidationError) -> list[ErrorDetails]:
@@ -118,7 +118,7 @@ def causes(error: ValidationError) -> list[ErrorDetails]:
     return [d for d in details if d["type"] != "too_short" or not has_bad_entry(d["loc"])]
 
 
-def key_of(location: tuple[int | str, ...]) -> str:
+def key_path(location: tuple[int | str, ...]) -> str:
     """Where in a file: ``goals[1][0]``, ``robot.left_links``."""
     text = ""
     for part in location:
@@ -127,14 +127,14 @@ def key_of(location: tuple[int | str, ...]) -> str:
     return text
 
 
-def sentence(text: str) -> PydanticCustomError:
-    """An error of a validator that says all by itself."""
+def error_saying(text: str) -> PydanticCustomError:
+    """A validation error whose message needs no prefix."""
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def explained(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
+def explain(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
-    key, message = key_of(detail["loc"]), detail["msg"]
+    key, message = key_path(detail["loc"]), detail["msg"]
     match detail["type"]:
         case "sentence":
             return message

@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Literal
@@ -25,7 +25,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands
 from coartic.motion.solution import Execution, Movement, execute
-from coartic.motion.trials import Hands, Trials, hand_codes, make_trials
+from coartic.motion.trials import HandSequences, Trials, hand_codes, make_trials
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
@@ -134,6 +134,11 @@ class Meter:
     )
     """Counters that a method states itself: what a solver evaluates."""
 
+    def add(self, **counts: int) -> None:
+        """Add to counters."""
+        for name, count in counts.items():
+            setattr(self, name, getattr(self, name) + int(count))
+
 
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
@@ -155,35 +160,13 @@ class Result:
     """Reward that no solution exceeds, where proven; for searches of this project."""
 
 
-class Session:
-    """One task, one seed, one meter: all that a method gets to work with.
+class TaskView:
+    """What a method sees of its task. What has to be declared is noted as used."""
 
-    The declaration is enforced and the calls are counted between honest parties: Python
-    has no walls, and who reaches for underscored names finds a way around both.
-    ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state what those spent.
-    """
-
-    def __init__(
-        self,
-        task: Task,
-        seed: int,
-        told: Iterable[Information],
-        *,
-        model: MotionModel = PAPER,
-        trial_budget: int | None = None,
-        trusted: bool = False,
-    ) -> None:
+    def __init__(self, task: Task, told: Iterable[Information]) -> None:
         self._task = task
         self._told = frozenset(told)
-        self.seed = seed
-        self.rng = np.random.default_rng(seed)
-        self.model = model
-        self._trusted = trusted
-        self._trial_budget = trial_budget
-        self._meter = Meter()
         self._used: set[Information] = set()
-        self._rewards: list[int | None] = []
 
     # Open to every method: what the robot is, not what the task wants of it.
 
@@ -240,34 +223,96 @@ class Session:
         self._use(Information.GOALS)
         return self._task.radius
 
+    def symbolic_hand(self, q: Any, hand: Hand) -> Any:
+        """Hand position as a CasADi expression. Needs ``kinematic model``.
+
+        What a solver evaluates of it is counted with :meth:`Session.spend`.
+        """
+        self._use(Information.KINEMATIC_MODEL)
+        return self._task.robot.symbolic_hand(q, hand)
+
+    @property
+    def used(self) -> frozenset[Information]:
+        """What has been used of what was declared."""
+        return frozenset(self._used)
+
+    def check_solution(self, solution: Sequence[Movement]) -> None:
+        """Corrective movements without a target are a use of the corrective process."""
+        if any(getattr(m, "kind", "") == "corrective" and m.target is None for m in solution):
+            self._use(Information.CORRECTIVE_PROCESS)
+
+    def _use(self, *information: Information) -> None:
+        for item in information:
+            if item not in self._told:
+                told = ", ".join(sorted(self._told)) or "nothing"
+                raise UndeclaredError(
+                    f"the method used {item.value!r}, which it does not declare (told: {told})"
+                )
+            self._used.add(item)
+
+
+class Session(TaskView):
+    """One task, one seed, one meter: all that a method gets to work with.
+
+    The declaration is enforced and the calls are counted between honest parties: Python
+    has no walls, and who reaches for underscored names finds a way around both.
+    ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state what those spent.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        seed: int,
+        told: Iterable[Information],
+        *,
+        model: MotionModel = PAPER,
+        trial_budget: int | None = None,
+        trusted: bool = False,
+    ) -> None:
+        super().__init__(task, told)
+        self.seed = seed
+        self.rng = np.random.default_rng(seed)
+        self.model = model
+        self._trusted = trusted
+        self._trial_budget = trial_budget
+        self._meter = Meter()
+        self._rewards: list[int | None] = []
+
+    # Calls that are counted.
+
     def forward_kinematics(self, q: Any, hand: Hand) -> Array:
         """Hand positions, ``(..., 2)``; counts one evaluation per configuration."""
         self._use(Information.FORWARD_KINEMATICS)
         positions = self._task.robot.forward_kinematics(q, hand)
-        self._meter.forward_kinematics += positions[..., 0].size
+        self._meter.add(forward_kinematics=positions[..., 0].size)
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
         """Jacobians, ``(..., 2, dof)``; counts one per configuration."""
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
-        self._meter.jacobians += jacobians[..., 0, 0].size
+        self._meter.add(jacobians=jacobians[..., 0, 0].size)
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """**A** from ``q`` for goal number ``goal`` (from 1); counts its iterations."""
         self._use(Information.CORRECTIVE_PROCESS)
+        if not 1 <= goal <= self.goals_count:
+            raise ValueError(f"goal {goal}: goals are numbered 1 to {self.goals_count}")
         correction = correct(
             self._task.robot,
             q,
             hand,
-            self._task.goals[self._goal(goal)],
+            self._task.goals[goal - 1],
             locked_base=self._task.locked_base,
             model=self.model,
         )
-        self._meter.corrective_iterations += correction.iterations
-        self._meter.jacobians += correction.iterations
-        self._meter.forward_kinematics += correction.iterations + 1
+        self._meter.add(
+            corrective_iterations=correction.iterations,
+            jacobians=correction.iterations,
+            forward_kinematics=correction.iterations + 1,
+        )
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
@@ -283,21 +328,15 @@ class Session:
         if self.trials_left == 0:
             raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
         execution = execute(self._task, solution, model=self.model)
-        self._meter.trials += 1
-        self._meter.movement_ticks += execution.ticks
-        self._meter.corrections += execution.corrections
-        self._meter.corrective_iterations += execution.iterations
-        self._meter.jacobians += execution.iterations
-        self._meter.forward_kinematics += execution.evaluations
-        self._meter.failed_trials += not execution.completed
-        self._rewards.append(execution.reward)
+        spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
+        self._count_trials([execution.reward], *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
             return execution
         return replace(
             execution, movements=tuple(solution), configurations=execution.configurations[:0]
         )
 
-    def trials(self, hands: Hands, targets: Any, *, until: Any = None) -> Trials:
+    def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
         """Make N physical trials at once, which takes a fraction of the time of N :meth:`trial`.
 
         ``hands`` is one hand sequence for all (``"RRLR"``), one each, or an array of shape
@@ -333,17 +372,7 @@ class Session:
             better = trials.rewards > np.asarray(until)[: len(given)]
             if better.any():
                 trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
-        self._meter.trials += len(trials.ticks)
-        self._meter.movement_ticks += int(trials.ticks.sum())
-        self._meter.corrections += int(trials.corrections.sum())
-        self._meter.corrective_iterations += int(trials.iterations.sum())
-        self._meter.jacobians += int(trials.iterations.sum())
-        self._meter.forward_kinematics += int(trials.evaluations.sum())
-        self._meter.failed_trials += int((~trials.completed).sum())
-        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
-        for failed in np.flatnonzero(~trials.completed).tolist():
-            rewards[failed] = None
-        self._rewards.extend(rewards)
+        self._count_batch(trials)
         if Information.CORRECTIVE_PROCESS in self._told:
             return trials
         return trials._replace(
@@ -353,6 +382,14 @@ class Session:
             reached=trials.reached[:0],
         )
 
+    def _count_batch(self, trials: Trials) -> None:
+        """Count the trials of a batch and keep their rewards."""
+        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
+        for failed in np.flatnonzero(~trials.completed).tolist():
+            rewards[failed] = None
+        spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
+        self._count_trials(rewards, *(each.sum() for each in spent))
+
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).
 
@@ -360,41 +397,42 @@ class Session:
         counted, but no reward is kept of them. Raises NotApplicableError where no sequence
         completes the task, or there are too many.
         """
-        self._use(Information.CORRECTIVE_PROCESS)
-        self._use(Information.REWARD_BY_TRIAL)
+        self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(self._task, hands, model=self.model)
-        self._count(spent)
+        self._meter.add(**spent)
         return chosen
 
-    def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Corrective movements without a target are a use of the corrective process."""
-        if any(getattr(m, "kind", "") == "corrective" and m.target is None for m in solution):
-            self._use(Information.CORRECTIVE_PROCESS)
-
-    def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Hand position as a CasADi expression. Needs ``kinematic model``.
-
-        What a solver evaluates of it is counted with :meth:`spend`.
-        """
-        self._use(Information.KINEMATIC_MODEL)
-        return self._task.robot.symbolic_hand(q, hand)
+    def _count_trials(
+        self,
+        rewards: list[int | None],
+        ticks: int,
+        corrections: int,
+        iterations: int,
+        evaluations: int,
+    ) -> None:
+        """Count trials by their rewards and what they spent in all."""
+        self._meter.add(
+            trials=len(rewards),
+            movement_ticks=ticks,
+            corrections=corrections,
+            corrective_iterations=iterations,
+            jacobians=iterations,
+            forward_kinematics=evaluations,
+            failed_trials=rewards.count(None),
+        )
+        self._rewards.extend(rewards)
 
     @property
     def trials_left(self) -> int | None:
         """Trials left in the budget; None where there is none."""
         return None if self._trial_budget is None else self._trial_budget - self._meter.trials
 
-    # What has been spent and used so far: copies, to read.
+    # What has been spent so far: copies, to read.
 
     @property
     def meter(self) -> Meter:
         """What has been spent."""
         return replace(self._meter)
-
-    @property
-    def used(self) -> frozenset[Information]:
-        """What has been used of what was declared."""
-        return frozenset(self._used)
 
     @property
     def rewards(self) -> list[int | None]:
@@ -417,32 +455,26 @@ class Session:
                 raise ValueError(f"counter {name!r}: {count} is negative")
             if getattr(self._meter, name) + count > MOST_COUNT:
                 raise ValueError(f"counter {name!r}: it counts to {MOST_COUNT:_} at most")
-        self._count(counts)
+        self._meter.add(**counts)
 
-    def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Rewards of the trials of a compiled method of this project, and its time for them: of
-        runs that are solved side by side, each has its share."""
-        self._needs_trust("record")
-        self._rewards.extend(rewards)
-        self._meter.solve_s += solve_s
-
-    @contextmanager
-    def building(self) -> Iterator[None]:
+    def building(self) -> AbstractContextManager[None]:
         """Count the wall time of the block as set-up."""
-        clock = time.perf_counter()
-        try:
-            yield
-        finally:
-            self._meter.build_s += time.perf_counter() - clock
+        return self._timing("build_s")
+
+    def solving(self) -> AbstractContextManager[None]:
+        """Count the wall time of the block as solving."""
+        return self._timing("solve_s")
 
     @contextmanager
-    def solving(self) -> Iterator[None]:
-        """Count the wall time of the block as solving."""
+    def _timing(self, counter: str) -> Iterator[None]:
         clock = time.perf_counter()
         try:
             yield
         finally:
-            self._meter.solve_s += time.perf_counter() - clock
+            spent = getattr(self._meter, counter) + time.perf_counter() - clock
+            setattr(self._meter, counter, spent)
+
+    # The back door of this project's compiled methods.
 
     def hand_over(self, *information: Information) -> Task:
         """The task itself, for compiled methods of this project that count by themselves.
@@ -453,30 +485,19 @@ class Session:
         self._needs_trust("hand_over")
         if not information:
             raise UndeclaredError("hand_over without saying what is used of the task")
-        for item in information:
-            self._use(item)
+        self._use(*information)
         return self._task
 
-    def _count(self, counts: Mapping[str, int]) -> None:
-        for name, count in counts.items():
-            setattr(self._meter, name, getattr(self._meter, name) + int(count))
+    def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
+        """Rewards of the trials of a compiled method of this project, and its time for them: of
+        the runs of a batch, each has its share."""
+        self._needs_trust("record")
+        self._rewards.extend(rewards)
+        self._meter.solve_s += solve_s
 
     def _needs_trust(self, name: str) -> None:
         if not self._trusted:
             raise UndeclaredError(f"{name} is for this project's own compiled methods")
-
-    def _use(self, information: Information) -> None:
-        if information not in self._told:
-            told = ", ".join(sorted(self._told)) or "nothing"
-            raise UndeclaredError(
-                f"the method used {information.value!r}, which it does not declare (told: {told})"
-            )
-        self._used.add(information)
-
-    def _goal(self, number: int) -> int:
-        if not 1 <= number <= self.goals_count:
-            raise ValueError(f"goal {number}: goals are numbered 1 to {self.goals_count}")
-        return number - 1
 
 
 class Method(ABC):
@@ -509,7 +530,7 @@ class Method(ABC):
         """Find a solution. Raises MethodError where there is none to be found."""
 
     def most_together(self) -> int:
-        """Number of runs, at most, that :meth:`solve_together` is given.
+        """Number of runs in a batch, at most, for :meth:`solve_together`.
 
         The methods of others are given one.
         """

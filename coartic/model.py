@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from coartic.errors import CoarticError
 
 
 class MotionModel(NamedTuple):
@@ -32,9 +35,6 @@ class MotionModel(NamedTuple):
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
 
-    arrival_tick: int = 1
-    """Ticks beyond its steps that a movement takes, to detect arrival: 1 (inferred) or 0."""
-
     corrective_arrival: bool = False
     """Whether a corrective movement also stops where its hand has arrived."""
 
@@ -52,11 +52,23 @@ _BOUNDS = {
     "gain": (1e-6, 1e6),
     "correction_tolerance": (1e-6, 1e6),
     "max_iterations": (0, math.inf),
-    "arrival_tick": (0, 1),
 }
 
 
-def checked_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
+def stored_model(fields: Mapping[str, Any]) -> MotionModel:
+    """The constants that a run is stored with.
+
+    Raises CoarticError for a run of version 1.0 in which arrival took no tick.
+    """
+    if fields.get("arrival_tick", 1) != 1:
+        raise CoarticError(
+            "the run was made under reading arrival-tick=0, which the printed results refute and "
+            "which is no longer here. Version 1.0.0 of coartic has it."
+        )
+    return MotionModel(**{name: fields[name] for name in MotionModel._fields})
+
+
+def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """The model itself; ValueError for constants no movement can be made with.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a

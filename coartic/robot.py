@@ -27,11 +27,13 @@ from coartic.text import short_repr
 Hand = Literal["left", "right"]
 """Which hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
-LARGEST = 1e4  # of any figure: far beyond use, and exact in all that follows
+LARGEST_FIGURE = 1e4  # of any figure: far beyond use, and exact in all that follows
 MOST_LINKS = 100  # of an arm
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST)]
-_Links = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
+Finite = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
+]
+Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST_FIGURE)]
+_Lengths = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
 
 HANDS: tuple[Hand, Hand] = ("left", "right")  # A, in the order that breaks ties
 BASE_DOF = 2
@@ -94,9 +96,9 @@ class Robot:
     of the left arm and those of the right one (rad, each from the link before).
     """
 
-    left_links: _Links = (1.0, 1.0, 1.0, 1.0)
+    left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
     """Lengths of the links of the left arm, from the shoulder outwards, length unit."""
-    right_links: _Links = (1.0, 1.0, 1.0, 1.0)
+    right_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
     """Lengths of the links of the right arm."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
     """Left shoulder, x and y from the centre of the base, length unit."""

@@ -33,6 +33,11 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
+def error_line(error: BaseException) -> str:
+    """An exception in one line."""
+    return plain(f"{type(error).__name__}: {error}")
+
+
 def one_line(text: str) -> str:
     """Text as one printable line, whole; one that is so already stays as it is.
 
@@ -42,7 +47,7 @@ def one_line(text: str) -> str:
     if text.isprintable() or all(map(prints, text)):
         return text
     parts = (part.strip() for part in text.splitlines())
-    return " | ".join("".join(map(shown, part)) for part in parts if part)
+    return " | ".join("".join(map(escape, part)) for part in parts if part)
 
 
 def prints(c: str) -> bool:
@@ -50,7 +55,7 @@ def prints(c: str) -> bool:
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
-def shown(c: str) -> str:
+def escape(c: str) -> str:
     """A character, or its escape where it does not print."""
     return c if prints(c) else c.encode("unicode_escape").decode()
 
@@ -105,7 +110,7 @@ def refuse_unprintable(text: str) -> str:
             raise PydanticCustomError(
                 "not_plain",
                 "should be one line of printable text, without {escape}",
-                {"escape": shown(c)},
+                {"escape": escape(c)},
             )
     return text
 

@@ -1,4 +1,4 @@
-"""What all worker processes have in common: one thread each, and an end with their parent."""
+"""How many threads or processes there are, and what all worker processes have in common."""
 
 from __future__ import annotations
 
@@ -20,6 +20,15 @@ ONE_THREAD = dict.fromkeys(
     "1",
 )
 """Environment of a worker. One run, one core: BLAS threads would get in each other's way."""
+
+
+def threads_for(jobs: int) -> int:
+    """Number of threads or processes; ``jobs`` is -1 for one a core."""
+    if jobs > 0:
+        return jobs
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextlib.contextmanager

@@ -132,10 +132,11 @@ def filled_pages() -> dict[str, str]:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    published = ANALYSIS / "topics" / "paper" / "published.toml"
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
         "seen": seen, "expect": expect, "name_of": name_of,
-        "printed": tomllib.loads((ANALYSIS / "published.toml").read_text("utf-8"))["general"],
+        "printed": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
         "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),

@@ -16,9 +16,9 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
-from coartic.tasks.families import Parts
+from coartic.tasks.families import Thousandths
 
-_IN_PARTS = get_args(Parts)[1]  # what reads a figure of a file into thousandths
+_IN_PARTS = get_args(Thousandths)[1]  # what reads a figure of a file into thousandths
 _SIMPLE = {bool: "`true` or `false`", int: "integer", float: "number", str: "text"}
 _LONGEST = 60  # characters of a default that is shown in a table
 
@@ -153,8 +153,8 @@ def parameters() -> Iterator[str]:
         if reading.part == "condition"
     }
     shared: dict[Any, list[str]] = {}
-    for name, entry in built_in().items():
-        shared.setdefault(entry.method.Parameters, []).append(f"`{name}`")
+    for name, card in built_in().items():
+        shared.setdefault(card.load().Parameters, []).append(f"`{name}`")
     for kind, names in shared.items():
         meanings = meanings_of(kind)
         if issubclass(kind, DualProcessParameters):
@@ -184,12 +184,12 @@ def readings() -> Iterator[str]:
 
 def signatures() -> Iterator[str]:
     """The signatures of coarticulation, from their register."""
-    from coartic.analysis.signatures.register import CONTEXTS, FAMILIES, WITHIN
+    from coartic.analysis.signatures.register import of_kind
 
     kinds = {
-        "One method's runs on one task": WITHIN,
-        "One goal before two different successors": CONTEXTS,
-        "A goal beside one that differs between tasks": FAMILIES,
+        "One method's runs on one task": of_kind("runs"),
+        "One goal before two different successors": of_kind("contexts"),
+        "A goal beside one that differs between tasks": of_kind("moved goals"),
     }
     for title, kind in kinds.items():
         yield from (f"**{title}**", "")
@@ -199,11 +199,11 @@ def signatures() -> Iterator[str]:
 
 def claims() -> Iterator[str]:
     """The register of the paper's claims; each claim has its id for an anchor."""
-    from coartic.analysis.claims.judge import test_in_words
+    from coartic.analysis.claims.judge import words_of_test
     from coartic.analysis.claims.register import CLAIMS
 
     def goals(claim: Any) -> str:
-        if claim.families:
+        if claim.on_random_tasks:
             return "random tasks"
         return "reconstructed †" if claim.fitted else "printed"
 
@@ -211,17 +211,12 @@ def claims() -> Iterator[str]:
         return f"{claim.place}: “{claim.quote}”" if claim.place else "nothing: it is our claim"
 
     def rule(claim: Any) -> str:
-        text = test_in_words(claim)
-        what = [", ".join(claim.compared)] if claim.compared else []
-        for by_task in (claim.pairs, claim.runs, claim.cells):
-            for task, names in by_task.items():
-                what.append(f"{task}: {names if isinstance(names, str) else ', '.join(names)}")
+        text = words_of_test(claim)
         before = f"Power, stated before suite `{claim.suite}` was run: "
         before = "" if claim.power.startswith("Written after") else before
         power = f" {before}{claim.power}."
         return (
             f"{text[0].upper()}{text[1:]}."
-            + (f" *{'; '.join(what)}.*" if what else "")
             + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
             + (power if claim.power else "")
         )

@@ -13,8 +13,6 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 from tests.support.forks import apart, forget
 
 ROOT = Path(__file__).parent.parent
@@ -102,14 +100,12 @@ def test_no_imports_go_round_in_circles():
 
 
 FRESH = """
-import gc, sys
-gc.disable()  # all is imported
+import sys
 import coartic
-ours = {name for name in sys.modules if name.startswith("coartic.")}
-assert not ours, f"imported with the package: {sorted(ours)}"
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
-from coartic.benchmarks.worker import _method
-assert _method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
+from coartic.runs.card import load_method
+import coartic.benchmarks.pool
+assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 assert not {"casadi", "cvxpy", "pandas", "coartic.benchmarks.run"} & set(sys.modules)
 print("worker", flush=True)
 from coartic import *
@@ -119,21 +115,9 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 """
 
 
-@pytest.fixture(scope="module")
-def fresh():
-    """How the program ended, in a process of its own."""
-    command = [sys.executable, "-c", FRESH]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def test_a_worker_imports_its_method_alone(fresh):
-    """What other methods import would take as long as all else of a worker's start."""
-    assert fresh.stdout == "worker\n", fresh.stderr
-
-
-def test_the_package_imports_what_is_asked_for(fresh):
+def test_the_package_imports_what_is_asked_for():
     """Every public name is there, under its own name whatever is imported first."""
-    assert fresh.returncode == 0, fresh.stderr
+    subprocess.run([sys.executable, "-c", FRESH], cwd=ROOT, check=True)
 
 
 def test_help_needs_no_compiler():
@@ -200,15 +184,15 @@ def without_posix(out):
     everything()
 
     from coartic.analysis.study import load
-    from coartic.benchmarks.run import Selection, plan_suite
+    from coartic.benchmarks.run import Selection, perform, plan_suite
     from tests.support.suites import InProcess
 
     methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
     select = Selection(tasks=["ascending"], methods=methods)
-    suite = plan_suite("quick", runs=2, trials=5, select=select)
-    assert suite.perform(out, executor=InProcess()).progress.failed == 0
+    plan = plan_suite("quick", runs=2, trials=5, select=select)
+    assert perform(plan, out, executor=InProcess()).progress.failed == 0
     runs = load(out).runs
-    assert len(runs) == suite.plan.size
+    assert len(runs) == plan.size
     assert runs.process_peak_mb.isna().all()
 
 

@@ -56,21 +56,13 @@ def test_who_is_told_that_ticks_count_plans_as_without_a_penalty():
 
 
 @pytest.mark.parametrize("terms", TERMS)
-def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms, monkeypatch):
+def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms):
     task = with_penalty(SMALL, **TERMS[terms])
     search = BelievedReward.Parameters(**QUICK)
     plans = cheapest(Session(task, 0, BelievedReward.told, trusted=True), task, search, [])
     seen = [(plan.cost, i.hands, plan.configurations) for i, plan in plans.ranked]
-    graph = PostureGraph.sampled(task, 30, np.random.default_rng(0), penalty=task.penalty)
-    costs, chain_of = [], PostureGraph.chain_of
-
-    def noted(self, complete):
-        costs.append(complete.cost.min())
-        return chain_of(self, complete)
-
-    monkeypatch.setattr(PostureGraph, "chain_of", noted)
-    chains = list(graph.chains())
-    seen += [(cost, *chain) for cost, chain in zip(costs, chains, strict=True)]
+    graph = PostureGraph.sample(task, 30, np.random.default_rng(0), penalty=task.penalty)
+    seen += [(each.cost.min(), *graph.chain_of(each)) for each in graph.sequences(None, None)]
     assert len(seen) > 5
     for cost, hands, configurations in seen:
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)

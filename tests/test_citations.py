@@ -19,8 +19,8 @@ from coartic.analysis.citations import (
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.suites import Cell
-from coartic.runs.plan import DeclaredMethod
-from coartic.runs.store import FILE
+from coartic.runs.card import MethodCard
+from coartic.runs.store import RUNS_FILE
 from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
 
@@ -35,7 +35,7 @@ def fields_of(entry):
 
 BIB = {key: fields_of(entry) for key, entry in references().items()}
 ANALYSIS = behind_analysis()
-BUILT_IN = [entry.method for entry in built_in().values()]
+BUILT_IN = list(built_in().values())
 
 
 def plain(text):
@@ -90,7 +90,7 @@ def test_the_software_is_cited_by_the_facts_of_citation_cff():
 
 
 def declared(title, citation, origin="built in"):
-    return DeclaredMethod(title, citation, (), (), True, {}, origin, "")
+    return MethodCard(title, title, citation, (), (), True, {}, origin, "")
 
 
 def test_each_work_once_with_the_methods_that_rest_on_it():
@@ -134,7 +134,9 @@ def test_command(tmp_path, monkeypatch, capsys):
     ]
     run_and_write(tmp_path / "results", cells, runs=1)
     commit = '{"id": "0123456789abcdef", "dirty": true}'
-    with closing(sqlite3.connect(tmp_path / "results" / FILE, isolation_level=None)) as plain_sql:
+    with closing(
+        sqlite3.connect(tmp_path / "results" / RUNS_FILE, isolation_level=None)
+    ) as plain_sql:
         change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
         plain_sql.execute(change, (commit,))
     code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")

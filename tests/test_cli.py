@@ -12,7 +12,7 @@ from coartic import __version__
 from coartic.analysis.study import load
 from coartic.benchmarks import pool
 from coartic.runs.plan import run_seed
-from coartic.runs.store import FILE
+from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
 from tests.support.commands import call
 from tests.support.suites import BROKEN, ROOT, InProcess
@@ -47,7 +47,7 @@ def test_run_resumes(coartic, tmp_path):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_folder_of_the_users_is_refused(coartic, tmp_path):
-    for name in (FILE, "notes.txt"):
+    for name in (RUNS_FILE, "notes.txt"):
         folder = tmp_path / name.replace(".", "-")
         folder.mkdir()
         (folder / name).write_text("mine")
@@ -114,7 +114,7 @@ def test_reproduce(coartic, tmp_path):
     code, text, _ = coartic("reproduce", first, "--in", out)
     assert code == 0
     assert text.splitlines()[-1] == "Performed again: identical."
-    with closing(sqlite3.connect(out / FILE, isolation_level=None)) as plain_sql:
+    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
         change = "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?"
         plain_sql.execute(change, (second,))
         change = 'UPDATE movements SET right_1 = right_1 + 1e-15 WHERE "order" = 0 AND part = ?'

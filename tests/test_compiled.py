@@ -3,15 +3,11 @@
 import os
 import shutil
 import sys
-import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
 import numpy as np
-from numba import njit, types
 
-from coartic.motion import compiled
 from tests.support.forks import apart, forget
 
 ROOT = Path(__file__).parent.parent
@@ -63,42 +59,6 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
         text.replace("xs[tip] - xs[joint]\n", "xs[tip] - 0.5 * xs[joint]\n"), encoding="utf-8"
     )
     assert apart(lever, tmp_path) == (6.0, 0)
-
-
-def test_a_kernel_is_compiled_once_for_all_numbers():
-    """Also where the compiler knows one of them: a kernel's compilation takes seconds."""
-
-    @compiled.inner
-    def twice(number):
-        return 2 * number
-
-    @njit
-    def of_some(number):
-        return twice(3) + twice(number)
-
-    assert of_some(4) == 14
-    assert twice.signatures == [(types.int64,)]
-
-
-def slow_lever(folder):
-    """How often the kernel was loaded, by a process that takes half a second to keep it."""
-    forget("coartic")
-    sys.path.insert(0, str(folder))
-    from coartic.motion.compiled import MachineCode
-
-    keep = MachineCode.save_overload
-    MachineCode.save_overload = lambda *code: (time.sleep(0.5), keep(*code))
-    from kernel import across
-
-    across(np.array([1.0, 6.5]), np.zeros(2))
-    return sum(across.stats.cache_hits.values())
-
-
-def test_of_two_processes_one_compiles(tmp_path):
-    write_kernel(tmp_path)
-    with ThreadPoolExecutor(2) as pool:
-        hits = list(pool.map(apart, [slow_lever] * 2, [tmp_path] * 2))
-    assert sorted(hits) == [0, 1]
 
 
 LANES = """

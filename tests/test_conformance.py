@@ -9,9 +9,11 @@ from coartic import load_task
 from coartic.analysis.optima import entries
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.pool import context
+from coartic.benchmarks.pool import worker_context
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.worker import job_of, perform
+from coartic.benchmarks.worker import Job, perform_job
+from coartic.model import PAPER
+from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
@@ -69,7 +71,7 @@ def methods():
 @pytest.fixture(scope="module")
 def another_process():
     """One for all methods: each of them would take long to begin its."""
-    with ProcessPoolExecutor(1, mp_context=context()) as pool:
+    with ProcessPoolExecutor(1, mp_context=worker_context()) as pool:
         yield pool
 
 
@@ -79,7 +81,7 @@ def quick_checks(monkeypatch, another_process):
 
     class HereAndThere(InProcess):
         def perform(self, jobs):
-            return enumerate((another_process.map if len(jobs) > 1 else map)(perform, jobs))
+            return enumerate((another_process.map if len(jobs) > 1 else map)(perform_job, jobs))
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)
@@ -103,9 +105,10 @@ def test_methods_that_keep_every_law(methods, name):
 
 
 def test_what_a_session_shows_cannot_be_written(methods):
-    task = load_task("ascending").model_dump(mode="json")
-    (outcome,) = perform(job_of(methods["test/forger"], task, {}, (0,))).outcomes
-    assert outcome.meter["trials"] == len(outcome.rewards) == 1
+    card = methods["test/forger"]
+    asked = Setting(load_task("ascending"), card.name, card.code, card.told, {}, PAPER, None)
+    (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
+    assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
 

@@ -95,13 +95,3 @@ def test_stationary_point_ends_the_descent():
 def test_too_large_a_gain_is_an_outcome():
     model = MotionModel(gain=1e6, max_iterations=500)
     assert not correct(ROBOT, np.full(10, 0.3), "right", (5.0, 1.0), model=model).converged
-
-
-def free_joints(robot, hand, locked):
-    free = np.zeros(robot.dof, bool)
-    free[:2] = ["x" not in locked, "y" not in locked]
-    free[robot.joints(hand)] = True
-    return free
-
-
-LOCKS = [(), ("x",), ("y",), ("x", "y")]

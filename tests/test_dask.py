@@ -5,6 +5,7 @@ import pytest
 from coartic import CoarticError
 from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
+from coartic.benchmarks.run import perform
 from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
 
 distributed = pytest.importorskip("distributed")
@@ -29,7 +30,7 @@ def test_runs_come_out_as_they_do_here(address, tmp_path):
 def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "current_code", lambda *_: "c0ffee")
     with pytest.raises(CoarticError, match=r"code c0ffee on a Dask worker.*install the same"):
-        planned(CELLS).perform(tmp_path, executor=Dask(address))
+        perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
 def test_nobody_at_an_address(tmp_path):
@@ -38,7 +39,7 @@ def test_nobody_at_an_address(tmp_path):
     with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
         for address in ("tcp://127.0.0.1:1", "nonsense://x"):
             with pytest.raises(CoarticError, match=f"no Dask scheduler at {address}.*8786"):
-                planned(CELLS).perform(tmp_path, executor=Dask(address))
+                perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
 def test_a_cluster_without_workers(tmp_path, monkeypatch):
@@ -47,7 +48,7 @@ def test_a_cluster_without_workers(tmp_path, monkeypatch):
     with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
         executor = Dask(cluster.scheduler_address, say=messages.append)
         with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
-            planned(CELLS).perform(tmp_path, executor=executor)
+            perform(planned(CELLS), tmp_path, executor=executor)
     assert len(messages) == 1
 
 
@@ -65,6 +66,6 @@ def test_a_scheduler_that_is_lost(tmp_path, monkeypatch):
 
         executor = Dask(cluster.scheduler_address)
         with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):
-            planned(CELLS).perform(tmp_path / "out", executor=executor, watch=watch)
+            perform(planned(CELLS), tmp_path / "out", executor=executor, watch=watch)
     again = run_and_write(tmp_path / "out", CELLS)
     assert (again.runs.status == "ok").all()

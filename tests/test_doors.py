@@ -1,403 +1,451 @@
-"""Sessions' trials in one call, and the objective function, against trials made one by one."""
+"""Every door makes the same trial: that of the step-by-step reference."""
 
+import functools
+import json
 import re
-import tracemalloc
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import coartic
 from coartic import (
     MotionModel,
     Movement,
-    builtin_tasks,
     corrective_trial,
     execute,
     hand_sequences,
+    learn,
+    learn_many,
     load_task,
+    trajectory,
 )
-from coartic.analysis.optima import entries
-from coartic.benchmarks.conformance import check_method
-from coartic.benchmarks.registry import registry
-from coartic.learner.rows import movements_from
-from coartic.method import BudgetError, Information, Meter, MethodError, Session, UndeclaredError
-from coartic.motion.trials import hand_codes, movements_of
-from coartic.optimisers import FAILED, TOLD, Objective
-from tests.support.strategies import tiny_task
+from coartic.analysis import verify as checker
+from coartic.method import Meter, MethodError, Session
+from coartic.motion.lanes import LANES
+from coartic.motion.solution import execute_many, other_arm_travel
+from coartic.motion.trials import make_trials
+from coartic.optimisers import FAILED, TOLD, explored_joints
+from coartic.tasks.task import hands_of, parse_task
+from tests.support import reference
+from tests.support.strategies import PAPER_CELLS, sample, tiny_task, uneven_task
 
-DOCS = Path(__file__).parent.parent / "docs"
-PAGE = (DOCS / "howto" / "optimisers.md").read_text("utf-8")
-BLIND = frozenset({Information.REWARD_BY_TRIAL})
+PENALTY = {"joints": 30.0, "region": 40.0, "distinct": 50.0}
+TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
+    "uneven": uneven_task(
+        [1.0],
+        [0.5, -0.5, 0.2, 1.0],
+        goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
+        initial_hands="RLR",
+    ),
+    "penalty": parse_task(
+        load_task("two-armed-1").model_dump(mode="json") | {"penalty": PENALTY}, "test"
+    ),
+}
+LIMITS = {  # iterations of the corrective process, spread of the targets
+    "ascending": (100, 4.0),
+    "descending": (100, 4.0),
+    "two-armed-1": (150, 0.3),
+    "two-armed-2": (120, 0.3),
+    "uneven": (120, 4.0),
+    "penalty": (300, 0.3),
+}
+NONE_FAILS = ("two-armed-2", "penalty")
+MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 
 
-def sample(task, count, noise=0.3, seed=0):
-    """Hand sequences, and targets around what the corrective process does with them."""
-    rng = np.random.default_rng(seed)
-    hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), count)]
-    targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
-    free = [axis not in task.locked_base for axis in "xy"] + [True] * (task.robot.dof - 2)
-    return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)
+class Case:
+    """A trial: hands, targets (NaN: none), the same as a solution, and what comes of it."""
+
+    def __init__(self, task, model, hands, targets):
+        self.hands, self.targets = hands, targets
+        kinds = ["corrective" if np.isnan(target).all() else "learned" for target in targets]
+        rows = list(enumerate(zip(hands_of(hands), kinds, targets, strict=True), 1))
+        given = [Movement(g, hand, k, None if k == "corrective" else t) for g, (hand, k, t) in rows]
+        self.due = reference.execute(task, given, model)
+        made = {m.goal: m.target for m in reversed(self.due.movements) if m.kind == "learned"}
+        self.solution = [  # with all joints; goals after a failure have some target, too
+            m if m.kind == "corrective" else Movement(m.goal, m.hand, m.kind, target)
+            for m in given
+            for target in [made.get(m.goal, task.q0)]
+        ]
+        self.is_plain = "corrective" not in kinds
 
 
-@pytest.mark.parametrize("name", coartic.builtin_tasks())
-def test_a_batch_is_so_many_single_trials(name):
+@functools.cache
+def cases(name):
+    """Trials; in every second one, the arms without a goal to come stay and no other joint."""
+    task, model, rng = TASKS[name], MODELS[name], np.random.default_rng(3)
+    noise = rng.choice([0.03, LIMITS[name][1]], (20, 1, 1))
+    hands, targets = sample(task, 20, noise, seed=1)
+    session = Session(task, 0, TOLD)
+    for n, sequence in enumerate(hands):
+        if n % 2 == 0:
+            targets[n][~explored_joints(session, sequence)] = np.nan
+        else:
+            targets[n][rng.random(targets[n].shape) < 0.2] = np.nan
+        if n % 4 > 1:
+            targets[n, rng.integers(len(task.goals))] = np.nan
+    return [Case(task, model, *each) for each in zip(hands, targets, strict=True)]
+
+
+def facts(execution):
+    return {
+        "reward": execution.reward,
+        "ticks": execution.ticks,
+        "corrections": execution.corrections,
+        "iterations": execution.iterations,
+        "hits": execution.configurations,
+        "movements": execution.movements,
+    }
+
+
+def by_execute(task, model, cases):
+    return [facts(execute(task, case.solution, model=model)) for case in cases]
+
+
+def by_execute_many(task, model, cases):
+    solutions = [case.solution for case in cases]
+    return [facts(execution) for execution in execute_many(task, solutions, model=model)]
+
+
+def by_trial(task, model, cases):
+    session = Session(task, 0, TOLD, model=model)
+    found = [facts(session.trial(case.solution)) for case in cases]
+    assert session.rewards == [each["reward"] for each in found]
+    return found
+
+
+def rows_of(trials):
+    """What a batch says of each trial."""
+    for n, reward in enumerate(trials.rewards.tolist()):
+        reached = trials.reached[n]
+        yield {
+            "reward": None if reward == -np.inf else reward,
+            "ticks": trials.ticks[n],
+            "corrections": trials.corrections[n],
+            "iterations": trials.iterations[n],
+            "hits": reached[~np.isnan(reached[:, 0])],
+        }
+
+
+def by_trials(task, model, cases):
+    session = Session(task, 0, TOLD, model=model)
+    trials = session.trials([case.hands for case in cases], np.array([c.targets for c in cases]))
+    found = [*rows_of(trials)]
+    assert session.rewards == [each["reward"] for each in found]
+    assert session.meter.jacobians == trials.iterations.sum()
+    assert session.meter.movement_ticks == trials.ticks.sum()
+    return found
+
+
+def by_make_trials(task, model, cases):
+    hands, targets = [case.hands for case in cases], np.array([case.targets for case in cases])
+    return [*rows_of(make_trials(task, hands, targets, model=model))]
+
+
+def by_objective(task, model, cases, many=False):
+    """For hands with which the corrective process alone completes the task."""
+    for number, case in enumerate(cases):
+        try:
+            cost = coartic.objective(task, case.hands, model=model)
+        except MethodError:
+            yield None
+            continue
+        if number % 2:  # some joints of a goal have no target
+            yield None
+            continue
+        point = case.targets[cost.joints]
+        value = cost.many(np.array([cost.x0, point]))[1] if many else cost(point)
+        assert value != cost.best_cost or execute(task, cost.solution, model=model).reward == -value
+        yield {"reward": None if value == FAILED else -value}
+
+
+def by_environment(task, model, cases):
+    gym = pytest.importorskip("coartic.gym")
+    env = gym.TaskEnv(task, model=model, scale=0.7)
+    for number, case in enumerate(cases):
+        if number % 2 and len(task.hands) == 1:  # the other arm moves
+            yield None
+            continue
+        env.reset()
+        total, ended, movements = 0.0, False, iter(case.solution)
+        while not ended:
+            movement = next(movements)
+            action = env.action_for(movement.hand, movement.target)
+            _, reward, ended, _, info = env.step(action)
+            total += reward
+        yield environment_facts(total, info["is_success"], info["corrections"])
+
+
+def environment_facts(total, success, corrections):
+    assert success == (total > -FAILED)
+    return {"reward": total if success else None, "corrections": corrections}
+
+
+def by_vector_environment(task, model, cases):
+    """All trials at once, around configurations that are no robot's."""
+    gym = pytest.importorskip("coartic.gym")
+    goals, count = len(task.goals), len(cases)
+    around = task.q0 + np.random.default_rng(0).normal(0, 0.1, (goals, task.robot.dof))
+    envs = gym.TaskVectorEnv(count, task, around=around, scale=0.7, model=model)
+    envs.reset()
+    arms, total, found = envs.arms, np.zeros(count), [None] * count
+    for goal in range(goals):
+        actions = np.full((count, *arms.action_space.shape), np.nan)
+        for n, case in enumerate(cases):
+            movement = case.solution[goal]
+            if len(task.hands) == 2:
+                actions[n, 0] = {"left": -1, "right": 1}[movement.hand]
+            if movement.target is not None:
+                away = (movement.target - around[goal])[arms.free] / 0.7
+                actions[n, -len(arms.free) :] = away
+        _, rewards, ended, _, infos = envs.step(actions)
+        total += rewards
+        for n in np.flatnonzero(ended):
+            if found[n] is None:
+                success = infos["is_success"][n], infos["corrections"][n]
+                found[n] = environment_facts(total[n], *success)
+    skip = len(task.hands) == 1
+    return [None if skip and number % 2 else each for number, each in enumerate(found)]
+
+
+def by_first_trial_of_the_learner(task, model, cases):
+    condition = "EC4" if len(task.hands) == 2 else "EC1"
+    for case in cases:
+        if not case.is_plain:
+            yield None
+            continue
+        (run,) = learn_many(
+            task, condition, seeds=[0], trials=1, start=case.solution, model=model, jobs=1
+        )
+        yield {
+            "reward": run.rewards[0] if run.completed[0] else None,
+            "ticks": run.counters.movement_ticks,
+            "corrections": run.counters.corrections,
+            "iterations": run.counters.corrective_iterations,
+        }
+
+
+def by_trajectory(task, model, cases):
+    for case in cases:
+        if case.due.reward is None:
+            with pytest.raises(coartic.SolutionError, match="goal"):
+                trajectory(task, case.solution, model=model)
+            yield None
+            continue
+        path = trajectory(task, case.solution, model=model)
+        hits = path.configurations[path.hits] if path.ticks else path.execution.configurations
+        yield {"ticks": path.ticks, "hits": hits, "rows": path.configurations}
+
+
+def by_checker(task, model, cases):
+    """Movements as they are stored, with what they took."""
+    judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))
+    for case in cases:
+        execution = execute(task, case.solution, model=model)
+        if not execution.completed:
+            yield None
+            continue
+        stored = [
+            checker.MoveRow(
+                n, m.goal, m.hand, m.kind, m.ticks, m.target,
+                [] if m.waypoints is None else list(m.waypoints),
+            )
+            for n, m in enumerate(execution.movements)
+        ]  # fmt: skip
+        reward, hands, corrections, travel = checker.recompute(judge, stored)
+        assert hands == execution.hands
+        assert travel == pytest.approx(
+            other_arm_travel(task, hands_of(hands), execution.configurations), abs=1e-9
+        )
+        yield {"reward": reward, "corrections": corrections}
+
+
+DOORS = {
+    "execute": by_execute,
+    "execute many": by_execute_many,
+    "trial": by_trial,
+    "trajectory": by_trajectory,
+    "checker": by_checker,
+    # Those above take any solution, those below one movement for each goal.
+    "trials": by_trials,
+    "make_trials": by_make_trials,
+    "objective": by_objective,
+    "many points": functools.partial(by_objective, many=True),
+    "environment": by_environment,
+    "vector environment": by_vector_environment,
+    "first trial": by_first_trial_of_the_learner,
+}
+
+
+def assert_due(door, task, model, cases):
+    """What a door says of each trial is what is due; of some it may say nothing."""
+    found = [*DOORS[door](task, model, cases)]
+    assert len(found) == len(cases)
+    for facts, case in zip(found, cases, strict=True):
+        for name, value in (facts or {}).items():
+            due = getattr(case.due, name)
+            if name == "reward":
+                assert value == due
+            elif name == "movements":
+                assert [(m.goal, m.hand, m.kind, m.ticks) for m in value] == [
+                    (m.goal, m.hand, m.kind, m.ticks) for m in due
+                ]
+                for one, other in zip(value, due, strict=True):
+                    np.testing.assert_allclose(one.target, other.target, rtol=0, atol=1e-9)
+            else:
+                due = np.reshape(due, np.shape(value))
+                np.testing.assert_allclose(value, due, rtol=0, atol=1e-9, err_msg=name)
+    return [facts for facts in found if facts]
+
+
+@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("door", DOORS)
+def test_a_trial_is_the_references(door, name):
+    found = assert_due(door, TASKS[name], MODELS[name], cases(name))
+    assert found or name == "two-armed-1"  # in which the corrective process fails alone
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_trials_differ(name):
+    """Some fail, some are corrected more than others."""
+    rewards = [case.due.reward for case in cases(name)]
+    assert (None in rewards) == (name not in NONE_FAILS)
+    assert len({*rewards}) >= 8
+    assert len({case.due.corrections for case in cases(name)}) >= 2
+
+
+OTHERS = [
+    MotionModel(max_iterations=100),
+    MotionModel(max_iterations=300, corrective_arrival=True, arrival_tolerance=0.09),
+    MotionModel(max_iterations=300, whole_last_step=True),
+]
+
+
+@functools.cache
+def rich_cases(name, number):
+    """Solutions of all kinds of movement, several for a goal, near what hits and far from it."""
+    task, model, rng = TASKS[name], OTHERS[number], np.random.default_rng(number)
+    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
+
+    def posture(goal, alone):
+        q = np.array(alone[goal] if goal < len(alone) else task.q0)
+        q += rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(q))
+        q[locked] = task.q0[locked]
+        return q
+
+    def movement(goal, hand, alone):
+        kind = str(rng.choice(["learned", "planned", "corrective", "path"]))
+        if kind == "path":
+            way = [posture(goal, alone) for _ in range(rng.integers(1, 4))]
+            return Movement(goal + 1, hand, kind, waypoints=np.array(way))
+        found = kind == "corrective" and rng.random() < 0.5
+        return Movement(goal + 1, hand, kind, None if found else posture(goal, alone))
+
+    found = []
+    for sequence in map(str, rng.choice(hand_sequences(task), 10)):
+        alone = corrective_trial(task, sequence, model=model).configurations
+        case = Case.__new__(Case)
+        case.solution = [
+            movement(goal, hand, alone)
+            for goal, hand in enumerate(hands_of(sequence))
+            for _ in range(rng.integers(1, 4))
+        ]
+        case.due = reference.execute(task, case.solution, model)
+        found.append(case)
+    return found
+
+
+@pytest.mark.parametrize("number", range(len(OTHERS)))
+@pytest.mark.parametrize("name", ["ascending", "two-armed-1", "uneven"])
+@pytest.mark.parametrize("door", [*DOORS][:5])
+def test_a_solution_of_any_kind_is_the_references(door, name, number):
+    assert_due(door, TASKS[name], OTHERS[number], rich_cases(name, number))
+
+
+@pytest.mark.parametrize(("name", "condition"), PAPER_CELLS)
+def test_learned_solutions_take_what_they_took(name, condition):
     task = load_task(name)
-    model = MotionModel(max_iterations=150 if name == "two-armed-1" else 70)  # some trials fail
-    hands, targets = sample(task, 40)
+    for seed in range(3):
+        run = learn(task, condition, seed=seed, trials=400)
+        due = reference.execute(task, run.solution)
+        path = trajectory(task, run.solution)
+        assert run.reward == due.reward == -path.ticks
+        np.testing.assert_array_equal(path.configurations, due.rows)
+        assert [movement.ticks for movement in run.solution] == [m.ticks for m in due.movements]
+
+
+@pytest.mark.parametrize("name", ["two-armed-1", "uneven"])
+def test_a_trial_does_not_notice_its_neighbours(name):
+    """To the last bit, whatever their number and order; nor does an execution."""
+    task, model = TASKS[name], MODELS[name]
+    hands, targets = sample(task, LANES + 30)
     targets[::7, 1] = np.nan
+    hands = np.array(hands)
+    together = make_trials(task, [*hands], targets, model=model)
+    for chosen in (slice(None, None, -1), slice(3, 60, 7), slice(5, 6)):
+        some = make_trials(task, [*hands[chosen]], targets[chosen], model=model)
+        for field, same in zip(together, some, strict=True):
+            np.testing.assert_array_equal(field[chosen], same)
+    kinds = [case.solution for case in rich_cases("two-armed-1", 0)]
+    broken = [kinds[0][:-1], [*kinds[0], "nonsense"], 5, kinds[0][::-1]]
+    many = execute_many(TASKS["two-armed-1"], [*broken, *kinds], model=OTHERS[0])
+    for solution, execution in zip([*broken, *kinds], many, strict=True):
+        if isinstance(execution, Exception):  # one movement less may still be a solution
+            with pytest.raises(type(execution), match=re.escape(str(execution))):
+                execute(TASKS["two-armed-1"], solution, model=OTHERS[0])
+        else:
+            alone = execute(TASKS["two-armed-1"], solution, model=OTHERS[0])
+            np.testing.assert_array_equal(alone.configurations, execution.configurations)
+            assert alone.evaluations == execution.evaluations
+
+
+def test_a_batch_counts_as_so_many_trials():
+    task, model = TASKS["two-armed-1"], MODELS["two-armed-1"]
     batch, single = (Session(task, 0, TOLD, model=model) for _ in range(2))
-    trials = batch.trials(hands, targets)
-    executions = [single.trial(movements_of(*pair)) for pair in zip(hands, targets, strict=True)]
-    assert batch.rewards == single.rewards == [execution.reward for execution in executions]
-    assert 0 < batch.rewards.count(None) < 40
-    rewards = [-np.inf if reward is None else reward for reward in single.rewards]
-    assert trials.rewards.tolist() == rewards
-    assert trials.ticks.tolist() == [execution.ticks for execution in executions]
-    assert trials.corrections.tolist() == [execution.corrections for execution in executions]
-    for reached, execution in zip(trials.reached, executions, strict=True):
-        hits = len(execution.configurations)
-        np.testing.assert_array_equal(reached[:hits], execution.configurations)
-        assert np.isnan(reached[hits:]).all()
+    some = cases("two-armed-1")
+    batch.trials([case.hands for case in some], np.array([case.targets for case in some]))
+    for case in some:
+        single.trial(case.solution)
+    assert batch.rewards == single.rewards
     for count in {*Meter.COUNTS} - {"forward_kinematics"}:
         assert getattr(batch.meter, count) == getattr(single.meter, count), count
     assert 0 < batch.meter.forward_kinematics < single.meter.forward_kinematics
 
 
-def test_hands_as_text_and_as_numbers():
-    task = load_task("two-armed-1")
-    hands, targets = sample(task, 6)
-    session = Session(task, 0, TOLD)
-    codes = hand_codes(task, hands, 6)
-    assert [["L", "R"][code] for code in codes[0]] == [*hands[0]]
-    both = session.trials(hands, targets), session.trials(codes, targets)
-    for one, other in zip(*both, strict=True):
-        np.testing.assert_array_equal(one, other)
-    for wrong in (codes[:5], codes[:, :3], codes + 1, hands[:5], "LLL"):
-        with pytest.raises(ValueError, match="hand"):
-            session.trials(wrong, targets)
+@pytest.mark.parametrize(
+    ("name", "printed"),
+    [("two-armed-1", {"LRLR": -532, "RRRR": -675}), ("two-armed-2", {"RRRR": -357})],
+)
+def test_corrective_process_alone(name, printed):
+    """Every hand sequence; those of the best and of the initial solution are printed."""
+    task = load_task(name)
+    rewards = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
+    assert len(rewards) == 16
+    for hands, reward in rewards.items():
+        alone = [Movement(g, hand, "corrective") for g, hand in enumerate(hands_of(hands), 1)]
+        assert reference.execute(task, alone).reward == reward
+    assert {hands: rewards[hands] for hands in printed} == printed
+    assert max(rewards, key=rewards.get) == next(iter(printed)) == coartic.objective(task).hands
+    assert sorted(rewards.values())[-2] < max(rewards.values())
 
 
-def test_a_budget_that_ends_within_a_batch():
-    task = load_task("two-armed-2")
-    hands, targets = sample(task, 10)
-    unlimited = Session(task, 0, TOLD).trials(hands, targets)
-    session = Session(task, 0, TOLD, trial_budget=7)
-    assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
-    rest = session.trials(hands[4:], targets[4:])
-    np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
-    assert (session.meter.trials, session.trials_left, len(session.rewards)) == (7, 0, 7)
-    assert len(session.trials([], targets[:0]).ticks) == 0
-    with pytest.raises(BudgetError, match="all 7 trials"):
-        session.trials(hands, targets)
+def test_rows_are_the_printed_points():
+    """q + k m (target - q)/distance, the last one short, then the next movement's start."""
+    task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
+    target = np.array([1.005, *[0.0] * 9])
+    path = trajectory(task, [Movement(goal, "right", "planned", target) for goal in (1, 2)])
+    np.testing.assert_allclose(path.configurations[:, 0], [*np.arange(91) * 0.01, 0.9])
+    assert list(path.hits) == [90, 91]
+    np.testing.assert_allclose(path.hand_path("right")[:, 0], path.configurations[:, 0] + 4.5)
+    assert [len(path.subtask(goal)) for goal in (1, 2)] == [91, 2]
 
 
-def test_until_the_first_that_is_better():
-    task = load_task("two-armed-2")
-    hands, targets = sample(task, 12)
-    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
-    until = np.full(12, np.inf)
-    until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
-    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
-    np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
-    alone.trials(hands[:6], targets[:6])
-    assert session.meter == alone.meter
-    assert session.rewards == alone.rewards
-
-
-def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
-    task = load_task("ascending")
-    hands, targets = sample(task, 3)
-    session = Session(task, 0, BLIND)
-    blind, told = session.trials(hands, targets), Session(task, 0, TOLD).trials(hands, targets)
-    np.testing.assert_array_equal(blind.rewards, told.rewards)
-    assert told.corrections.sum() > 0
-    hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
-    assert [len(field) for field in hidden] == [0] * 4
-    targets[1, 2] = np.nan
-    with pytest.raises(UndeclaredError, match="corrective process"):
-        session.trials(hands, targets)
-    with pytest.raises(UndeclaredError, match="reward by trial"):
-        Session(task, 0, TOLD - BLIND).trials(hands, targets)
-
-
-def test_the_cost_of_a_point_is_what_its_trial_takes():
-    task = load_task("two-armed-1")
-    cost = coartic.objective(task, "LRLR", half_width=0.25)
-    assert (cost.dim, cost.bounds.shape) == (4 * 9 - 4, (32, 2))  # locked in y; L is done at last
-    np.testing.assert_allclose(cost.bounds.T - cost.x0, [[-0.25] * 32, [0.25] * 32])
-    assert cost.best_cost == -corrective_trial(task, "LRLR").reward
-    points = cost.x0 + 0.1 * np.random.default_rng(1).standard_normal((20, 32))
-    costs = cost.many(points)
-    q, targets = task.q0, np.tile(task.q0, (4, 1))
-    targets[cost.joints] = points[3]
-    for goal in range(4):  # joints without a parameter stay where they are
-        targets[goal] = np.where(cost.joints[goal], targets[goal], q)
-        q = execute(task, movements_of("LRLR", targets)).configurations[goal]
-    assert costs[3] == -execute(task, movements_of("LRLR", targets)).reward
-    np.testing.assert_array_equal(cost(points.T), costs)
-    assert cost(points[3]) == costs[3]
-    assert cost.evaluations == 41
-
-
-def test_the_best_point_is_kept_with_its_solution():
-    task = load_task("ascending")
-    cost = coartic.objective("ascending")
-    assert execute(task, cost.solution).reward == -319  # the corrective process alone
-    assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
-    state = "hands RRR, 18 parameters, 2 evaluations, best cost 319"
-    assert repr(cost) == f"Objective(ascending, {state})"
-    rng, costs, points = np.random.default_rng(0), [], []
-    for _ in range(30):
-        points.append(cost.x0 + 0.05 * rng.standard_normal((50, cost.dim)))
-        costs.append(cost.many(points[-1]))
-    assert cost.best_cost == np.min(costs) < 319
-    np.testing.assert_array_equal(cost.best_x, np.vstack(points)[np.argmin(costs)])
-    assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x)
-
-
-@pytest.mark.parametrize("name", ["x0", "best_x"])
-def test_points_of_the_objective_can_be_changed_without_harm(name):
-    cost = coartic.objective("two-armed-1")
-    cost.many(cost.x0 + 0.02 * np.random.default_rng(0).standard_normal((300, cost.dim)))
-    kept = cost.x0, cost.best_x, cost.bounds.copy(), cost.postures.copy(), cost.solution
-    x = getattr(cost, name)
-    x += 1.0
-    now = cost.x0, cost.best_x, cost.bounds, cost.postures
-    for before, after in zip(kept, now, strict=False):
-        np.testing.assert_array_equal(before, after)
-    assert cost.best_cost == cost(cost.best_x) < 532  # the corrective process alone
-    assert execute(load_task("two-armed-1"), cost.solution).reward == -cost.best_cost
-
-
-def test_the_objective_keeps_no_batch():
-    cost = coartic.objective("ascending")
-    points = cost.x0 + 0.01 * np.random.default_rng(0).standard_normal((20_000, cost.dim))
-    cost.many(np.tile(cost.x0, (1000, 1)))  # after which nothing is compiled
-    before = cost.best_cost
-    tracemalloc.start()
-    cost.many(points)
-    held, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert cost.best_cost < before
-    assert peak > points.nbytes
-    assert held < points.nbytes / 2  # a reward of each trial
-
-
-def test_a_goal_without_a_target_is_left_to_the_corrective_process():
-    task = load_task("two-armed-2")
-    cost = coartic.objective(task, "RLRR")
-    goals = np.argwhere(cost.joints)[:, 0]  # of each entry of a point
-    rng = np.random.default_rng(0)
-    points = cost.x0 + 0.03 * rng.standard_normal((40, cost.dim))
-    none = rng.random((40, 4)) < 0.5
-    points[none[:, goals]] = np.nan
-    for point, without, value in zip(points, none, cost.many(points), strict=True):
-        targets = np.full(cost.joints.shape, np.nan)
-        targets[cost.joints] = point
-        q, movements = task.q0, []
-        for goal, target in enumerate(targets):
-            whole = None if without[goal] else np.where(np.isnan(target), q, target)
-            kind = "corrective" if without[goal] else "learned"
-            hand = "left" if "RLRR"[goal] == "L" else "right"
-            movements.append(Movement(goal + 1, hand, kind, whole))
-            q = execute(task, movements + rest("RLRR", goal + 1)).configurations[goal]
-        assert value == -execute(task, movements).reward
-    points[3, 0] = 0.0 if none[3, 0] else np.nan
-    with pytest.raises(ValueError, match="point 3: of goal 1 some entries are NaN"):
-        cost.many(points)
-    with pytest.raises(ValueError, match="infinite"):
-        cost(np.where(goals == 1, np.inf, cost.x0))
-
-
-def rest(hands, first):
-    """The corrective process alone at the goals from ``first`` on, counted from 0."""
-    return [*movements_of(hands, np.full((len(hands), 1), np.nan))[first:]]
-
-
-ENTRIES = {f"{e.task} {e.base} {e.other_arm}": e for e in entries()}
-WITHOUT_SOLUTION = {  # no search has one: the task as it is locked has none, or none is known
-    "ascending xy free", "ascending xy still", "descending xy free", "descending xy still",
-    "descending y free", "descending y still", "two-armed-1 xy free", "two-armed-1 xy still",
-    "two-armed-2 xy free", "two-armed-2 xy still",
-}  # fmt: skip
-
-
-def test_every_optimum_is_replayed_or_there_is_none():
-    assert {name for name, entry in ENTRIES.items() if not entry.solution} == WITHOUT_SOLUTION
-    assert ENTRIES.keys() - WITHOUT_SOLUTION >= {f"{task} task free" for task in builtin_tasks()}
-
-
-@pytest.mark.parametrize("name", sorted(ENTRIES.keys() - WITHOUT_SOLUTION))
-def test_an_optimum_gets_its_reward_through_every_door(name):
-    """Solutions hold one movement for each goal, and none follows a path."""
-    entry, task = ENTRIES[name], load_task(name.split()[0])
-    if entry.base != "task":
-        task = task.model_copy(update={"locked_base": tuple(entry.base)})
-    solution = movements_from(task, pd.DataFrame(entry.solution))
-    assert execute(task, solution).reward == entry.reward
-    assert [movement.goal for movement in solution] == [*range(1, len(task.goals) + 1)]
-    targets = np.array([np.full(task.robot.dof, np.nan) if m.kind == "corrective" else m.target
-                        for m in solution])  # fmt: skip
-    session = Session(task, 0, TOLD)
-    assert session.trials(entry.hands, targets[None]).rewards == [entry.reward]
-    cost = coartic.objective(task, entry.hands)
-    assert cost(targets[cost.joints]) == -entry.reward
-    assert execute(task, cost.solution).reward == entry.reward
-    gymnasium, door = pytest.importorskip("gymnasium"), pytest.importorskip("coartic.gym")
-    options = {"task": task, "around": entry.hands}
-    env = gymnasium.make("coartic/Task-v0", **options)
-    env.reset()
-    actions, rewards = [], []
-    for movement, target in zip(solution, targets, strict=True):
-        actions.append(env.unwrapped.action_for(movement.hand, target))
-        rewards.append(env.step(actions[-1])[1])
-    assert sum(rewards) == entry.reward
-    assert env.unwrapped.arms.is_success.all()
-    several = door.TaskVectorEnv(3, **options)
-    several.reset()
-    totals = sum(several.step(np.tile(action, (3, 1)))[1] for action in actions)
-    assert totals.tolist() == [entry.reward] * 3
-
-
-def test_the_optima_that_need_a_goal_of_no_ticks_hold_one():
-    """So that the tests above see that a door can express it."""
-    none = {n for n, e in ENTRIES.items() if any(m["ticks"] == 0 for m in e.solution)}
-    assert none >= {"two-armed-1 task free", "two-armed-2 task free"}
-
-
-def test_the_default_hands_are_those_that_do_best_alone():
-    task = load_task("two-armed-1")
-    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
-    assert coartic.objective(task).hands == max(alone, key=alone.get) == "LRLR"
-    with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
-        coartic.objective(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
-
-
-def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
-    model = MotionModel(max_iterations=100)
-    cost = coartic.objective("ascending", model=model)
-    costs = cost.many(cost.x0 + np.random.default_rng(0).standard_normal((200, cost.dim)))
-    assert 0 < (costs == FAILED).sum() < 200
-    assert costs[costs < FAILED].max() < 5000
-    with pytest.raises(MethodError, match="completes no hand sequence"):
-        coartic.objective("ascending", model=MotionModel(max_iterations=2))
-    for wrong in (cost.x0[None, 1:], cost.x0):
-        with pytest.raises(ValueError, match="needed is"):
-            cost.many(wrong)
-
-
-@pytest.mark.parametrize(("budget", "trials"), [(30, None), (None, 30), (30, 50)])
-def test_the_objective_ends_with_the_trials(budget, trials):
-    session = Session(load_task("two-armed-2"), 0, TOLD, trial_budget=budget)
-    cost = Objective(session, trials=trials)
-    points = np.tile(cost.x0, (10, 1))
-    assert len(cost.many(points)) == 10
-    with pytest.raises(BudgetError):
-        cost.many(points)  # 16 for the hands, and 4 of these
-    assert (cost.evaluations, session.meter.trials) == (14, 30)
-    with pytest.raises(BudgetError):
-        cost(cost.x0)
-
-
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-EXAMPLES = DOCS / "examples"
-
-
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
-def test_the_examples_are_methods(path, in_this_process):
-    text = path.read_text("utf-8")
-    for library in re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE):
-        pytest.importorskip(library)
-    if "coartic.agents" in text:
-        pytest.importorskip("stable_baselines3")
-    name = re.search(r'name = "(.*)"', text)[1]
-    entry = registry([path])[name]
-    laws = check_method(entry, tasks=[load_task("ascending")])
-    assert [law for law in laws if not law.passed] == []
-    session = Session(load_task("ascending"), 0, entry.method.told, trial_budget=300)
-    solution = entry.with_parameters({}).solve(session).solution
-    assert session.meter.trials == len(session.rewards) == 300
-    reward = execute(load_task("ascending"), solution).reward
-    if "coartic.agents" in text:  # what was learned, in the last trial
-        assert reward == session.rewards[-1]
-    else:
-        assert reward == max(session.rewards)
-
-
-def test_the_first_program_of_the_page(capsys):
-    exec(BLOCKS[0].replace('"seed": 1', '"seed": 1, "maxiter": 3'), {})
-    shown = capsys.readouterr().out
-    cost, reward = re.search(r"([0-9.]+) ticks", shown)[1], re.search(r"\n(-\d+)\n", shown)[1]
-    assert float(cost) == -int(reward)
-
-
-class Practised:
-    """Stands for an agent: wild while it learns, still when its policy is asked for."""
-
-    def __init__(self, envs, action, seed):
-        self.envs, self.action, self.rng = envs, action, np.random.default_rng(seed)
-        self.gains = []
-
-    def learn(self, steps):
-        self.envs.reset()
-        for _ in range(steps):
-            size = (self.envs.num_envs, *self.envs.action_space.shape)
-            gains, ended = self.envs.step(self.rng.uniform(-1, 1, size))[1:3]
-            self.gains += gains[ended].tolist()
-
-    def predict(self, observations, deterministic=False):
-        assert deterministic
-        size = len(observations), *self.envs.action_space.shape
-        return np.broadcast_to(self.action, size), None
-
-
-def agent_of(action, **parameters):
-    agents = pytest.importorskip("coartic.agents")
-
-    class Told(agents.Agent):
-        name, title, citation = "told", "Told what to do", "None."
-
-        def agent(self, envs, seed):
-            return Practised(envs, action, seed)
-
-    return Told(agents.AgentParameters(**parameters))
-
-
-@pytest.mark.parametrize(("budget", "trials"), [(100, 10_000), (None, 100)])
-def test_an_agent_is_judged_by_its_policy_without_noise(budget, trials):
-    task = load_task("two-armed-1")
-    pytest.importorskip("stable_baselines3")
-    session = Session(task, 0, TOLD, trial_budget=budget)
-    method = agent_of(0.02, trials=trials, scale=0.25, envs=8)
-    result = method.solve(session)
-    assert session.meter.trials == len(session.rewards) == 100
-    cost = coartic.objective(task, "LRLR")
-    learned = -cost(cost.x0 + 0.25 * np.float64(0.02))
-    assert execute(task, result.solution).reward == session.rewards[-1] == learned
-    assert result.details == {"best_trial_reward": max(session.rewards)}
-    assert max(session.rewards) == -532 > learned  # no guess was better than what was tried first
-
-
-def test_an_agent_whose_policy_fails_has_no_solution():
-    pytest.importorskip("stable_baselines3")
-    task, model = load_task("ascending"), MotionModel(max_iterations=100)
-    session = Session(task, 0, TOLD, model=model, trial_budget=50)
-    result = agent_of(-0.5, scale=2.0).solve(session)
-    assert session.rewards[-1] is None
-    assert not execute(task, result.solution, model=model).completed
-    assert result.details["best_trial_reward"] == max(r for r in session.rewards if r is not None)
-
-
-def test_an_agent_needs_a_trial_for_its_policy():
-    pytest.importorskip("stable_baselines3")
-    for budget in (1, 2, 17, 18):
-        session = Session(load_task("two-armed-1"), 0, TOLD, trial_budget=budget)
-        if budget == 1:
-            with pytest.raises(MethodError, match="no trial to make"):
-                agent_of(0.0).solve(session)
-        else:
-            assert len(agent_of(0.0).solve(session).solution) == 4
-        assert session.meter.trials == (budget if budget > 1 else 0)
+def test_goals_hit_at_the_start():
+    task = tiny_task(goals=[[4.5, 0.1], [5.5, 0.1]])
+    path = trajectory(task, [Movement(goal, "right", "corrective") for goal in (1, 2)])
+    assert path.hits[0] == 0
+    np.testing.assert_array_equal(path.configurations[0], task.q0)
+    only = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
+    idle = trajectory(only, [Movement(1, "right", "corrective")])
+    assert (idle.configurations.shape, list(idle.hits)) == ((0, 10), [0])

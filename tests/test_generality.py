@@ -12,8 +12,9 @@ from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.topics.families.sample import one_by_one, sample, signs
-from coartic.tasks.families import names_in
+from coartic.analysis.study import one_by_one
+from coartic.analysis.topics.families.sample import sample, signs
+from coartic.tasks.families import instances_in
 from tests.support.made_up import MadeUp, made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -44,7 +45,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
     """Rewards of conditions by label: a number, or a function of the instance's number."""
     rows, tasks, best = [], [], {}
     for family in families:
-        for number, name in enumerate(names_in(f"{family}/{split}000..{split}{count - 1:03d}")):
+        for number, name in enumerate(instances_in(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
@@ -156,9 +157,9 @@ def test_claims_of_generality(monkeypatch):
     monkeypatch.setattr(data, "initial_solution", lambda task, model: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
     study = with_signs(rewarded(centres, families=ONE + TWO))
-    entries = {entry.claim.id: entry for entry in judge.judged(study)}
+    entries = {entry.claim.id: entry for entry in judge.judgements(study)}
     assert set(entries) == {
-        name for name, claim in CLAIMS.items() if claim.families and not claim.suite
+        name for name, claim in CLAIMS.items() if claim.on_random_tasks and not claim.suite
     }
     for name in (
         "learning-improves",
@@ -170,7 +171,7 @@ def test_claims_of_generality(monkeypatch):
         assert entry.verdict == "supported", entry.finding.evidence
         assert entry.adjusted_p < 0.05
     guessed = with_signs(rewarded(centres, families=ONE + TWO), placebo=1.0)
-    entries_of_guesses = {entry.claim.id: entry for entry in judge.judged(guessed)}
+    entries_of_guesses = {entry.claim.id: entry for entry in judge.judgements(guessed)}
     for name in ("other-arm-coarticulation-in-general", "arm-coarticulation-in-general"):
         assert entries_of_guesses[name].verdict == "undecided"  # no more than guessing shows
     ensured = entries["corrective-ensures-in-general"]
@@ -189,7 +190,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
                 values["hand"] = np.array([0.4, 0.6]) + shift
-        (entry,) = judge.judge(study, [CLAIMS["hand-coarticulation-in-general"]])
+        (entry,) = judge.judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]])
         return entry.verdict
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [
@@ -206,13 +207,13 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
         CLAIMS[f"{name}-in-general"]
         for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
     ]
-    assert {entry.verdict for entry in judge.judge(falling, claims)} == {"not supported"}
-    assert judge.judge(mixed, claims)[0].verdict == "undecided"
+    assert {entry.verdict for entry in judge.judge_claims(falling, claims)} == {"not supported"}
+    assert judge.judge_claims(mixed, claims)[0].verdict == "undecided"
 
 
 def test_development_instances_are_not_judged():
     study = with_signs(rewarded(RISING, split="d"))
-    assert {entry.verdict for entry in judge.judged(study)} == {"undecided"}
+    assert {entry.verdict for entry in judge.judgements(study)} == {"undecided"}
 
 
 def test_tables_over_instances():

@@ -8,46 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import CONDITIONS, MotionModel, Movement, execute, learn, load_task
-from coartic.baselines.cma_es import Bandit
-from coartic.method import Session
+from coartic import MotionModel, load_task
 from coartic.optimisers import FAILED
 
 gymnasium = pytest.importorskip("gymnasium")
 
+import coartic  # noqa: E402
 import coartic.gym  # noqa: E402
 
-IDS = {f"coartic/{name}-v0": task for name, task in coartic.gym.TASKS.items() if task}
 TWO = "coartic/TwoArmed1-v0"
-
-
-def solutions(task):
-    """Of the learner, and of CMA-ES, which ends as near to a whole tick as it gets."""
-    condition = CONDITIONS["EC4" if len(task.hands) == 2 else "EC1"]
-    yield learn(task, condition, seed=0, trials=300).learned
-    yield Bandit(Bandit.Parameters(trials=800)).solve(Session(task, 0, Bandit.told)).solution
-
-
-@pytest.mark.parametrize(("name", "around"), [*zip(IDS, [None, "alone"] * 2, strict=True)])
-def test_a_replayed_solution_gets_its_reward(name, around):
-    task = load_task(IDS[name])
-    env = gymnasium.make(name, around=around and "R" * len(task.goals)).unwrapped
-    for solution in solutions(task):
-        execution = execute(task, solution)
-        first = {m.goal: m for m in reversed(execution.movements)}
-        env.reset()
-        steps = [
-            env.step(env.action_for(first[goal].hand, first[goal].target)) for goal in sorted(first)
-        ]
-        _, rewards, ended, truncated, infos = zip(*steps, strict=True)
-        assert [-reward for reward in rewards] == list(execution.ticks_by_goal())
-        assert sum(rewards) == execution.reward
-        assert [*ended] == [False] * (len(task.goals) - 1) + [True]
-        assert not any(truncated)
-        assert infos[-1]["hands"] == execution.hands
-        assert infos[-1]["is_success"]
-        assert not infos[-2]["is_success"]
-        np.testing.assert_allclose(env.arms.q[0], execution.configurations[-1], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -85,31 +54,17 @@ def test_what_the_learner_sees_and_what_can_be_seen():
     assert gymnasium.make("coartic/Ascending-v0").action_space.shape == (2 + 4,)
 
 
-@pytest.mark.parametrize("options", [{}, {"around": "LRLR"}])
-def test_joints_that_are_nan_leave_a_goal_to_the_corrective_process(options):
-    """Some robots of a vector move to targets, and some do not."""
-    task, rng = load_task("two-armed-1"), np.random.default_rng(0)
-    envs = gymnasium.make_vec(TWO, num_envs=20, **options)
-    single = gymnasium.make(TWO, **options)
-    actions = rng.uniform(-1, 1, (4, 20, 10))
-    without = rng.random((4, 20)) < 0.5
-    actions[..., 1:][without] = np.nan
-    envs.reset()
-    rewards = sum(envs.step(action)[1] for action in actions)
-    for robot in range(20):
-        hands = ["left" if hand <= 0 else "right" for hand in actions[:, robot, 0]]
-        single.reset()
-        movements = []
-        for goal, hand in enumerate(hands):
-            arms = single.unwrapped.arms
-            target = arms.centre(np.array([0]))[0].copy()
-            target[arms.free] += actions[goal, robot, 1:]
-            kind = "corrective" if without[goal, robot] else "learned"
-            movements.append(
-                Movement(goal + 1, hand, kind, None if kind == "corrective" else target)
-            )
-            single.step(actions[goal, robot])
-        assert execute(task, movements).reward == rewards[robot]
+def test_given_hands_leave_idle_arms_where_they_are():
+    """As the objective does, whose points have no entries for them."""
+    cost = coartic.objective("two-armed-1", "LRLR")
+    env = gymnasium.make(TWO, hands="LRLR", around="LRLR").unwrapped
+    for away in (0.02, -0.03):
+        env.reset()
+        steps = [env.step(np.full(9, away)) for _ in range(4)]
+        assert sum(reward for _, reward, *_ in steps) == -cost(cost.x0 + away)
+        assert steps[-1][4]["hands"] == "LRLR"
+    with pytest.raises(ValueError, match="do not fit"):
+        gymnasium.make(TWO, hands="LR")
 
 
 def test_the_action_of_no_target():
@@ -175,6 +130,21 @@ def test_the_vector_is_as_many_single_ones(options):
 
 
 def test_the_robot_is_drawn():
+    """Goals that are hit are filled; the robot moves."""
+    from matplotlib.figure import Figure
+
+    from coartic import drawing
+
+    task, axes = load_task("two-armed-1"), Figure().add_subplot()
+    circles = drawing.draw_goals(axes, task)
+    drawing.fill_goals(circles, [True, False, False, False])
+    assert [circle.get_fill() for circle in circles] == [True, False, False, False]
+    assert [circle.center for circle in circles] == [*map(tuple, task.goals)]
+    move = drawing.draw_robot(axes, task, task.q0)
+    move(task.q0 + 1.0)
+    for line, hand in zip(axes.lines, ("left", "right"), strict=True):
+        due = task.robot.joint_positions(task.q0 + 1.0, hand)
+        np.testing.assert_array_equal(line.get_xydata(), due)
     env = gymnasium.make(TWO, render_mode="rgb_array")
     env.reset()
     before = env.render()

@@ -6,7 +6,6 @@ from dataclasses import replace
 from fnmatch import fnmatch
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from coartic import (
@@ -18,18 +17,18 @@ from coartic import (
     hand_sequences,
     load_task,
 )
-from coartic.analysis.topics.paper.rewards import beside_paper
-from coartic.benchmarks.outcome import kept, too_long
+from coartic.analysis.topics.paper.tables import beside_paper
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.registry import Entry, registry
-from coartic.benchmarks.run import Selection, plan_suite
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.run import Selection, perform, plan_suite
+from coartic.benchmarks.scoring import score, too_long
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
-from coartic.benchmarks.worker import Answer, Outcome
+from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.learner.conditions import CONDITIONS, VARIANTS
-from coartic.learner.rows import movements_from
 from coartic.method import Information, Session
 from coartic.motion.initial import ranked_sequences
-from coartic.runs.plan import BUILT_IN, run_seed
+from coartic.runs.plan import RunKey, Setting, run_seed
+from coartic.runs.run import Times, movements_from
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import as_released, tiny_task
 from tests.support.suites import (
@@ -97,18 +96,12 @@ def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
 
 
-def test_a_cell_does_not_depend_on_its_company(results, tmp_path):
-    cells = paper_cells(tasks=["two-armed-2"], methods=["dual-process/EC4"])
-    alone = run_and_write(tmp_path, cells).runs
-    chosen = results.runs[results.runs.run_id.isin(alone.run_id)].reset_index(drop=True)
-    pd.testing.assert_series_equal(alone.reward, chosen.reward)
-    assert len(chosen) == 2
-
-
 def test_seeds_are_paired_by_task_and_run(results):
     seeds = results.runs.groupby(["task", "run"]).seed.nunique()
     assert (seeds == 1).all()
     assert results.runs.seed.nunique() == 8  # 4 tasks x 2 runs
+    first = results.runs[results.runs.task == "ascending"].set_index("run").seed
+    assert first.loc[[0, 1]].tolist() == [8100969740339433741, 8329115429701909987]
     for root, task in ((0, "ascending"), (1, "ascending"), (2**40 + 5, "x"), (2**63 - 1, "é")):
         digest = hashlib.sha256(task.encode()).digest()
         words = [int.from_bytes(digest[4 * k : 4 * k + 4], "little") for k in range(4)]
@@ -120,8 +113,8 @@ def test_seeds_are_paired_by_task_and_run(results):
 
 def test_run_ids_name_what_the_run_depends_on():
     def first(cells=None, **changes):
-        plan = planned(cells or paper_cells()[:1], **{"runs": 1, "trials": 10, **changes}).plan
-        return plan.run_ids(0)[0]
+        plan = planned(cells or paper_cells()[:1], **{"runs": 1, "trials": 10, **changes})
+        return plan.key(0, 0).id
 
     (cell, other), base = paper_cells()[:2], first()
     assert base == first()
@@ -131,9 +124,9 @@ def test_run_ids_name_what_the_run_depends_on():
         first(seed=1),
         first(trials=11),
         first(trial_budget=5),
-        first([Cell(cell.task, cell.entry, (("noise_sd", 0.1),))]),
-        first([Cell(cell.task.model_copy(update={"radius": 0.2}), cell.entry)]),
-        first([Cell(cell.task, Entry(cell.entry.method, BUILT_IN, cell.entry.where, "c0de"))]),
+        first([Cell(cell.task, cell.method, {"noise_sd": 0.1})]),
+        first([Cell(cell.task.model_copy(update={"radius": 0.2}), cell.method)]),
+        first([Cell(cell.task, replace(cell.method, code="c0de"))]),
     ]
     assert len({base, *others}) == 8
 
@@ -213,12 +206,14 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     cells = suite_of(tmp_path, ec1, ec1 + "runs = 7")
     with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
         plan_suite(tmp_path / "own.toml")
-    assert [cell.runs for cell in planned(cells, runs=2).plan.cells] == [2]
+    assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
+    once = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
+    assert planned(once, runs=20).size == 1
     task, select = tmp_path / "mine.toml", Selection(task_files=[tmp_path / "mine.toml"])
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
     own = plan_suite(tmp_path / "own.toml", select=select)
-    assert {cell.runs for cell in own.plan.cells if cell.task == "mine"} == {7}
+    assert {cell.runs for cell in own.cells if cell.task.name == "mine"} == {7}
 
 
 def test_verdicts_only_for_runs_as_long_as_the_papers(tmp_path):
@@ -268,39 +263,45 @@ def test_a_session_counts_per_configuration():
         session.correct(session.q0, "right", 4)
 
 
-def test_what_is_kept_of_a_run():
-    """Of three runs of one job, whose solutions are the corrective process (319 ticks)."""
-    task = load_task("ascending")
+def test_the_runs_of_a_batch_are_scored():
+    """Solutions are the corrective process, 319 ticks; the second run has no tenths."""
+    task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
+    setting = Setting(task, card.name, card.code, card.told, {}, PAPER, None)
+    keys = tuple(RunKey(f"run-{k}", 0, k, 10 + k) for k in range(4))
+    times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
-    told = {"parts": {"solution": movements}, "rewards": [None, -330, -319, -319]}
+    told = {"parts": {"solution": movements}, "times": times}
     outcomes = [
-        Outcome("ok", details={"corrections": corrections}, **told),
-        Outcome("ok", details={"corrections": corrections[:-1]}, parts=told["parts"]),
-        Outcome("ok"),
+        Outcome("ok", details={"corrections": corrections}, rewards=[None, -330, -319, -319],
+                bound=-300, **told),
+        Outcome("ok", details={"corrections": corrections[:-1]}, **told),
+        Outcome("ok", times=times),
+        Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
+    ]  # fmt: skip
+    job = Job(setting, card, keys, 60.0)
+    runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
+    columns = ["run_id", "run", "seed", "status", "reward", "hands", "best_trial",
+               "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
+               "replay_reward", "proven_bound", "together", "wall_s", "cpu_s"]  # fmt: skip
+    nothing = [None] * 9
+    assert [[run.to_row()[name] for name in columns] for run in runs] == [
+        ["run-0", 0, 10, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, -300, 4, 2.0, 1.0],
+        ["run-1", 1, 11, "ok", -319, "RRR", None, None, None, 3, 0.0, None, None, 4, 2.0, 1.0],
+        ["run-2", 2, 12, "solver-failed", *nothing, 4, 2.0, 1.0],
+        ["run-3", 3, 13, "solver-failed", *nothing, 1, None, None],
+        ["run-0", 0, 10, "timeout", *nothing, 4, 2.0, None],
     ]
-    kept_runs = kept([{"run": k} for k in range(3)], Answer(outcomes, 6.0, 3.0), task, PAPER)
-    columns = ["run", "status", "reward", "hands", "best_trial", "early_corrections",
-               "late_corrections", "solution_corrections", "other_arm_travel", "replay_reward",
-               "together", "wall_s", "cpu_s"]  # fmt: skip
-    assert [[run.row[name] for name in columns] for run in kept_runs] == [
-        [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, 3, 2.0, 1.0],
-        [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, 3, 2.0, 1.0],
-        [2, "solver-failed", None, None, None, None, None, None, None, None, 3, 2.0, 1.0],
-    ]
-    assert kept_runs[2].row["reason"] == "it reported ok, but returned no solution"
+    assert (runs[0].reason, runs[4].reason) == ("", "too slow")
+    assert runs[2].reason == "it reported ok, but returned no solution"
+    assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].reason
+    assert runs[3].scores == {}
 
 
 def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000, PAPER) is None
     assert "10001 movements" in str(too_long(task, [move] * 10_001, PAPER))
-
-
-def test_deterministic_methods_run_once():
-    cells = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
-    assert [cell.method for cell in cells] == ["corrective-alone/every"]
-    assert planned(cells, runs=20).plan.size == 1
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):
@@ -325,7 +326,7 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     assert len(select_cells(paper, KNOWN, task_files=[path])) == 7 + 4
 
     def methods(path, **selection):
-        return [c.method for c in select_cells(paper, KNOWN, task_files=[path], **selection)]
+        return [c.method.name for c in select_cells(paper, KNOWN, task_files=[path], **selection)]
 
     baseline = ["corrective-alone/every"]
     assert methods(path, tasks=["mine"], methods=baseline) == baseline
@@ -345,11 +346,10 @@ def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
     assert [cell.variant for cell in grid] == ["", "discount=0.2"]
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/"):
-            method = entry.declared
             condition = (CONDITIONS | VARIANTS)[name.partition("/")[2]]
             for key, value in entry.complete({"trials": 1}).items():
                 assert key == "trials" or getattr(condition, key) == value
-            assert ("reward by subtask" in method.told) == name.endswith("-subtask")
+            assert ("reward by subtask" in entry.told) == name.endswith("-subtask")
     with pytest.raises(CoarticError, match="discount is an unknown key"):
         KNOWN["dual-process/EC4"].complete({"discount": 0.1})  # told would no longer be right
 
@@ -410,7 +410,6 @@ def test_a_suite_can_move_one_goal(tmp_path):
 def test_a_folder_of_another_suite_is_refused(tmp_path):
     cells = paper_cells(tasks=["ascending"], methods=["EC1"])
     plan = planned(cells, runs=1, trials=5)
-    plan.perform(tmp_path, executor=InProcess())
-    other = replace(plan, plan=replace(plan.plan, suite="quick"))
+    perform(plan, tmp_path, executor=InProcess())
     with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
-        other.perform(tmp_path, executor=InProcess())
+        perform(replace(plan, suite="quick"), tmp_path, executor=InProcess())

@@ -1,6 +1,8 @@
 """Models beside people: measures of planted paths and postures, verdicts, a small suite."""
 
+import json
 import math
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -8,81 +10,75 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from pydantic import ValidationError
 from scipy import stats
 
+from coartic import load_task
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.topics.human import judge, measures
-from coartic.analysis.topics.human.judge import (
-    AGREES,
-    DISAGREES,
-    FINDINGS,
-    NO_CASES,
-    NOT_BEYOND,
-    SILENT,
-    UNDECIDED,
-    Finding,
-    bootstrapped,
-    judged,
-    separating,
-    verdict_of,
-    verdict_of_test,
-)
-from coartic.analysis.topics.human.measures import MODELS, Values
+from coartic.analysis.statistics.estimates import Estimate
+from coartic.analysis.topics.human import findings, measures
+from coartic.analysis.topics.human.findings import FINDINGS, bootstrap
+from coartic.analysis.topics.human.measures import MEASURES, MODELS, Model, mean_of_rows
+from tests.support.made_up import row, study_of
 from tests.support.suites import run_and_write, suite_of
 
-ABOVE, BETWEEN, RATIO = (
-    FINDINGS[name] for name in ("first-slower", "few-are-enough", "stop-separates")
-)
+ABOVE = [{"above": 1}]
+BETWEEN = [{"above": 1}, {"below": 3, "disagree": 4}]
+RATIO = [{"below": 1, "disagree": 0.9}]
 
 
 @pytest.mark.parametrize(
-    ("finding", "ends", "tasks", "verdict"),
+    ("tests", "ends", "tasks", "verdict"),
     [
-        (ABOVE, [(1.5, 9)], 10, AGREES),
-        (ABOVE, [(0.5, 9)], 10, UNDECIDED),
-        (ABOVE, [(-2, 0.5)], 10, DISAGREES),
-        (ABOVE, [(1, 9)], 10, UNDECIDED),  # may be at the bound, which is not above it
-        (ABOVE, [(1.5, 9)], 9, UNDECIDED),
-        (ABOVE, [(math.nan, math.nan)], 0, NO_CASES),
-        (BETWEEN, [(1.2, 2.5)] * 2, 10, AGREES),
-        (BETWEEN, [(1.2, 3.5)] * 2, 10, UNDECIDED),  # above 3, and not yet above 4
-        (BETWEEN, [(4.2, 4.5)] * 2, 10, DISAGREES),
-        (BETWEEN, [(0.2, 0.5)] * 2, 10, DISAGREES),
-        (RATIO, [(0.5, 0.8)], 10, AGREES),
-        (RATIO, [(0.92, 0.98)], 10, UNDECIDED),  # less than 1, but within a tenth of it
-        (RATIO, [(0.95, 1.2)], 10, DISAGREES),
-        (RATIO, [(0.85, 1.2)], 10, UNDECIDED),
+        (ABOVE, [(1.5, 9)], 10, "agrees"),
+        (ABOVE, [(0.5, 9)], 10, "undecided"),
+        (ABOVE, [(-2, 0.5)], 10, "disagrees"),
+        (ABOVE, [(1, 9)], 10, "undecided"),  # may be at the bound, which is not above it
+        (ABOVE, [(1.5, 9)], 9, "undecided"),
+        (BETWEEN, [(1.2, 2.5)] * 2, 10, "agrees"),
+        (BETWEEN, [(1.2, 3.5)] * 2, 10, "undecided"),  # above 3, and not yet above 4
+        (BETWEEN, [(4.2, 4.5)] * 2, 10, "disagrees"),
+        (BETWEEN, [(0.2, 0.5)] * 2, 10, "disagrees"),
+        (RATIO, [(0.5, 0.8)], 10, "agrees"),
+        (RATIO, [(0.92, 0.98)], 10, "undecided"),  # less than 1, but within a tenth of it
+        (RATIO, [(0.95, 1.2)], 10, "disagrees"),
+        (RATIO, [(0.85, 1.2)], 10, "undecided"),
     ],
 )
-def test_verdicts(finding, ends, tasks, verdict):
+def test_verdicts(tests, ends, tasks, verdict):
     of_tests = [
-        verdict_of_test(test, (math.nan, *end), tasks)
-        for test, end in zip(finding.tests, ends, strict=True)
+        findings.verdict_of_test(Estimate(math.nan, *end, n=(tasks,)), **bounds)
+        for bounds, end in zip(tests, ends, strict=True)
     ]
-    assert verdict_of(of_tests) == verdict
+    assert findings.verdict_of(of_tests) == verdict
+    assert findings.verdict_of_test(Estimate(math.nan), **tests[0]) == "no cases"
 
 
-def test_a_test_without_cases_does_not_hide_one_on_the_wrong_side():
-    assert verdict_of([NO_CASES, DISAGREES]) == verdict_of([AGREES, DISAGREES]) == DISAGREES
-    assert verdict_of([NO_CASES, AGREES]) == NO_CASES
+@pytest.mark.parametrize(
+    ("of_tests", "verdict"),
+    [
+        (["no cases", "disagrees"], "disagrees"),
+        (["agrees", "disagrees"], "disagrees"),
+        (["agrees", "no cases"], "no cases"),
+        (["agrees", "undecided"], "undecided"),
+    ],
+)
+def test_one_test_on_the_wrong_side_disagrees(of_tests, verdict):
+    assert findings.verdict_of(of_tests) == verdict
 
 
-def values_of(numbers):
-    """One number a task, and their mean."""
-    by_task = {f"t{k}": np.array([[float(number)]]) for k, number in enumerate(numbers)}
-    return Values(by_task, lambda rows: float(rows.mean()))
+def by_task(numbers):
+    """One number a task."""
+    return {f"t{k}": float(number) for k, number in enumerate(numbers)}
 
 
-def test_an_interval_covers_as_often_as_it_says(monkeypatch):
+def test_an_interval_covers_as_often_as_it_says():
     """Means of 15 tasks: about 95 of 100 intervals hold the truth, 0; a few less with so few."""
-    monkeypatch.setattr(judge, "RESAMPLES", 499)
     rng = np.random.default_rng(5)
-    held = 0
-    for _ in range(300):
-        _, low, high = bootstrapped(values_of(rng.standard_normal(15)), 0.05)
-        held += low <= 0 <= high
-    assert 0.88 <= held / 300 <= 0.985
+    seen = [
+        bootstrap(by_task(rng.standard_normal(15)), mean_of_rows, 0.05, resamples=499)
+        for _ in range(300)
+    ]
+    assert 0.88 <= np.mean([each.low <= 0 <= each.high for each in seen]) <= 0.985
 
 
 def test_a_difference_is_paired_by_task():
@@ -90,76 +86,90 @@ def test_a_difference_is_paired_by_task():
     rng = np.random.default_rng(6)
     tasks = 20 * rng.standard_normal(21)
     tasks[20] = 1e6
-    ours = values_of(tasks + 1 + 0.1 * rng.standard_normal(21))
-    theirs = values_of(tasks[:20])
-    value, low, high = bootstrapped(ours, 0.05, beside=theirs)
-    assert 0.9 < low < value < high < 1.1
+    ours = by_task(tasks + 1 + 0.1 * rng.standard_normal(21))
+    seen = bootstrap(ours, mean_of_rows, 0.05, by_task(tasks[:20]))
+    assert 0.9 < seen.low < seen.value < seen.high < 1.1
+    assert seen.n == (20,)
+    assert math.isnan(bootstrap(by_task([1]), mean_of_rows, 0.05).low)
 
 
-def planted(monkeypatch, **by_model):
-    """A study in which every measure finds of each model what is planted, and else nothing."""
-    models = {id(MODELS[name.replace("_", " ")]): numbers for name, numbers in by_model.items()}
-    monkeypatch.setattr(
-        judge,
-        "MEASURES",
-        dict.fromkeys(measures.MEASURES, lambda _, model: values_of(models.get(id(model), []))),
-    )
-    monkeypatch.setattr(judge, "RESAMPLES", 499)
-    return SimpleNamespace(suite="human", _computed={})
-
-
-def verdict_on_two_ahead(study, model):
-    rows = judged(study).set_index(["finding", "model"])
-    return tuple(rows.loc[("two-ahead", model), ["verdict", "because"]])
-
-
-def test_what_is_picked_from_trials_agrees_only_beyond_random_guesses(monkeypatch):
-    noise = 0.02 * np.random.default_rng(7).standard_normal((3, 12))
-    shows = 0.5 + noise[0]
-    study = planted(monkeypatch, learner=shows, two_goals_ahead=shows, random_guesses=noise[1])
-    assert verdict_on_two_ahead(study, "learner") == (AGREES, "")
-    study = planted(
-        monkeypatch, learner=shows, two_goals_ahead=shows, random_guesses=0.5 + noise[2]
-    )
-    assert verdict_on_two_ahead(study, "learner") == (UNDECIDED, NOT_BEYOND)
-    assert verdict_on_two_ahead(study, "two goals ahead") == (AGREES, "")  # no trials to pick from
-    study = planted(monkeypatch, learner=shows, random_guesses=noise[1][:9])
-    assert verdict_on_two_ahead(study, "learner") == (UNDECIDED, NOT_BEYOND)  # nine tasks of both
-    study = planted(monkeypatch, learner=noise[0] - 0.5, random_guesses=noise[1])
-    assert verdict_on_two_ahead(study, "learner") == (DISAGREES, "")
+@pytest.mark.parametrize(
+    ("learner", "guesses", "expected"),
+    [
+        (0.5, 12 * [0.0], ("agrees", "")),
+        (0.5, 12 * [0.5], ("undecided", findings.NOT_BEYOND)),
+        (0.5, 9 * [0.0], ("undecided", findings.NOT_BEYOND)),  # nine tasks of both
+        (-0.5, 12 * [0.0], ("disagrees", "")),
+    ],
+)
+def test_models_picked_from_trials_agree_only_beyond_random_guesses(
+    learner, guesses, expected, monkeypatch
+):
+    noise = 0.02 * np.random.default_rng(7).standard_normal((2, 12))
+    planted = {
+        "learner": learner + noise[0],
+        "two goals ahead": 0.5 + noise[0],
+        "random guesses": guesses + noise[1][: len(guesses)],
+    }
+    of_model = {id(MODELS[name]): by_task(numbers) for name, numbers in planted.items()}
+    measure = "slope norm at distance 2", (lambda _, m: of_model.get(id(m), {}), mean_of_rows)
+    monkeypatch.setitem(MEASURES, *measure)
+    runs = pd.DataFrame([row("random-search/pure", -300, task="ascending")])
+    study = study_of(runs, [load_task("ascending")], suite="human")
+    rows = findings.verdicts(study).set_index(["finding", "model"]).loc["two-ahead"]
+    assert tuple(rows.loc["learner", ["verdict", "because"]]) == expected
+    assert rows.verdict["two goals ahead"] == "agrees"  # no trials to pick from
+    over = rows.over_guesses["learner"]
+    assert over == pytest.approx(learner - guesses[0], abs=0.03)
+    assert rows.over_guesses.isna().sum() == len(rows) - 1
 
 
 def test_where_the_learner_could_differ_from_planners(monkeypatch):
     verdicts = {
-        "differs": {"learner": DISAGREES, "one goal ahead": AGREES, "least jerk": AGREES},
-        "alike": {"learner": AGREES, "one goal ahead": AGREES, "no goal ahead": DISAGREES},
-        "split": {"learner": AGREES, "one goal ahead": AGREES, "least jerk": DISAGREES},
-        "undecided": {"learner": UNDECIDED, "one goal ahead": AGREES},
-        "alone": {"learner": DISAGREES, "one goal ahead": SILENT, "least jerk": UNDECIDED},
+        "differs": {"learner": "disagrees", "one goal ahead": "agrees", "least jerk": "agrees"},
+        "a-like": {"learner": "agrees", "one goal ahead": "agrees", "no goal ahead": "disagrees"},
+        "split": {"learner": "agrees", "one goal ahead": "agrees", "least jerk": "disagrees"},
+        "undecided": {"learner": "undecided", "one goal ahead": "agrees"},
+        "alone": {"learner": "disagrees", "one goal ahead": "silent", "least jerk": "undecided"},
     }
     rows = [
-        (finding, model, of_model.get(model, NO_CASES))
+        (finding, model, of_model.get(model, "no cases"))
         for finding, of_model in verdicts.items()
         for model in MODELS
     ]
-    frame = pd.DataFrame(rows, columns=["finding", "model", "verdict"])
-    monkeypatch.setattr(judge, "judged", lambda study: frame)
-    found = separating(None)
-    assert found["possible"] == ["differs", "alike", "split"]
-    assert found["apart"] == ["differs"]
-    assert found["look_ahead"] == ["alike"]
+    cells = pd.DataFrame(rows, columns=["finding", "model", "verdict"])
+    possible, apart, look_ahead = findings.where_models_differ(cells)
+    assert possible == ["differs", "a-like", "split"]
+    assert apart == ["differs"]
+    assert look_ahead == ["a-like"]
+    monkeypatch.setattr(findings, "verdicts", lambda study: cells)
+    assert findings.finding_of_human(None) == (
+        f"Of {len(FINDINGS)} findings about people, the paper's learner agrees with 2, disagrees "
+        "with 2 and is undecided on 1. It could differ from planners that look ahead on 3, where "
+        "it and at least one of them are decided, and differs from all that are on differs. "
+        "Planners that look ahead differ from those that do not on a like."
+    )
 
 
-def test_a_finding_can_be_cited():
-    fields = FINDINGS["two-ahead"].model_dump()
-    for wrong in ({"doi": ""}, {"doi": "from memory"}, {"authors": ""}, {"year": None}):
-        with pytest.raises(ValidationError):
-            Finding.model_validate(fields | wrong)
+@pytest.mark.parametrize("finding", FINDINGS.values(), ids=FINDINGS)
+def test_a_finding_can_be_cited_and_judged(finding):
+    for field in "statement population quote place authors title source read predicts".split():
+        assert finding[field]
+    assert re.fullmatch(r"10\.\d{4,}/\S+", finding["doi"])
+    assert 1900 < finding["year"] < 2100
+    assert len(finding["quote"].split()) <= 40
+    assert finding["where"] in ("moved goals", "tasks, one arm", "tasks, two arms", "long tasks")
+    for test in finding["tests"]:
+        assert test["measure"] in MEASURES
+        assert len(test.keys() & {"above", "below"}) == 1
+        assert test.keys() <= {"measure", "above", "below", "disagree"}
+    named = findings.by_model(finding.get("silent", {}) | finding.get("built_in", {}))
+    assert named.keys() <= MODELS.keys()
 
 
 def test_every_measure_serves_a_finding():
-    used = {test.measure for finding in FINDINGS.values() for test in finding.tests}
-    assert used == set(measures.MEASURES)
+    used = {test["measure"] for finding in FINDINGS.values() for test in finding["tests"]}
+    assert used == set(MEASURES)
 
 
 def test_rank_correlation_is_kendalls():
@@ -167,6 +177,32 @@ def test_rank_correlation_is_kendalls():
     expected = stats.kendalltau(*pairs.T).statistic
     assert measures.rank_correlation(pairs) == pytest.approx(expected)
     assert measures.rank_correlation(np.column_stack([np.zeros(14), np.arange(14)])) == 0
+
+
+def test_statistics_of_all_tasks():
+    # Slope norms at distances 1 and 2 after practice and before.
+    norms = np.array([[1.0, 0.5, 1.0, 0.2], [3.0, 1.5, 1.0, 0.4]])
+    assert measures.horizon_rise(norms) == pytest.approx(0.7)
+    assert measures.ratio_rise(norms) == pytest.approx(0.5 - 0.3)
+    assert measures.ratio_of_means(norms[:, :2]) == pytest.approx(2.0)
+    turns = np.random.default_rng(4).uniform(-2, 2, size=(2, 30))
+    bow = 0.1 - 0.3 * turns[0] + 0.2 * turns[1]
+    assert measures.slope_of_bows(np.column_stack([bow, *turns])) == pytest.approx(-0.3)
+
+
+def test_horizon_that_is_enough():
+    """Within 1 % of all goals in view, on tasks with six goals or more."""
+    tasks = [load_task(f"{family}/v1/i000") for family in ("long", "one-armed")]
+    assert [len(task.goals) >= 6 for task in tasks] == [True, False]
+    rows = [
+        row("receding-horizon", -ticks, task=task.name, variant=f"horizon={h}",
+            parameters=json.dumps({"horizon": h}))
+        for task in tasks
+        for h, ticks in {0: 150, 1: 102, 2: 101, 3: 110, 99: 100}.items()
+    ]  # fmt: skip
+    study = study_of(pd.DataFrame(rows), tasks, suite="human")
+    assert measures.sufficient_horizon(study, MODELS["all goals ahead"]) == {tasks[0].name: 2}
+    assert measures.sufficient_horizon(study, MODELS["one goal ahead"]) == {}
 
 
 def moving(slopes, noise, rng, runs=4):
@@ -244,26 +280,32 @@ grid = { horizon = [0, 1, 7] }
     return study
 
 
-def test_a_small_study(small, monkeypatch):
+def test_a_small_study(small):
     assert (small.runs.status == "ok").all()
-    monkeypatch.setattr("coartic.analysis.topics.human.judge.FEWEST_TASKS", 2)
-    for model in ("learner", "learner, replayed"):
-        monkeypatch.setitem(MODELS[model].parameters, "trials", 150)
-    rows = judged(small).set_index(["finding", "model", "measure"])
-    near = rows.xs("slope norm at distance 1", level="measure").loc["both-directions"]
-    far = rows.xs("slope norm at distance 2", level="measure").loc["two-ahead"]
+    near, far = (
+        {name: measures.slope_norms(small, model, distance) for name, model in MODELS.items()}
+        for distance in (1, 2)
+    )
     # What is planned for one goal at a time does not follow the next; one ahead, not the third.
     for model in ("corrective process", "no goal ahead", "null-space control, this goal"):
-        assert near.value[model] == pytest.approx(0, abs=1e-9)
-    assert near.value["one goal ahead"] > 0.01
-    # Runs of the best trial and of the replay are not the same.
-    assert near.tasks["learner"] == near.tasks["learner, replayed"] == 2
-    assert near.value["learner"] != near.value["learner, replayed"]
-    assert far.value["one goal ahead"] == pytest.approx(0, abs=1e-9)
-    assert far.built_in["one goal ahead"]
-    assert far.verdict["one goal ahead"] == DISAGREES
-    assert far.verdict["learner EC2"] == SILENT
-    assert far.because["learner EC2"]
+        assert list(near[model].values()) == pytest.approx([0, 0], abs=1e-9)
+    assert np.mean(list(near["one goal ahead"].values())) > 0.01
+    assert list(far["one goal ahead"].values()) == pytest.approx([0, 0], abs=1e-9)
+    # Runs of the best trial and of the replay are not the same; these have 150 trials.
+    assert not near["learner"]
+    best, replay = (
+        measures.slope_norms(small, Model("", {"trials": 150}, replayed), 1)
+        for replayed in (False, True)
+    )
+    assert best.keys() == replay.keys() == near["no goal ahead"].keys()
+    assert best != replay
+    rows = TABLES["human-effects"](small)
+    row = rows.loc["two-ahead one goal ahead slope norm at distance 2"]
+    assert (row.tasks, row.of_test, row.bound) == (2, "undecided", "above 0.01")
+    assert set(row.run_ids.split()) <= set(small.runs.run_id)
+    silent = rows.loc["two-ahead learner EC2 slope norm at distance 2"]
+    assert (silent.verdict, silent.tasks) == ("silent", 0)
+    assert silent.because.startswith("they are for two arms")
     table = TABLES["human"](small)
-    assert table["of one goal ahead"]["two-ahead"].startswith("disagrees *: 0.00")
-    assert set(table.run_ids["two-ahead"].split()) <= set(small.runs.run_id)
+    assert table["of one goal ahead"]["two-ahead"].startswith("undecided: 0.00")
+    assert table["of no goal ahead"]["few-are-enough"] == "silent"

@@ -89,7 +89,7 @@ def test_the_interval_ends_at_what_runs_can_make():
     assert gap.low == 0
     assert gap.high <= 0.4
     turned = other_tasks({"a": [(np.zeros(3), *runs) for runs in gaps]})
-    assert (turned.low, turned.high) == pytest.approx((-gap.high, -gap.low), abs=0.02)
+    assert (turned.low, turned.high) == pytest.approx((-gap.high, -gap.low))
 
 
 def test_given_tasks_are_strata():

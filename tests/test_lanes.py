@@ -8,13 +8,12 @@ import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
 from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import failed
+from coartic.benchmarks.worker import fail
 from coartic.motion.compiled import entry
 from coartic.motion.lanes import LANES, board, lanes_for, near, place
 from coartic.motion.trigonometry import LARGEST
-from coartic.runs.plan import run_seed
 from tests.support.strategies import UNEVEN
-from tests.support.suites import KNOWN, InProcess, planned, run_and_write
+from tests.support.suites import KNOWN, InProcess, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
 
@@ -97,29 +96,14 @@ def test_lanes_do_not_mix(count, far):
         npt.assert_allclose((xs[-1, number], ys[-1, number]), expected, atol=1e-9)
 
 
-class Watched(InProcess):
-    """An executor that keeps what it was asked."""
-
-    def __init__(self, workers=1):
-        self.workers, self.jobs = workers, []
-
-    def perform(self, jobs):
-        self.jobs += jobs
-        return super().perform(jobs)
-
-    @property
-    def sizes(self):
-        return [len(job.seeds) for job in self.jobs]
-
-
-class Nobody(Watched):
+class Nobody(InProcess):
     """Its processes end wherever runs are performed side by side."""
 
     def perform(self, jobs):
-        for number, answer in super().perform(jobs):
+        for number, outcomes in super().perform(jobs):
             job = jobs[number]
-            lost = len(job.seeds) > 1
-            yield number, failed(job, "crashed", "exit code 9", 1.0) if lost else answer
+            lost = len(job.keys) > 1
+            yield number, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
 
 
 LEARNER = Cell(load_task("ascending"), KNOWN["dual-process/EC1"])
@@ -128,44 +112,24 @@ ALONE = Cell(load_task("ascending"), KNOWN["corrective-alone/given"])
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path):
     tables = []
-    for number, executor in enumerate((Watched(), Nobody())):
+    for number, executor in enumerate((InProcess(), Nobody())):
         options = {"runs": LANES + 2, "trials": 3, "executor": executor}
         tables.append(run_and_write(tmp_path / str(number), [LEARNER, ALONE], **options).runs)
     assert (tables[0].status == "ok").all()
     assert tables[0].result.tolist() == tables[1].result.tolist()
-    assert executor.sizes == [LANES, 2, 1] + [1] * (LANES + 2)
     assert [set(runs.together) for runs in tables] == [{1, 2, LANES}, {1}]
-
-
-@pytest.mark.parametrize(
-    ("cells", "runs", "workers", "sizes"),
-    [
-        ([LEARNER], 40, 2, [20, 20]),
-        ([LEARNER], 20, 8, [8, 8, 4]),
-        ([LEARNER], 2 * LANES + 20, 2, [LANES, LANES, 10, 10]),
-        ([LEARNER], 2 * LANES + 3, 2, [LANES, LANES, 3]),
-        ([LEARNER], LANES, 1, [LANES]),
-        ([LEARNER, ALONE], 20, 2, [11, 9, 1]),
-    ],
-)
-def test_runs_are_divided_among_workers(cells, runs, workers, sizes, tmp_path):
-    executor, plan = Watched(workers), planned(cells, runs=runs, trials=3)
-    plan.perform(tmp_path, executor=executor)
-    assert executor.sizes == sizes
-    seeds = [run_seed(0, "ascending", n) for cell in plan.plan.cells for n in range(cell.runs)]
-    assert [seed for job in executor.jobs for seed in job.seeds] == seeds
 
 
 class Forges(InProcess):
     """Has two of many runs state what is no solution."""
 
     def perform(self, jobs):
-        for number, answer in super().perform(jobs):
-            if len(answer.outcomes) == LANES:
-                fifth, seventh = (answer.outcomes[run].parts["solution"] for run in (5, 7))
+        for number, outcomes in super().perform(jobs):
+            if len(outcomes) == LANES:
+                fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
                 fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
-            yield number, answer
+            yield number, outcomes
 
 
 def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):

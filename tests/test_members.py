@@ -6,19 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from reconstruction.scoring import printed_tests
+from reconstruction.search import search_for
 
 from coartic import CoarticError, TaskError, load_task
-from coartic.analysis.reconstruction.robustness import (
+from coartic.analysis.claims.specifications import (
     PAPERS,
-    judged_specifications,
+    judge_specifications,
     shares,
     specifications,
 )
-from coartic.analysis.reconstruction.scoring import printed_tests
-from coartic.analysis.reconstruction.search import search_for
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.runs.plan import DeclaredMethod
-from coartic.tasks.catalogue import MEMBERS_FOLDER, members, task_of, with_members
+from coartic.tasks.catalogue import MEMBERS_FOLDER, is_admitted, members, task_of, with_members
 from tests.support.made_up import row, study_of
 from tests.support.suites import KNOWN
 
@@ -33,8 +32,8 @@ def test_an_ensemble_has_200_members_that_meet_every_constraint(task):
         assert load_task(name) is t
         assert task_of(name) == task
         assert "goals" in t.reconstructed
-    goals = np.array([t.goal_array for t in drawn.values()])
-    assert search_for(task).meets_all(goals).all()
+    goals = np.array([t.goal_array for t in ensemble.values()])
+    assert search_for(task).meets_all(goals).tolist() == [is_admitted(name) for name in ensemble]
 
 
 @pytest.mark.parametrize("task", with_members())
@@ -72,13 +71,12 @@ def study_with(tasks, means, **plan):
                     replay_reward=int(r), initial_reward=-675)
                 for k, r in enumerate(rewards)
             ]  # fmt: skip
-    method = DeclaredMethod(
-        title="t", citation="", told=(), secondary=(), stochastic=True,
-        defaults={"ties": "left", "trials": 10_000}, origin="", code="",
-    )  # fmt: skip
-    names = ("dual-process/EC3", "dual-process/EC4")
-    methods = dict.fromkeys(names, method)
-    return study_of(pd.DataFrame(rows), list(map(load_task, tasks)), methods=methods, **plan)
+    study = study_of(pd.DataFrame(rows), list(map(load_task, tasks)), **plan)
+    defaults = {"ties": "left", "trials": 10_000}
+    cells = tuple(
+        replace(cell, method=replace(cell.method, defaults=defaults)) for cell in study.plan.cells
+    )
+    return replace(study, plan=replace(study.plan, cells=cells))
 
 
 def test_claims_are_judged_for_each_member():
@@ -87,12 +85,12 @@ def test_claims_are_judged_for_each_member():
     more = ["two-armed-1-v0.1", "two-armed-1-m001", "two-armed-1-F3"]
     study = study_with([*names, *more], (20.0, 20.0, 20.0, -20.0, 20.0, 20.0, 20.0))
     claims = [claim for claim in PAPERS if claim.id == "ec4-beats-ec3"]
-    table = judged_specifications([study], claims=claims)
+    table = judge_specifications([study], claims=claims)
     judged = table[table.claim == "ec4-beats-ec3"].set_index("member")
     assert set(judged.index) == {"", *names[2:], "two-armed-1-m001"}
     assert judged.effect["two-armed-1-m002"] > 0 > judged.effect["two-armed-1-m003"]
     assert judged.verdict[["", *names[2:]]].tolist() == ["supported", "supported", "not supported"]
-    twice = judged_specifications([study, study], claims=claims)
+    twice = judge_specifications([study, study], claims=claims)
     pd.testing.assert_frame_equal(twice, table)
     counts = shares(table).set_index(["claim", "kind"]).loc["ec4-beats-ec3"]
     assert counts.loc["two-armed-1", ["supported", "specifications"]].tolist() == [2, 3]
@@ -101,10 +99,7 @@ def test_claims_are_judged_for_each_member():
 
 def test_parameters_of_a_reading_are_no_variant():
     study = study_with(["two-armed-1"], (20.0,), readings=("ties=right",))
-    cells = tuple(
-        replace(cell, variant="ties=right", parameters={"ties": "right"})
-        for cell in study.plan.cells
-    )
+    cells = tuple(replace(cell, parameters={"ties": "right"}) for cell in study.plan.cells)
     runs = study.runs.assign(variant="ties=right")
     changed = replace(study, plan=replace(study.plan, cells=cells), runs=runs)
     ((specification, view),) = specifications(changed)

@@ -6,7 +6,7 @@ import pytest
 from coartic import CoarticError
 from coartic.analysis.report import next_goal
 from coartic.analysis.study import load
-from coartic.benchmarks.run import plan_suite
+from coartic.benchmarks.run import perform, plan_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, InProcess
 
@@ -19,7 +19,7 @@ def moved(tmp_path_factory):
     cells = [cell for cell in cells if cell.task.name.endswith(tuple(ends))]
     plan = plan_suite("locus", cells=cells, runs=1, trials=10_000)
     folder = tmp_path_factory.mktemp("locus")
-    plan.perform(folder, executor=InProcess())
+    perform(plan, folder, executor=InProcess())
     return load(folder)
 
 

@@ -1,4 +1,4 @@
-"""The cascade against closed forms and other solvers; the controller on real tasks."""
+"""The cascade against closed forms and another solver; the controller on real tasks."""
 
 import itertools
 
@@ -7,30 +7,13 @@ import pytest
 from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, execute, load_task
-from coartic.baselines.cascade import (
-    DAMPING,
-    LIMIT,
-    SLACK,
-    Cascade,
-    CascadeError,
-)
-from coartic.baselines.modelled_cascade import ModelledCascade
-from coartic.baselines.nullspace_qp import (
-    FACES,
-    METHODS,
-    Aim,
-    Controller,
-    NextGoal,
-    NullspaceQP,
-    Preshaping,
-    cascade_for,
-)
+from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade, state_cascade
+from coartic.baselines.nullspace_qp import FACES, METHODS, Aim, Controller, NextGoal, NullspaceQP
 from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import tiny_task
 
 ROBOT = Robot()
-NOTHING = np.zeros(ROBOT.dof)
 ANGLES = 2 * np.pi * np.arange(FACES) / FACES
 NORMALS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 
@@ -51,34 +34,8 @@ def problems(count, seed, far=0.5, preferred=0.3):
         yield NORMALS @ jacobian, NORMALS @ error - 0.1, rng.normal(size=ROBOT.dof) * preferred
 
 
-def exact(rows, least, preferred):
-    """The cascade by enumeration: every pair of rows may be the active ones of level 2.
-
-    No limit may be active; two rows decide in the plane of the hand. Level 1 is solved as
-    nonnegative least squares would be, by the same enumeration in ``(s / λ, x)``.
-    """
-    joints = rows.shape[1]
-
-    def nearest(rows, least, preferred):
-        best = None
-        for active in itertools.chain.from_iterable(
-            itertools.combinations(range(len(rows)), size) for size in range(3)
-        ):
-            some = rows[list(active)]
-            point = preferred + np.linalg.pinv(some) @ (least[list(active)] - some @ preferred)
-            if (rows @ point < least - 1e-9).any():
-                continue
-            if best is None or np.linalg.norm(point - preferred) < np.linalg.norm(best - preferred):
-                best = point
-        return best
-
-    slack = np.full((len(rows), 1), DAMPING)  # in units of 1 / λ
-    first = nearest(np.hstack([rows, slack]), least, np.zeros(joints + 1))
-    return nearest(rows, least - DAMPING * first[-1], preferred)
-
-
 def damped_projection(row, least, preferred, damping=DAMPING):
-    """What the cascade gives for a task of one row where no limit is active, in closed form.
+    """The cascade for a task of one row where no limit is active, in closed form.
 
     ``z + a (b - a.z)_+ / |a|^2``, with ``a`` the row and ``b`` what the damping leaves of a
     demand, ``least |a|^2 / (|a|^2 + λ^2)`` if that is positive; shapes ``(joints,)``. Sources:
@@ -91,75 +48,75 @@ def damped_projection(row, least, preferred, damping=DAMPING):
 
 
 def test_one_row_without_active_limits_is_the_closed_form():
-    cascade = cascade_for(1, ROBOT.dof)
     for rows, least, preferred in problems(10, 1):
         projected = damped_projection(rows[0], least[0], preferred)
         assert np.abs(projected).max() < LIMIT
-        np.testing.assert_allclose(
-            cascade.solve(rows[:1], least[:1], preferred), projected, atol=1e-7 + SLACK
-        )
+        changes, _ = solve_cascade(rows[:1], least[:1], preferred)
+        np.testing.assert_allclose(changes, projected, atol=1e-7 + SLACK)
 
 
-@pytest.fixture(scope="module")
-def enumerated():
-    """Problems of discs with their exact solutions."""
-    return [(*problem, exact(*problem)) for problem in problems(10, 5)]
-
-
-def test_a_disc_without_active_limits_is_the_nearest_by_enumeration(enumerated):
-    cascade = cascade_for(FACES, ROBOT.dof)
-    decided = 0
-    for rows, least, preferred, wanted in enumerated:
-        assert np.abs(wanted).max() < LIMIT
-        np.testing.assert_allclose(
-            cascade.solve(rows, least, preferred), wanted, atol=1e-6 + 10 * SLACK
-        )
-        decided += np.linalg.norm(wanted - preferred) > 1e-3
-    assert decided > 5
-
-
-def test_a_modelling_language_gives_the_same():
-    """cvxpy is told the two levels as they are defined; limits are active in half of them."""
-    modelled = ModelledCascade(FACES, ROBOT.dof)
-    assert all(level.is_dcp(dpp=True) for level in modelled.levels)
-    cascade = cascade_for(FACES, ROBOT.dof)
-    for problem in (*problems(5, 3), *problems(5, 4, far=4.0, preferred=1.0)):
-        np.testing.assert_array_equal(cascade.solve(*problem), modelled.solve(*problem))
+@pytest.mark.parametrize(("far", "preferred", "bind"), [(0.5, 0.3, False), (4.0, 1.0, True)])
+def test_both_levels_of_a_disc_are_as_near_as_a_general_solver_finds(far, preferred, bind):
+    """With and without active limits, each level solved by SLSQP."""
+    moved = bound = 0
+    for rows, least, wanted in problems(5, 4, far, preferred):
+        joints = rows.shape[1]
+        options = {"method": "SLSQP", "options": {"maxiter": 500, "ftol": 1e-12}}
+        limits = [(-LIMIT, LIMIT)] * joints
+        short = minimize(
+            lambda x: 1e4 * x[0] ** 2 + (x[1:] ** 2).sum(),  # level 1 over λ²
+            np.r_[least.max(), np.zeros(joints)],
+            bounds=[(None, None), *limits],
+            constraints={"type": "ineq", "fun": lambda x, a=rows, b=least: a @ x[1:] + x[0] - b},
+            **options,
+        ).x[0]
+        demand = least - max(short, 0) - SLACK
+        nearest = minimize(
+            lambda x, z=wanted: ((x - z) ** 2).sum(),
+            np.clip(wanted, -LIMIT, LIMIT),
+            bounds=limits,
+            constraints={"type": "ineq", "fun": lambda x, a=rows, b=demand: a @ x - b},
+            **options,
+        ).x
+        changes, iterations = solve_cascade(rows, least, wanted)
+        assert iterations > 0
+        assert np.abs(changes).max() <= LIMIT + 1e-9
+        assert (demand - rows @ changes).max() < 1e-4
+        np.testing.assert_allclose(changes, nearest, atol=2e-3)
+        np.testing.assert_allclose(state_cascade(rows, least, wanted)[0], changes, atol=1e-5)
+        moved += np.linalg.norm(changes - wanted) > 1e-3
+        bound += np.abs(changes).max() > LIMIT - 1e-6
+    assert moved > 3
+    assert (bound > 0) == bind
 
 
 def test_singular_jacobians_leave_the_changes_bounded():
     """Both arms straight along x on a base locked in x: nothing moves the hand along x."""
-    cascade = cascade_for(1, ROBOT.dof - 1)
-    jacobian = np.delete(ROBOT.jacobian(NOTHING, "right"), 0, axis=1)
+    jacobian = np.delete(ROBOT.jacobian(np.zeros(ROBOT.dof), "right"), 0, axis=1)
     assert np.linalg.matrix_rank(jacobian) == 1
     preferred = np.linspace(-0.2, 0.2, ROBOT.dof - 1)
     for direction in ([1.0, 0.0], [0.0, 1.0], [0.6, 0.8]):
         rows = np.array(direction)[None] @ jacobian
         wanted = damped_projection(rows[0], 1.0, preferred) if rows.any() else preferred
         assert np.linalg.norm(wanted) < 1
-        solved = cascade.solve(rows, np.ones(1), preferred)
-        np.testing.assert_allclose(solved, wanted, atol=1e-7 + SLACK)
+        changes, _ = solve_cascade(rows, np.ones(1), preferred)
+        np.testing.assert_allclose(changes, wanted, atol=1e-7 + SLACK)
 
 
-def test_a_failed_solve_is_an_outcome(monkeypatch):
-    def fails(*_):
-        raise CascadeError("level 2: daqp ended infeasible")
-
-    monkeypatch.setattr(Cascade, "solve", fails)
-    with pytest.raises(MethodError, match="level 2") as caught:
-        solve(NextGoal, tiny_task(), hands="RR", period=10)
+def test_a_failed_solve_is_an_outcome():
+    with pytest.raises(MethodError, match="level .: DAQP ended") as caught:
+        solve_cascade(np.eye(FACES, ROBOT.dof), np.full(FACES, np.inf), np.zeros(ROBOT.dof))
     assert caught.value.outcome == "solver-failed"
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-@pytest.mark.parametrize(("task", "hands"), [("two-armed-2", "RRRR"), ("two-armed-1", "LRLR")])
-def test_solutions_keep_the_rules(method, task, hands):
-    """Steps within m, locks kept, every goal hit without correction, hands as given."""
-    task = load_task(task)
-    result, execution, session = solve(method, task, hands=hands, period=20)
+@pytest.mark.parametrize("name", ["two-armed-2", "two-armed-1"])
+def test_solutions_keep_the_rules(method, name):
+    """Steps within m, locks kept, every goal hit without correction."""
+    task = load_task(name)
+    result, execution, session = solve(method, task, hands="nearest", period=20)
     assert execution.completed
     assert execution.corrections == 0
-    assert execution.hands == hands
     q = task.q0
     for movement, at_hit in zip(result.solution, execution.configurations, strict=True):
         steps = np.diff(np.vstack([q, movement.waypoints]), axis=0)
@@ -169,16 +126,6 @@ def test_solutions_keep_the_rules(method, task, hands):
             assert (movement.waypoints[:, 1] == task.q0[1]).all()
     assert session.meter.jacobians > 0
     assert session.meter.solver_iterations > 0
-
-
-def test_preshaping_moves_the_other_arm_towards_its_goal():
-    task = load_task("two-armed-2")
-    misses = []
-    for method in (NullspaceQP, Preshaping):
-        _, execution, _ = solve(method, task, hands="RLRR", period=10)
-        hand = ROBOT.forward_kinematics(execution.configurations[0], "left")
-        misses.append(np.hypot(*(hand - task.goal_array[1])))
-    assert misses[1] < 0.7 * misses[0]
 
 
 def test_subgoals_of_lower_priority_coarticulate():
@@ -191,38 +138,37 @@ def test_subgoals_of_lower_priority_coarticulate():
 
 def test_a_goal_behind_a_straight_arm_is_reached():
     """The gradient vanishes there: the corrective process does not leave (test_corrective)."""
-    task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], initial_hands="RR")
+    task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], hands=["right"])
     for locked in (("x", "y"), ("x",)):
-        task = task.model_copy(update={"locked_base": locked})
-        _, execution, _ = solve(NextGoal, task, hands="RR", period=5)
+        _, execution, _ = solve(NextGoal, task.model_copy(update={"locked_base": locked}))
         assert execution.completed
         assert execution.corrections == 0
 
 
-@pytest.mark.parametrize("hands", ["every", "nearest", "RL"])
+@pytest.mark.parametrize("hands", ["every", "nearest"])
 def test_an_unreachable_goal_is_infeasible(hands):
     task = tiny_task().model_copy(
         update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
     )
     with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(NextGoal, task, hands=hands, period=20, max_steps=200)
+        solve(NextGoal, task, hands=hands, period=20)
     assert caught.value.outcome == "infeasible"
 
 
-@pytest.mark.parametrize("method", [NextGoal, Preshaping])
+@pytest.mark.parametrize("method", METHODS[2:], ids=lambda method: method.name)
 def test_every_sequence_keeps_the_best(method):
-    task = tiny_task(
-        goals=[[4.0, 1.5], [-3.0, 2.0]],
-        initial_hands="RL",
-        start={"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4},
-    )
-    given_hands = {
-        hands: solve(method, task, hands=hands, period=20)[1].reward
-        for hands in map("".join, itertools.product("LR", repeat=2))
-    }
-    result, execution, _ = solve(method, task, hands="every", period=20)
-    assert execution.reward == max(given_hands.values()) == given_hands[execution.hands]
-    assert len(set(given_hands.values())) > 1
+    goals = [[4.0, 1.5], [-3.0, 2.0]]
+    start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
+    task = tiny_task(goals=goals, initial_hands="RL", start=start)
+    rewards = {}
+    for hands in itertools.product(task.hands, repeat=2):
+        session = Session(task, 0, method.told, trusted=True)
+        alone = method().search(Controller(session, task, 20), [hands])
+        rewards[hands] = execute(task, alone.solution).reward
+    result, execution, _ = solve(method, task, period=20)
+    chosen = tuple(movement.hand for movement in result.solution)
+    assert execution.reward == max(rewards.values()) == rewards[chosen]
+    assert len(set(rewards.values())) > 1
     assert result.details["sequences"] == 4
     assert result.details["simulated_movements"] < 2 * 4
 
@@ -236,36 +182,53 @@ def test_the_other_hand_goes_where_the_nearest_cannot():
     assert execution.hands == "R"
 
 
-def test_hands_that_do_not_fit_are_refused():
-    def why_not(task, hands):
-        return NextGoal(NextGoal.Parameters(hands=hands)).why_not(task)
-
-    task = tiny_task()
-    assert why_not(task, "LR") is None
-    assert "names 3 hands for 2 goals" in why_not(task, "LRL")
-    right = task.model_copy(update={"hands": ("right",)})
-    assert "no left hand" in why_not(right, "LR")
-    assert "no other arm" in Preshaping().why_not(right)
-    assert "hand sequences" in why_not(
-        tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13), "every"
-    )
+def test_tasks_that_do_not_suit_are_refused():
+    (preshaping,) = (method for method in METHODS if method.name.endswith("preshaping"))
+    right = tiny_task().model_copy(update={"hands": ("right",)})
+    assert NextGoal().why_not(right) is None
+    assert "no other arm" in preshaping().why_not(right)
+    many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
+    assert "hand sequences" in NextGoal().why_not(many)
+    assert NextGoal(NextGoal.Parameters(hands="nearest")).why_not(many) is None
 
 
 def controller(task, **options):
-    session = Session(task, 0, NextGoal.told, trusted=True)
-    joints = task.robot.dof - len(task.locked_base)
-    cascade = cascade_for(FACES, joints)
-    return Controller(session, task, cascade, 5, 1000, **options)
+    return Controller(Session(task, 0, NextGoal.told, trusted=True), task, 5, **options)
+
+
+def test_preshaping_moves_the_other_arm_towards_its_goal():
+    task, aim = load_task("two-armed-2"), Aim("right", 0)
+    alone, preshaped = (
+        controller(task).leg(None, aims) for aims in ((aim,), (aim, Aim("left", 1, arm_only=True)))
+    )
+    assert miss(preshaped.q, task, "left", 1) < 0.7 * miss(alone.q, task, "left", 1)
+
+
+def test_inertia_keeps_the_rates_of_the_step_before():
+    """Half of them beside half of the way to the posture, in the arm that is free of the goal."""
+    task, q, left = load_task("two-armed-2"), np.full(ROBOT.dof, 0.3), ROBOT.joints("left")
+    last, posture = np.zeros(ROBOT.dof), q + 0.4 * np.eye(ROBOT.dof)[3]
+    last[left] = [0.1, 0.0, 0.2, -0.3]
+    for inertia in (0.0, 0.5):
+        rates = controller(task, inertia=inertia).next_rates(
+            q, Aim("right", 0), posture, last, 0.05
+        )
+        wanted = (1 - inertia) * np.eye(4)[1] + inertia * last[left]
+        wanted /= max(1.0, np.linalg.norm(wanted))
+        np.testing.assert_allclose(rates[left], wanted, atol=1e-3)
+
+
+def miss(q, task, hand, goal):
+    return np.hypot(*(ROBOT.forward_kinematics(q, hand) - task.goal_array[goal]))
 
 
 def test_the_posture_hits_its_goal_and_lies_near():
     """Against a general solver started from the same configuration, with the disc itself."""
     task = load_task("two-armed-2")
-    control = controller(task)
     rng = np.random.default_rng(3)
     for goal in (0, 1, 2, 3) * 2:
         q = rng.uniform(-1, 1, ROBOT.dof)
-        posture = control.postures(q, (Aim("right", goal),), {})[0]
+        posture = controller(task).find_postures(q, (Aim("right", goal),), {})[0]
         assert miss(posture, task, "right", goal) <= task.radius
         nearest = minimize(
             lambda p, q=q: ((p - q) ** 2).sum(),
@@ -282,17 +245,13 @@ def test_the_posture_hits_its_goal_and_lies_near():
         assert np.linalg.norm(posture - nearest) < 0.05
 
 
-def miss(q, task, hand, goal):
-    return np.hypot(*(ROBOT.forward_kinematics(q, hand) - task.goal_array[goal]))
-
-
 @pytest.mark.parametrize("name", ["ascending", "two-armed/v1/d003"])
 def test_postures_make_the_way_through_all_discs_shortest(name):
     """A local minimum of the reward's own metric: a general solver finds nothing shorter near."""
     task = load_task(name)
     goals = range(len(task.goals))
     aims = tuple(Aim("right", goal) for goal in goals)
-    postures = controller(task, gain=1.0).postures(task.q0, aims, {})
+    postures = controller(task).find_postures(task.q0, aims, {})
 
     def length(flat):
         chain = np.vstack([task.q0, flat.reshape(len(aims), -1)])
@@ -327,9 +286,7 @@ def test_faces_say_how_the_hand_leaves_the_disc(locked):
     q = np.random.default_rng(4).uniform(-1, 1, ROBOT.dof)
     rows, outside = control.faces(q, Aim("left", 2))
     for column, joint in enumerate(control.moving):
-        moved = q.copy()
-        moved[joint] += 1e-6
-        change = outside - control.faces(moved, Aim("left", 2))[1]
+        change = outside - control.faces(q + 1e-6 * np.eye(ROBOT.dof)[joint], Aim("left", 2))[1]
         np.testing.assert_allclose(change / 1e-6, rows[:, column], atol=1e-5)
     # A polygon in a circle: its faces are no farther than the circle, and nearer by as much as
     # the cosine of half the angle between two of them.
@@ -342,8 +299,7 @@ def test_faces_say_how_the_hand_leaves_the_disc(locked):
 def test_the_hand_comes_nearer_all_the_time(name):
     """Level 1 of the movement: to within what a disc's polygon and its linear steps leave."""
     task = load_task(name)
-    method = NextGoal(NextGoal.Parameters(hands="nearest"))
-    result = method.solve(Session(task, 0, method.told, trusted=True))
+    result, _, _ = solve(NextGoal, task, hands="nearest")
     for movement in result.solution:
         hands = ROBOT.forward_kinematics(movement.waypoints, movement.hand)
         distances = np.hypot(*(hands - task.goal_array[movement.goal - 1]).T)

@@ -1,6 +1,7 @@
 """The study of wrong objectives, on a small folder: against a slow loop, and in closed form."""
 
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,17 +10,16 @@ import pytest
 
 from coartic import execute, load_task
 from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.report import build, facts
+from coartic.analysis.claims.judge import judge_claims
+from coartic.analysis.claims.register import CLAIMS
+from coartic.analysis.report import build
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.report.text import sentence
-from coartic.analysis.study import load
+from coartic.analysis.study import load, one_by_one
 from coartic.analysis.topics import objectives
-from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.learner.rows import movements_from
+from coartic.runs.run import movements_from
 from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
 from tests.support.made_up import MadeUp, row, study_of
@@ -30,29 +30,27 @@ title = "x"
 description = "x"
 runs = 3
 trials = 60
-[[cells]]
-tasks = ["one-armed/v1/d000..d002"]
-methods = ["believed-reward/plan", "believed-reward/EC1"]
-parameters = { nodes = 40, graphs = 1, starts = 2 }
-[[cells]]
-tasks = ["one-armed/v1/d000..d002"]
-methods = ["dual-process/EC1"]
-[[cells]]
-tasks = ["one-armed/v1/d000..d002"]
-methods = ["believed-reward/plan", "believed-reward/EC1"]
-parameters = { nodes = 40, graphs = 1, starts = 2 }
-penalties = [{ distinct = 100 }, { distinct = 300 }]
-[[cells]]
-tasks = ["one-armed/v1/d000..d002"]
-methods = ["dual-process/EC1"]
-penalties = [{ distinct = 100 }, { distinct = 300 }]
 """
+CELLS = """
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["believed-reward/plan", "believed-reward/EC1"]
+parameters = { nodes = 40, graphs = 1, starts = 2 }
+PENALTIES
+[[cells]]
+tasks = ["one-armed/v1/d000..d002"]
+methods = ["dual-process/EC1"]
+PENALTIES
+"""
+PENALTIES = "penalties = [{ distinct = 100 }, { distinct = 300 }]"
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("objectives")
-    (folder / "own.toml").write_text(SMALL)
+    (folder / "own.toml").write_text(
+        SMALL + CELLS.replace("PENALTIES", "") + CELLS.replace("PENALTIES", PENALTIES)
+    )
     run_suite(folder / "own.toml", folder / "results", executor=InProcess())
     return load(folder / "results")
 
@@ -138,32 +136,16 @@ def test_where_a_line_crosses_zero():
     assert crossing(weights, np.array([1.0, -2.0, 2.0])) == 65.0  # for good
 
 
-def test_the_rule_compares_regrets(study):
-    claim = Claim(
-        id="x", section="x", statement="x", rule="less_regret", suite="own",
-        cells={"distinct 300": ["learner", "ticks"]},
-    )  # fmt: skip
-    finding = less_regret(Data(study), claim)
-    values = advantage(study, "learner", "ticks", "distinct")[300.0]
-    assert finding.tests[0].value == pytest.approx(values.mean() - 1.0)
-    assert finding.holds == (values.mean() > 1.0)
-    assert finding.evidence.startswith("The learner regrets less than the planner of ticks: ")
-    assert " points at weight 300 (postures alike) on 3 random tasks." in finding.evidence
-    missing = claim.model_copy(update={"cells": {"region 300": ["learner", "ticks"]}})
+def test_a_claim_without_its_tasks_is_not_judged(study):
     with pytest.raises(MissingError, match="region"):
-        less_regret(Data(study), missing)
+        less_regret(Data(study), "learner", "ticks", 300, ("distinct", "region"))
 
 
 def test_suite_has_what_its_claims_compare():
     cells = select_cells(load_suite("objectives"), KNOWN)
-    claims = [claim for claim in CLAIMS.values() if claim.suite == "objectives"]
-    assert claims
-    weights = {task.name.partition(".")[2].split("-")[1] for task in (c.task for c in cells)
-               if task.penalty is not None}  # fmt: skip
-    assert weights == {"30", "100", "300"}
-    for claim in claims:
-        for where in claim.cells:
-            assert where.split(" ")[1] in weights | {"0"}
+    penalties = [cell.task.penalty for cell in cells if cell.task.penalty is not None]
+    compared = {(t, w) for *_, w, terms in objectives.CLAIMED.values() for t in terms if w}
+    assert compared <= {(t, getattr(p, t)) for p in penalties for t in objectives.TERMS}
     instances = {c.task.name for c in cells if "/" in c.task.name and c.task.penalty is None}
     assert len(instances) >= 40
     assert all("/i" in name for name in instances)
@@ -171,34 +153,61 @@ def test_suite_has_what_its_claims_compare():
 
 def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
     """Regrets of ten tasks, planted in the place of solutions."""
-    planted = {"told": 0.0, "ticks": 50.0, "learner": 20.0, "from plan": 10.0}
-    rows = []
-    for number in range(10):
-        for weight, share in ((0.0, 0.0), (100.0, 0.5), (300.0, 1.0)):
-            for who, regret in planted.items():
-                at = {"ticks": share, "from plan": share}.get(who, 1.0)
-                rows.append(
-                    {
-                        "task": f"one-armed/v1/i{number:03d}", "family": "one-armed/v1",
-                        "split": "test", "term": "region", "weight": weight, "who": who,
-                        "reward": -100.0, "regret": regret * at * (0.8 + 0.4 * number / 9),
-                        "cell": SimpleNamespace(runs=pd.DataFrame({"run_id": [f"{number}"]})),
-                    }
-                )  # fmt: skip
+    planted = {"told": 0.0, "ticks": 50.0, "smooth": 5.0, "learner": 20.0, "cma-es": 30.0,
+               "from plan": 10.0}  # fmt: skip
+    rows = [
+        {
+            "task": f"one-armed/v1/i{number:03d}", "family": "one-armed/v1", "split": "test",
+            "term": term, "weight": weight, "who": who, "reward": -100.0,
+            "regret": regret * (share if who in ("ticks", "from plan") else 1.0)
+            * (0.8 + 0.4 * number / 9),
+            "cell": SimpleNamespace(runs=pd.DataFrame({"run_id": [f"{number}"]})),
+        }
+        for term in objectives.TERMS
+        for number in range(10)
+        for weight, share in ((0.0, 0.0), (30.0, 0.05), (100.0, 0.5), (300.0, 1.0))
+        for who, regret in planted.items()
+    ]  # fmt: skip
     frame = pd.DataFrame(rows).astype({"family": "string", "split": "string"})
     monkeypatch.setattr(objectives, "rewards", lambda study: frame)
-    study = study_of(pd.DataFrame([row("dual-process/EC1", -100)]), [load_task("ascending")])
+    rows = pd.DataFrame([row("dual-process/EC1", -100, task="ascending")])
+    study = study_of(rows, [load_task("ascending")])
     table = TABLES["objectives"](study)
     assert table.regret["region 300 ticks"] == pytest.approx(50)
     assert table.regret_low["region 300 ticks"] < 50 < table.regret_high["region 300 ticks"]
     assert table.helps["region 100 from plan"] == pytest.approx(15)  # 20 % against 5 %
     assert set(table.tasks) == {10}
     crossings = TABLES["crossings"](study)
-    # 25 % at 100, so that 20 % lie at 80.
-    assert crossings.crossing["region learner"] == pytest.approx(80)
-    assert list(crossings.index) == ["region learner"]
+    # 2.5 % at 30 and 25 % at 100: 20 % lie between them, 30 % between 100 and 300.
+    assert crossings.crossing["region learner"] == pytest.approx(30 + 70 * 17.5 / 22.5)
+    assert crossings.crossing["joints cma-es"] == pytest.approx(140)
+    assert len(crossings) == 6
     assert build.drawn(study, "objectives")
-    assert "weight of 80 with a costly disc" in sentence("objectives", facts.objectives(study))
+    assert objectives.finding_of_objectives(study) == (
+        "On 10 random tasks with a penalty of weight 300 a planner that believes that ticks alone "
+        "count loses 50.0 % of the best known reward with costly joints, 50.0 % with a costly "
+        "disc, 50.0 % with postures alike, the learner 20.0 %, 20.0 %, 20.0 %. The learner "
+        "overtakes that planner at a weight of 84 [84, 84] with costly joints, 84 [84, 84] with a "
+        "costly disc, 84 [84, 84] with postures alike."
+    )
+    claims = [claim for claim in CLAIMS.values() if claim.suite == "objectives"]
+    entries = {entry.claim.id: entry for entry in judge_claims(study, claims)}
+    finding = entries["cma-es-overtakes-sooner"].finding
+    assert [test.value for test in finding.tests] == pytest.approx([-6, -6])  # and the margin, 1
+    assert re.fullmatch(
+        r"CMA-ES regrets less than the planner of ticks: −5.0 \[.*\] points at weight 100 \(costly "
+        r"joints\) on 10 random tasks, −5.0 .*\. Points are per cent of the best known reward\.",
+        finding.evidence,
+    )
+    assert {name: entry.verdict for name, entry in entries.items()} == {
+        "right-objective-plans-better": "supported",  # 0 % against 20 %
+        "learner-overtakes-wrong-plans": "supported",  # 20 % against 50 %
+        "cma-es-overtakes-sooner": "not supported",  # 30 % against 25 %
+        "learner-finds-distinct-postures": "not supported",  # 20 % against 5 %
+        "slightly-wrong-plan-helps": "supported",  # 0.5 % against 20 %
+        "very-wrong-plan-hurts": "not supported",  # 20 % against 10 %
+        "truth-beats-trial-and-error": "supported",  # 0 % against 20 %
+    }
 
 
 def test_variants_of_instances_are_not_listed_one_by_one(study):

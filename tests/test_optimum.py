@@ -1,17 +1,20 @@
 """The optimum: what is shipped holds, and can be found again."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
+import renew_optima
 
 from coartic import PAPER, builtin_tasks, execute, load_task
-from coartic.analysis import optima, renew_optima
+from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.benchmarks.suites import Cell
-from coartic.learner.rows import movements_from
 from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
+from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed
 from tests.support.suites import KNOWN, run_and_write
@@ -97,7 +100,7 @@ def test_a_hand_that_is_there_already_saves_a_tick():
 def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     task, few = load_task("ascending"), {"graphs": 1, "chains": 1, "nodes": 60}
     names = ("optimum/branch-and-bound", "optimum/dynamic-programming")
-    cells = [Cell(task, KNOWN[name], tuple(few.items())) for name in names]
+    cells = [Cell(task, KNOWN[name], few) for name in names]
     study = run_and_write(tmp_path / "results", cells, runs=1)
     (entry,) = renew_optima.collect(study)
     assert (entry.reward, entry.bound) == (-292, -292)
@@ -107,18 +110,16 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292
 
 
-def test_renewing_with_what_is_there_changes_nothing(tmp_path, monkeypatch):
-    copy = tmp_path / "optima.json"
-    copy.write_bytes(optima.DATA.read_bytes())
-    for module in (optima, renew_optima):
-        monkeypatch.setattr(module, "DATA", copy)
-    before = copy.read_bytes()
+def test_renewing_with_what_is_there_changes_nothing():
     shipped = entries()
-    assert renew_optima.renew(shipped[:3]) == len(shipped) - 3
-    assert copy.read_bytes() == before
+    before = optima.DATA.read_bytes()
+    assert renew_optima.content_with(shipped[2:], shipped) == before
     better = shipped[0].model_copy(update={"reward": -1})
-    renew_optima.renew([better])
-    assert entries() == [better, *shipped[1:]]
+    changed = json.loads(renew_optima.content_with([better], shipped))["optima"]
+    assert changed[0].pop("reward") == -1
+    as_before = json.loads(before)["optima"]
+    del as_before[0]["reward"]
+    assert changed == as_before
 
 
 def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_family():

@@ -28,9 +28,8 @@ from coartic.optimisers import objective
 from coartic.tasks.families import task_text
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import tiny_task, uneven_task
+from tests.support.strategies import sample, tiny_task, uneven_task
 from tests.support.suites import InProcess
-from tests.test_doors import sample
 from tests.test_learner import assert_equals_reference
 
 TERMS = {
@@ -176,13 +175,13 @@ def test_a_suite_has_variants_of_tasks_and_its_folder_can_be_checked(tmp_path):
     (tmp_path / "own.toml").write_text(SUITE)
     folder = tmp_path / "results"
     run_suite(tmp_path / "own.toml", folder, executor=InProcess())
-    report = checker.verify(folder)
+    report = checker.check_runs(folder)
     assert (report.wrong, report.runs) == ([], 9)
     with sqlite3.connect(folder / "runs.sqlite") as db:
         names = {name for (name,) in db.execute("SELECT name FROM tasks")}
         words = ("distinct-50", "distinct-100", "region-50-radius-2")
         assert names == {f"two-armed-1.{n}" for n in words}
         db.execute("UPDATE settings SET definition = replace(definition, '100.0', '200.0')")
-    wrong = checker.verify(folder).wrong
+    wrong = checker.check_runs(folder).wrong
     assert len(wrong) == 3  # those of one of three tasks
     assert all("reward is " in sentence for sentence in wrong)

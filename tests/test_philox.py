@@ -4,7 +4,7 @@ from itertools import islice
 
 import pytest
 
-from coartic.tasks.philox import Draws, key_of, philox4x32
+from coartic.tasks.philox import Draws, hash_key, philox4x32
 
 ONES = 0xFFFFFFFF
 # Of the authors' file of known answers (Random123, kat_vectors: philox4x32 10).
@@ -32,7 +32,7 @@ def test_draws_are_the_words_of_counters_that_follow():
 
 
 def test_every_integer_is_as_likely():
-    draws = Draws(key_of("any"), 0, 0, 0)
+    draws = Draws(hash_key("any"), 0, 0, 0)
     counts = [0] * 7
     for _ in range(7000):
         counts[draws.integer(-3, 3) + 3] += 1
@@ -45,7 +45,7 @@ def test_places_of_a_counter_have_draws_of_their_own():
         draws = Draws(key, *place)
         return tuple(islice(iter(lambda: draws.integer(0, 2**64 - 1), None), 2))
 
-    keys = [key_of(name) for name in ("a", "b")]
+    keys = [hash_key(name) for name in ("a", "b")]
     places = [(number, attempt, part) for number in range(9) for attempt in (0, 1) for part in "xy"]
     beginnings = {first(key, n, a, "xy".index(p)) for key in keys for n, a, p in places}
     assert len(beginnings) == 2 * len(places)

@@ -4,24 +4,23 @@ import contextlib
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.outcome import kept
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import Answer, Outcome, job_of
-from coartic.model import PAPER
-from tests.support.suites import KNOWN, run_and_write
+from coartic.benchmarks.worker import Job
+from tests.support.suites import KNOWN, planned, run_and_write
 
 METHODS = """
 import itertools, os, signal, sys, tempfile, time
 import numpy as np
-import coartic.benchmarks.outcome, coartic.benchmarks.worker, coartic.motion.solution
+import coartic.benchmarks.scoring, coartic.benchmarks.worker, coartic.motion.solution
 from coartic.method import Information, Method, MethodError, Parameters, Result
 from coartic.motion.solution import Movement
 
@@ -81,7 +80,7 @@ HANDLED = {
     "honest": ("return Result(corrected(session))", "ok", ""),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),
-    "giant": ("coartic.motion.solution.execute = coartic.benchmarks.outcome.scored = None\n"
+    "giant": ("coartic.motion.solution.execute = coartic.benchmarks.scoring.execute_all = None\n"
               "        session.model = session.model._replace(step=1.0)\n"
               "        return Result(corrected(session))", "ok", ""),
 }  # fmt: skip
@@ -102,7 +101,7 @@ def runs(tmp_path_factory):
     """In the same workers, then others, then this project's."""
     folder, task = tmp_path_factory.mktemp("pool"), load_task("ascending")
     does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-    cells = [Cell(task, does, (("what", name),)) for name in HANDLED]
+    cells = [Cell(task, does, {"what": name}) for name in HANDLED]
     cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
     study = run_and_write(
         folder / "out", cells, executor=Local(2, wall_times=10), runs=1, time_limit_s=2.0,
@@ -135,18 +134,10 @@ def test_other_work_on_the_core_changes_no_outcome(tmp_path):
     seconds = {name: "0.7" if name == "short" else "99" for name in names}
     bodies = [(name, burn.replace("self.seconds", seconds[name])) for name in names]
     task, (does, _) = load_task("ascending"), entries(tmp_path, bodies)
-    cells = [Cell(task, does, (("what", name),)) for name in names]
+    cells = [Cell(task, does, {"what": name}) for name in names]
     study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=1.5)
     assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
     assert set(study.runs.reason[1:]) == {"CPU time limit of 1.5 s exceeded"}
-
-
-def test_no_run_is_ok_without_a_solution():
-    (run,) = kept([{}], Answer([Outcome("ok")], 1.0), load_task("ascending"), PAPER)
-    assert (run.status, run.row["reason"]) == (
-        "solver-failed",
-        "it reported ok, but returned no solution",
-    )
 
 
 def test_other_methods_notice_nothing(runs):
@@ -154,9 +145,10 @@ def test_other_methods_notice_nothing(runs):
 
 
 def test_workers_that_cannot_begin_get_a_sentence():
-    entry, task = KNOWN["dual-process/EC1"], load_task("ascending").model_dump(mode="json")
-    job = job_of(entry, task | {"goals": []}, entry.complete({}), (0,))
-    with pytest.raises(CoarticError, match="worker processes cannot begin.*goals is "):
+    plan = planned([Cell(load_task("ascending"), KNOWN["dual-process/EC1"])])
+    task = load_task("ascending").model_copy(update={"goals": ()})
+    job = Job(replace(plan.settings[0], task=task), plan.cells[0].method, (plan.key(0, 0),))
+    with pytest.raises(CoarticError, match="worker processes cannot begin"):
         list(Local(1).perform([job] * 10))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import PostureGraph, sample_postures, spread_out
+from coartic.baselines.posture_graph import PostureGraph, move_other_arm, sample_postures
 from tests.support.strategies import changed
 
 TASKS = {
@@ -41,7 +41,7 @@ def length_of(task, configurations):
 @pytest.mark.parametrize("name", TASKS)
 def test_chains_are_the_cheapest(name):
     task = TASKS[name]
-    graph = PostureGraph.sampled(task, 5, np.random.default_rng(3))
+    graph = PostureGraph.sample(task, 5, np.random.default_rng(3))
     chains = list(graph.chains())
     assert len(chains) == len(task.hands) ** len(task.goals)
     assert len(dict(chains)) == len(chains)
@@ -78,9 +78,9 @@ def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
 
 def test_a_free_arm_is_spread_over_its_way():
     task = TASKS["two-armed-2"]
-    graph = PostureGraph.sampled(task, 10, np.random.default_rng(6))
+    graph = PostureGraph.sample(task, 10, np.random.default_rng(6))
     ((hands, chain),) = graph.chains(("left", "right", "right", "left"))
-    spread = spread_out(task, hands, chain)
+    spread = move_other_arm(task, hands, chain)
     left = task.robot.joints("left")
     first, last = chain[0, left], chain[3, left]
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
@@ -90,7 +90,7 @@ def test_a_free_arm_is_spread_over_its_way():
 
 def test_a_goal_without_a_posture_is_named():
     task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
-    graph = PostureGraph.sampled(task, 20, np.random.default_rng(7))
+    graph = PostureGraph.sample(task, 20, np.random.default_rng(7))
     assert graph.why_none().startswith("goal 2: no posture was found that puts the left or")
     assert "the right hand" in graph.why_none(("right", "right"))
     assert list(graph.chains()) == []
@@ -98,7 +98,7 @@ def test_a_goal_without_a_posture_is_named():
 
 def test_a_beam_keeps_the_cheapest_beginnings():
     task = TASKS["two-armed-1"]
-    graph = PostureGraph.sampled(task, 12, np.random.default_rng(8))
+    graph = PostureGraph.sample(task, 12, np.random.default_rng(8))
     by_hands = dict(graph.chains())
     assert list(by_hands) == list(itertools.product(("left", "right"), repeat=4))
     for most in (16, 64):

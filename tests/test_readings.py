@@ -1,13 +1,16 @@
 """What the paper leaves open: the table against the code, and how a choice is written."""
 
 import itertools
+import json
 from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
-from coartic import Movement, corrective_trial, learn, trajectory
+from coartic import Movement, learn, trajectory
+from coartic.analysis.verify import stored_task
 from coartic.errors import CoarticError
 from coartic.learner.conditions import (
     CONDITIONS,
@@ -17,26 +20,22 @@ from coartic.learner.conditions import (
     Ties,
     UnknownTarget,
 )
-from coartic.model import PAPER
+from coartic.learner.method import DualProcessParameters
+from coartic.model import PAPER, stored_model
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Robot
-from coartic.tasks.catalogue import builtin_tasks, load_task
+from coartic.tasks.catalogue import load_task
 from coartic.tasks.readings import (
     condition_under,
     load_reading,
     load_readings,
     model_under,
     readings,
-    task_under,
 )
 from tests.support import reference
 from tests.support.strategies import tiny_task, uneven_task
 
-APPLIED = {
-    "model": [PAPER],
-    "condition": list(CONDITIONS.values()),
-    "robot": [Robot(), *(load_task(name).robot for name in builtin_tasks())],
-}
+APPLIED = {"model": [PAPER], "condition": list(CONDITIONS.values())}
 by_id = pytest.mark.parametrize("reading", readings(), ids=lambda reading: reading.id)
 
 
@@ -57,18 +56,14 @@ def test_a_choice_is_loaded_as_it_is_written(reading):
         assert load_reading(str(chosen)) == chosen
 
 
-def test_numbers_may_be_written_otherwise():
-    assert load_reading("arrival-tolerance = 1e-1").choice.value == 0.1
-    assert load_reading("shoulder-height=0").choice.value == 0.0
-
-
 @pytest.mark.parametrize(
     ("texts", "says"),
     [
         (["ties"], "'ties': write it as NAME=VALUE"),
         (["tie=left"], "unknown reading 'tie'; did you mean 'ties'"),
         (["ties=rigth"], "'rigth' is not one of its choices .* did you mean 'right'"),
-        (["arrival-tolerance=nan"], "0.01, 0.1"),
+        (["arrival-tick=0"], "refuted by the printed results .* Version 1.0.0"),
+        (["ties=left", "shoulder-height=-0.1"], "shoulder-height=-0.1 is refuted"),
         (["corrective-arrival=1"], r"'1' is not one of its choices \(false, true\)"),
         (["ties=\x1b[2J"], r"'\\x1b\[2J'"),
         (["ties=left", "ties=right"], "cannot both hold"),
@@ -82,20 +77,22 @@ def test_what_cannot_be_loaded_is_said(texts, says):
         load_readings(texts)
 
 
-LEARNED = [
-    text
-    for reading in readings()
-    if reading.part != "robot"
-    for text in (f"{reading.id}={choice.written}" for choice in reading.alternatives)
+def test_the_default_choice_is_no_reading():
+    assert [str(each) for each in load_readings(["ties=left", "state=goal"])] == ["state=goal"]
+
+
+ALTERNATIVES = [
+    f"{reading.id}={choice.written}" for reading in readings() for choice in reading.alternatives
 ]
 
 
-@pytest.mark.parametrize("text", [*LEARNED, "correction-tolerance=0.099 corrective-arrival=true"])
+@pytest.mark.parametrize("text", [*ALTERNATIVES, "corrective-arrival=true, near the rim"])
 def test_the_learner_is_the_slow_one_under_every_reading(text):
-    chosen = load_readings(text.split())
+    text, _, near_rim = text.partition(", ")
+    chosen = load_readings([text])
     model, fields = model_under(chosen), condition_under(chosen)
-    if len(chosen) > 1:
-        model = model._replace(arrival_tolerance=0.04)  # now and then a correction misses
+    if near_rim:  # now and then a correction misses
+        model = model._replace(correction_tolerance=0.099, arrival_tolerance=0.04)
     task, plain = load_task("two-armed-1"), CONDITIONS["EC2" if text in SELDOM_OF_EC3 else "EC3"]
     condition = replace(plain, **fields)
     fast = learn(task, condition, seed=42, trials=5, model=model)
@@ -159,21 +156,8 @@ def test_a_learned_replay_is_the_replay():
     assert run.execute().reward == run.reward
 
 
-def test_shoulders_are_at_the_height_that_is_read():
-    chosen = load_readings(["shoulder-height=-0.1", "ties=left"])
-    assert [str(each) for each in chosen] == ["shoulder-height=-0.1"]  # ties=left is the default
-    task = task_under(chosen, load_task("ascending"))
-    assert task.robot.shoulder_height == -0.1
-    assert (
-        corrective_trial(task, "RRR").reward
-        != corrective_trial(load_task("ascending"), "RRR").reward
-    )
-
-
-@pytest.mark.parametrize("tick", [0, 1])
-def test_rows_of_a_trajectory_start_where_the_robot_does(tick):
+def test_rows_of_a_trajectory_start_where_the_robot_does():
     """Two lines of 3 and 2 steps and a goal hit where the robot stands, counted by hand."""
-    model = PAPER._replace(arrival_tick=tick)
     task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
     ahead = [np.array([x, *[0.0] * 9]) for x in (0.06, 0.08)]
     path = trajectory(
@@ -183,10 +167,8 @@ def test_rows_of_a_trajectory_start_where_the_robot_does(tick):
             Movement(2, "right", "planned", ahead[0]),
             Movement(3, "right", "planned", ahead[1]),
         ],
-        model,
     )
-    stands = {0: [0, 1, 2, 3, 4, 5], 1: [0, 1, 2, 3, 3, 4, 5]}[tick]
-    np.testing.assert_allclose(100 * path.configurations[:, 0], stands, atol=1e-12)
+    np.testing.assert_allclose(100 * path.configurations[:, 0], [0, 1, 2, 3, 3, 4, 5], atol=1e-12)
     np.testing.assert_allclose(path.subtask(1)[:, 0], [0.0])
 
 
@@ -207,3 +189,16 @@ def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, 
         np.testing.assert_allclose(path.q, line.q, atol=1e-12)
         hits += path.hit
     assert 10 < hits < 30
+
+
+def test_what_version_1_stored_is_read_unless_its_reading_is_gone():
+    fields = PAPER._asdict()
+    assert stored_model(fields) == stored_model(fields | {"arrival_tick": 1}) == PAPER
+    with pytest.raises(CoarticError, match="reading arrival-tick=0.* Version 1.0.0"):
+        stored_model(fields | {"arrival_tick": 0})
+    with pytest.raises(ValueError, match="arrival took no tick"):
+        stored_task(tiny_task().model_dump_json(), json.dumps(fields | {"arrival_tick": 0}))
+    old = {"trials": 5, "update": "greater", "learned": "best"}
+    assert DualProcessParameters(**old) == DualProcessParameters(trials=5)
+    with pytest.raises(ValidationError, match="update"):
+        DualProcessParameters(update="not-less")

@@ -1,28 +1,26 @@
-"""Searching for what the paper does not print: trials, constraints, scores, likelihoods."""
+"""The search for what the paper does not print (docs/scripts): its command, scores, likelihoods."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter
+import runpy
+import sys
 from dataclasses import replace
+from pathlib import Path
 
+import calibrate
 import numpy as np
 import pandas as pd
 import pytest
+from reconstruction import layouts, readings, scoring
+from reconstruction.search import search_for
 from scipy import stats
 
-from coartic import (
-    PAPER,
-    CoarticError,
-    corrective_trial,
-    hand_sequences,
-    load_task,
-)
-from coartic.analysis.reconstruction import ensemble, layouts, readings, scoring
-from coartic.analysis.reconstruction.search import Search, search_for
+from coartic import PAPER, CoarticError, corrective_trial, hand_sequences, load_task
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 
+SCRIPTS = Path(__file__).parent.parent / "docs" / "scripts"
 TASK = load_task("two-armed-1")
 
 
@@ -70,39 +68,27 @@ def test_constraints() -> None:
         assert constraint.holds(trials).tolist() == expected, constraint.says
 
 
-@pytest.fixture(scope="module")
-def search() -> Search:
-    layout = replace(
-        layouts.layouts()["two-armed-1"],
-        grid={
-            "y": (3.04, 3.44, 0.2), "x1": (2.15, 2.55, 0.2), "x2": (3.2, 3.6, 0.2),
-            "y3": (2.76, 3.16, 0.2), "x3": (2.18, 2.58, 0.2), "x4": (7.03, 7.43, 0.2),
-        },
-    )  # fmt: skip
-    constraints = (
-        layouts.reward_is("RRRR", -675.0),
-        layouts.reward_is("LRLR", -532.0),
-        layouts.base_moves("RRRR", 2, 3, "left", start_x=0.0),
-    )
-    return Search(TASK, layout, constraints, jobs=1, near=45.0)
-
-
-def test_a_search_finds_what_it_is_asked_for(search: Search) -> None:
-    exact, near = search.grid()
-    assert len(exact) < len(near)
-    solved = search.admitted(search.solve(near), "solved")
-    assert len(solved) > 10
-    more = search.spread(solved, 20, np.random.default_rng(0), 0.02)
-    for points in (exact, solved, more):
-        assert search.layout.allowed(points).all()
-        assert search.meets_all(search.layout.places(points)).all()
-        for goals in search.layout.places(points[:5]):
-            task = search.task_with(goals)
-            assert corrective_trial(task, "RRRR").reward == -675
-            assert corrective_trial(task, "LRLR").reward == -532
-    assert search.tried["round sets of goals"] == sum(map(len, search.layout.blocks(99)))
-    assert (np.abs(exact - [3.24, 2.35, 3.4, 2.96, 2.38, 7.23]) < 1e-9).all(axis=1).any()
-    assert not search.meets_all(TASK.goal_array[None] + [0.0, 0.5]).any()
+def test_a_quick_search_gives_what_is_printed(tmp_path, monkeypatch):
+    """Sets of goals with the printed rewards of the corrective process, and how far each is."""
+    command = ["reconstruct.py", "goals", "two-armed-1", "--quick", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", [*command, "--jobs", "2"])
+    runpy.run_path(str(SCRIPTS / "reconstruct.py"), run_name="__main__")
+    members = pd.read_csv(tmp_path / "out" / "two-armed-1-members.csv")
+    earlier = list(layouts.layouts()["two-armed-1"].earlier)
+    ours = len(members) - len(earlier)
+    assert ours in (4, 5)  # four that are spread, and the nearest where it is none of them
+    names = [f"m{k:03d}" for k in range(1, ours + 1)]
+    assert members.member.tolist() == [*names, *earlier]
+    goals = [members[[f"x{g}", f"y{g}"]].to_numpy() for g in range(1, 5)]
+    for places in np.stack(goals, axis=1)[:ours]:
+        task = TASK.model_copy(update={"goals": tuple(map(tuple, places.tolist()))})
+        assert corrective_trial(task, "RRRR").reward == -675
+        assert corrective_trial(task, "LRLR").reward == -532
+    labels = [test.label for test in scoring.printed_tests("two-armed-1")]
+    off = members[[f"{label}, distance" for label in labels]].abs().clip(upper=5.0).fillna(5.0)
+    np.testing.assert_allclose(members.distance, np.sqrt((off**2).mean(axis=1)), atol=0.01)
+    tried = pd.read_csv(tmp_path / "out" / "two-armed-1-tried.csv", index_col="stage")
+    assert tried.loc["round sets of goals"].item() <= 3**6
 
 
 def test_a_grid_holds_what_the_layout_allows() -> None:
@@ -117,15 +103,6 @@ def test_a_grid_holds_what_the_layout_allows() -> None:
     np.testing.assert_array_equal(points, expected)
     np.testing.assert_array_equal(layout.places(points)[:, 1], points[:, [0, 2]])
     np.testing.assert_array_equal(layout.points(layout.places(points)), points)
-
-
-def test_members_are_spread() -> None:
-    points = np.random.default_rng(0).normal(size=(60, 3))
-    chosen = ensemble.spread_out(points, 20, 7)
-    assert chosen[0] == 7
-    for k in range(1, 20):
-        gaps = np.linalg.norm(points[:, None] - points[chosen[:k]], axis=2).min(axis=1)
-        assert gaps[chosen[k]] == pytest.approx(gaps.max())
 
 
 @pytest.mark.parametrize("kind", ["mean", "sd", "share"])
@@ -172,7 +149,7 @@ def test_a_sequence_that_is_lost_is_as_bad_as_one_far_off() -> None:
     far = scoring.Figure("EC3", "mean", -900.0, 20, "LRLR", 3.0)
 
     def distance(*tests: scoring.Figure) -> float:
-        return scoring.distance(scoring.compared(tests, cells))
+        return scoring.distance(scoring.compare(tests, cells))
 
     assert share.compare(cells) == (0.75, 0.0)
     assert distance(far) == distance(absent) == scoring.FARTHEST
@@ -193,9 +170,8 @@ def test_chance_of_printed_counts_is_multinomial() -> None:
     assert counts.p == pytest.approx(exact, abs=0.01)
 
 
-def test_what_comes_from_a_reading_is_not_refuted_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_comes_from_a_reading_is_not_refuted_by_it() -> None:
     """Figures of 20 of a reading's own runs: p is uniform. Of others it is small."""
-    monkeypatch.setattr(readings, "DRAWS", 500)
     rng = np.random.default_rng(0)
     of_reading = runs(rng.normal(-300.0, 3.0, 1000))
 
@@ -240,33 +216,6 @@ def test_a_gain_is_as_likely_as_its_rounding_allows() -> None:
     assert never.p < 1e-6
 
 
-def test_a_reconstruction_is_found_and_scored(
-    search: Search, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ensemble, "MOST_NEAR", 30)
-    monkeypatch.setattr(ensemble, "RANDOM_STEPS", 100)
-    monkeypatch.setattr(scoring, "RESAMPLES", 20)
-    monkeypatch.setattr(ensemble, "PLAN", ((3, 2, 0, 0.0), (2, 2, 2, 0.01)))
-    monkeypatch.setattr(ensemble, "TRIALS", 30)
-    monkeypatch.setattr(ensemble, "LAST_RUNS", 2)
-    effort = {"members": 4, "runs": 2}
-    small = replace(search, tried=Counter())
-    members = ensemble.reconstruct(small, **effort)
-    # Four that are spread, and the nearest where it is none of them.
-    ours = members.member.str.startswith("m")
-    assert list(members.member[ours]) == [f"m{k:03d}" for k in range(1, ours.sum() + 1)]
-    assert ours.sum() in (4, 5)
-    assert list(members.member[~ours]) == list(search.layout.earlier)
-    printed = members.set_index("member").loc["F2", ["x3", "y3"]]
-    assert printed.tolist() == [2.38, 2.96]
-    for _, row in members[ours].iterrows():
-        goals = np.array([[row[f"x{g}"], row[f"y{g}"]] for g in range(1, 5)])
-        assert corrective_trial(small.task_with(goals), "RRRR").reward == -675
-    assert members["EC3 LRLR share"].between(0, 1).all()
-    again = ensemble.reconstruct(replace(search, tried=Counter(), jobs=2), **effort)
-    pd.testing.assert_frame_equal(again, members)
-
-
 def test_what_is_printed_is_what_is_searched_for() -> None:
     constraints = {constraint.says for constraint in search_for("two-armed-1").constraints}
     assert {"RRRR gives -675", "LRLR gives -532", "RRRR earns more than LLLL"} < constraints
@@ -280,25 +229,12 @@ def test_what_is_printed_is_what_is_searched_for() -> None:
         search_for("ascending")
 
 
-def test_what_stands_is_replaced_by_what_is_clearly_nearer(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(scoring, "RESAMPLES", 60)
-    rng = np.random.default_rng(1)
-    mean = scoring.Figure("EC3", "mean", -500.0, 20, sd=4.0)
-
-    def at(offset: float, count: int) -> ensemble.Scored:
-        cells = {"EC3": runs(rng.normal(-500.0 + offset, 4.0, count))}
-        comparisons = scoring.compared([mean], cells)
-        return ensemble.Scored(np.zeros(6), cells, comparisons, scoring.distance(comparisons))
-
-    near, far = at(0.5, 300), at(4.0, 300)
-    assert ensemble.clearly_nearer(near, far, [mean])
-    assert not ensemble.clearly_nearer(far, near, [mean])
-    assert not ensemble.clearly_nearer(at(0.5, 300), at(0.7, 300), [mean])
-    # Of few runs the same difference is no more than chance.
-    assert not ensemble.clearly_nearer(at(0.5, 4), at(2.0, 4), [mean])
-    # A distance in units of the error of a mean of n runs has that error over it.
-    error = math.sqrt(16 / 20 + 16 / 300 + 1 / 12)
-    expected = pytest.approx(4 / math.sqrt(300) / error, rel=0.3)
-    assert scoring.distance_error([mean], far.cells) == expected
+def test_procedures_are_calibrated_on_samples_with_a_known_truth() -> None:
+    """One sample of each kind; of an interval around 5 instead of -300 nothing holds."""
+    rng, draw = np.random.default_rng(0), calibrate.POPULATIONS["ticks"]
+    seen = calibrate.of_rewards(rng, draw, 20, -300.0)
+    assert seen["interval of a mean (Student)"]
+    assert not calibrate.of_rewards(rng, draw, 20, 5.0)["interval of a mean (Student)"]
+    seen |= calibrate.of_counts(rng, 20) | calibrate.of_postures(rng, 20)
+    seen |= calibrate.of_instances(rng, 20)
+    assert len(seen) == 13

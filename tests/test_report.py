@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.claims.judge import judge
+from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import facts, numbers, render
@@ -189,13 +189,13 @@ def test_answers_name_failed_runs_behind_them(traced):
 
 
 def test_claims_without_their_runs_are_named(traced):
-    entries = judge(traced, [CLAIMS["context"]])
-    assert not entries[0].finding.failed
+    entries = judge_claims(traced, [CLAIMS["context"]])
+    assert not entries[0].failed
     runs = traced.runs.assign(status="crashed")
     spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    (entry,) = judge(spoiled, [CLAIMS["context"]])
-    assert ("ascending", "dual-process/EC1") in entry.finding.failed
-    failed = facts.failed_behind(spoiled, entry.finding.failed)
+    (entry,) = judge_claims(spoiled, [CLAIMS["context"]])
+    assert ("ascending", "dual-process/EC1") in entry.failed
+    failed = facts.failed_behind(spoiled, entry.failed)
     assert failed["failed"] == failed["runs"] > 0
     assert failed["who"] == "learner EC1"
 

@@ -2,34 +2,27 @@
 
 import itertools
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
-from coartic.analysis.signatures.context import (
-    beyond_p,
-    context_dependence,
-    context_pairs,
-    distance,
-    lead_time,
-    permutation_p,
-    smallest_p,
-)
-from coartic.analysis.signatures.locus import families, locus_slopes, slope_norm
+from coartic.analysis.methods import EC1, PLACEBO
+from coartic.analysis.signatures import context, subtasks
+from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
+from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
-from coartic.analysis.signatures.register import REGISTER, signatures
-from coartic.analysis.signatures.subtasks import (
-    isolated_agreement,
-    isolated_reach,
-    preshaping,
-    travel,
-    turning_angles,
-)
-from coartic.analysis.trajectories import best_sequences, change_from
-from tests.support.made_up import MadeUp, study_of
+from coartic.analysis.signatures.register import REGISTER
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics import hypotheses
+from coartic.analysis.topics.coarticulation import placebo, sentences, tables
+from coartic.analysis.topics.coarticulation.values import signature_values
+from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
+from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.strategies import as_released, changed, tiny_task
 
 
@@ -53,16 +46,27 @@ def planned(*targets, hands):
     ]
 
 
+def posed(task, method, q, ticks=(0, 0, 0)):
+    """Runs that hit all goals with the right hand in one posture each, ``q`` (runs, dof)."""
+    configurations = np.repeat(np.asarray(q)[:, None], len(task.goals), axis=1)
+    runs = (
+        SimpleNamespace(configurations=each, hands="RRR", ticks_by_goal=lambda: ticks)
+        for each in configurations
+    )
+    solutions = (SimpleNamespace(hands=["right"] * 3, execution=run) for run in runs)
+    return Trajectories(task, method, "", tuple(solutions))
+
+
 # Context dependence
 
 
 def test_context_dependence_by_hand():
     first = np.array([[0.0, 0.0], [2.0, 0.0]])  # mean (1, 0), squares 2
     second = np.array([[4.0, 3.0], [4.0, 5.0]])  # mean (4, 4), squares 2
-    assert distance(first, second) == 5.0
-    assert context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
-    assert math.isnan(context_dependence(first[:1], second[:1]))
-    assert math.isnan(context_dependence(first[[0, 0]], second[[1, 1]]))
+    assert distance_of_means(first, second) == 5.0
+    assert context.context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
+    assert math.isnan(context.context_dependence(first[:1], second[:1]))
+    assert math.isnan(context.context_dependence(first[[0, 0]], second[[1, 1]]))
 
 
 def test_permutation_p_finds_a_planted_context_and_no_other():
@@ -84,9 +88,9 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
         second = rng(m).standard_normal((m, 3)) + 1000.0
         p = float(permutation_p(first, second, rng()))
         # Of groups of one size the exchange of both is as far apart.
-        assert p == pytest.approx(smallest_p(n, m) * (2 if n == m else 1))
-    assert smallest_p(2, 2) > 0.05 > smallest_p(4, 4)
-    assert smallest_p(50, 50, resamples=99) == 0.01
+        assert p == pytest.approx(context.smallest_p(n, m) * (2 if n == m else 1))
+    assert context.smallest_p(2, 2) > 0.05 > context.smallest_p(4, 4)
+    assert context.smallest_p(50, 50, resamples=99) == 0.01
 
 
 def test_more_than_a_placebo_by_brute_force():
@@ -99,27 +103,35 @@ def test_more_than_a_placebo_by_brute_force():
     def excess(ours, theirs):
         groups = zip(pools, ours, theirs, strict=True)
         parts = [(pool[list(a)], pool[list(b)]) for pool, a, b in groups]
-        return distance(parts[0][0], parts[1][0]) - distance(parts[0][1], parts[1][1])
+        return distance_of_means(parts[0][0], parts[1][0]) - distance_of_means(
+            parts[0][1], parts[1][1]
+        )
 
-    observed, count, total = distance(*method) - distance(*placebo), 0, 0
+    observed, count, total = (
+        distance_of_means(*method) - distance_of_means(*placebo),
+        0,
+        0,
+    )
     for one in itertools.combinations(range(5), 3):
         for two in itertools.combinations(range(4), 2):
             rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
             count += excess((one, two), rest) >= observed - 1e-12
             total += 1
-    p = beyond_p(method, placebo, rng(), resamples=20_000)
+    p = context.beyond_p(method, placebo, rng(), resamples=20_000)
     assert p == pytest.approx(2 * count / total, abs=0.03)
 
 
-def test_a_context_counts_where_it_exceeds_the_placebos():
-    """Selected noise: both move apart by the same; a learner that moves by more is told apart."""
-    shift = np.array([0.5, 0.0, 0.0])
-    noise = rng(7).standard_normal((4, 20, 3)) * 0.2
-    placebo = noise[0], noise[1] + shift
-    assert permutation_p(*placebo, rng()) < 0.001  # which alone would count as a sign
-    assert beyond_p((noise[2], noise[3] + shift), placebo, rng()) > 0.05
-    assert beyond_p((noise[2], noise[3] + 2 * shift), placebo, rng()) < 0.001
-    assert math.isnan(beyond_p((noise[2][:1], noise[3]), placebo, rng()))
+def test_drawn_tests_count_what_was_seen():
+    """No resample comes near: p is that of the one that was seen, both tails where it has two."""
+    near = rng(9).standard_normal((2, 30, 2))
+    far = near[0], near[1] + 100.0
+    assert permutation_p(*far, rng(), resamples=9) == 0.1
+    assert context.beyond_p(far, near, rng(), resamples=19) == 2 / 20
+    assert context.beyond_p(near, far, rng(), resamples=19) == 1.0
+    assert math.isnan(context.beyond_p((far[0][:1], far[1]), near, rng()))
+    assert context.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
+    assert context.dependence_below(*far, 1.0, rng(), resamples=9) == 1.0
+    assert math.isnan(context.dependence_below(near[0][:1], near[1], 1.0, rng()))
 
 
 def test_slopes_count_where_they_exceed_the_placebos():
@@ -132,12 +144,12 @@ def test_slopes_count_where_they_exceed_the_placebos():
         return [q + slope * place for q, place in zip(samples, x, strict=True)]
 
     steep, flat = follows(0.5, noise[:3]), follows(0.2, noise[3:])
-    assert beyond_p(steep, flat, rng(), contrast=contrast) < 0.001
-    assert beyond_p(flat, steep, rng(), contrast=contrast) == 1.0
-    assert beyond_p(follows(0.2, noise[:3]), flat, rng(), contrast=contrast) > 0.05
+    assert context.beyond_p(steep, flat, rng(), contrast=contrast) < 0.001
+    assert context.beyond_p(flat, steep, rng(), contrast=contrast) == 1.0
+    assert context.beyond_p(follows(0.2, noise[:3]), flat, rng(), contrast=contrast) > 0.05
     # What is common to all places is no slope.
     moved = [q + 3.0 for q in flat]
-    assert beyond_p(moved, flat, rng(), contrast=contrast) > 0.05
+    assert context.beyond_p(moved, flat, rng(), contrast=contrast) > 0.05
 
 
 def test_pairs_of_contexts():
@@ -145,7 +157,10 @@ def test_pairs_of_contexts():
     assert context_pairs(tasks) == [("ascending", "descending", 1)]
     moved = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
     other = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.5]], initial_hands="RRR")
-    assert context_pairs({"a": moved, "b": other, "c": moved}) == [("a", "b", 2), ("b", "c", 2)]
+    assert context_pairs({"a": moved, "b": other, "c": moved}) == [
+        ("a", "b", 2),
+        ("b", "c", 2),
+    ]
     wider = other.model_copy(update={"radius": 0.2})
     assert context_pairs({"a": moved, "b": wider}) == []
 
@@ -155,16 +170,16 @@ def test_lead_time_of_a_planted_divergence():
     first = 0.01 * rng(4).standard_normal((12, 20, 3))
     second = 0.01 * rng(5).standard_normal((12, 20, 3))
     second[:, -6:, 1] += 1.0
-    assert lead_time(first, second, rng(), alpha=0.002) == 5
+    assert context.lead_time(first, second, rng(), alpha=0.002) == 5
     ticks = [permutation_p(first[:, k], second[:, k], rng()) for k in range(20)]
     assert max(ticks[-6:]) < 0.001
     assert ticks[-7] > 0.002
     second[:, -1] = first[:, -1]  # together again at the hit: no lead counts
-    assert lead_time(first, second, rng()) is None
-    assert lead_time(first, first, rng()) is None
-    assert lead_time(first[:1], first, rng()) is None
+    assert context.lead_time(first, second, rng()) is None
+    assert context.lead_time(first, first, rng()) is None
+    assert context.lead_time(first[:1], first, rng()) is None
     apart = first + 3.0
-    assert lead_time(first, apart, rng()) == 19  # the whole movement
+    assert context.lead_time(first, apart, rng()) == 19  # the whole movement
 
 
 def test_permutations_by_brute_force():
@@ -172,11 +187,11 @@ def test_permutations_by_brute_force():
     draw = rng(11)
     first, second = draw.standard_normal((3, 2)), draw.standard_normal((4, 2)) + 0.8
     pool = np.concatenate([first, second])
-    observed = distance(first, second)
+    observed = distance_of_means(first, second)
     count = 0
     for chosen in itertools.combinations(range(7), 3):
         rest = [k for k in range(7) if k not in chosen]
-        count += distance(pool[list(chosen)], pool[rest]) >= observed - 1e-12
+        count += distance_of_means(pool[list(chosen)], pool[rest]) >= observed - 1e-12
     assert permutation_p(first, second, rng()) == pytest.approx(count / 35)
     drawn = permutation_p(first, second, rng(), resamples=34)
     assert drawn == pytest.approx(count / 35, abs=0.25)
@@ -186,7 +201,7 @@ def test_permutations_by_brute_force():
         math.hypot(*(np.polyfit(x, q[list(order), k], 1)[0] for k in range(2)))
         for order in itertools.permutations(range(4))
     ]
-    norm = slope_norm(q, x, rng())
+    norm = slope_length(q, x, rng())
     assert norm.value == pytest.approx(norms[0])
     assert norm.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
 
@@ -211,22 +226,35 @@ def test_motor_equivalence_by_hand():
     assert math.isnan(motor_equivalence(np.ones(2), np.eye(2))[0])
 
 
-def test_self_motion_of_the_robot_is_motor_equivalent():
-    """A small displacement that leaves the hand in place, and one that only moves it."""
-    task = load_task("ascending")
-    q = posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
+def test_parts_of_two_contexts():
+    """Mean postures that differ by self-motion: the hand stays, which its Jacobian tells."""
+    task, q = load_task("ascending"), posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
     joints = movable(task, "right")
-    jacobian = task.robot.jacobian(q, "right")[:, joints]
-    null, complement = subspaces(jacobian)
-    still, moving = np.array(q), np.array(q)
-    still[joints] += 1e-4 * null[:, 0]
-    moving[joints] += 1e-4 * complement[:, 0]
-    at = task.robot.forward_kinematics(np.array([q, still, moving]), "right")
-    assert np.linalg.norm(at[1] - at[0]) < 1e-7
-    assert np.linalg.norm(at[2] - at[0]) > 5e-5
-    parts = [motor_equivalence((p - q)[joints], jacobian) for p in (still, moving)]
-    assert parts[0] == pytest.approx((1e-4 / 2, 0), abs=1e-12)
-    assert parts[1] == pytest.approx((0, 1e-4 / math.sqrt(2)), abs=1e-12)
+    null, _ = subspaces(task.robot.jacobian(q, "right")[:, joints])
+    noise = 1e-4 * rng(3).standard_normal((6, 10))
+    moved = np.array(q)
+    moved[joints] += 0.02 * null[:, 0]
+    contexts = TwoContexts(
+        posed(task, "", q + noise), posed(task, "", moved + noise[::-1]), 1, "right"
+    )
+    parts = [REGISTER[f"{of}motor-equivalent part"].measure(contexts) for of in ("", "non-")]
+    assert parts[0].estimate.value == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
+    assert parts[1].estimate.value < 5e-4
+    assert [part.n for part in parts] == [12, 12]
+    assert parts[0].estimate.p < 0.01
+    assert contexts.hands_apart < 1e-3 < contexts.apart == pytest.approx(0.02)
+
+
+def test_a_lead_is_at_most_the_shortest_movement():
+    task = load_task("ascending")
+    cells = [posed(task, "", x + 0.01 * rng(1).standard_normal((8, 10))) for x in (0.0, 1.0)]
+    for cell in cells:
+        for number, run in enumerate(cell.runs):
+            length = 6 + number
+            run.hits = np.array([length - 1, 20, 30])
+            run.configurations = np.repeat(run.execution.configurations[:1], length, axis=0)
+    lead = REGISTER["lead time"].measure(TwoContexts(*cells, 1, "right"))
+    assert (lead.estimate.value, lead.place.longest, lead.n) == (5, 5, 16)
 
 
 # Subtasks and hands
@@ -235,11 +263,11 @@ def test_self_motion_of_the_robot_is_motor_equivalent():
 def test_isolated_reaches_are_the_corrective_process():
     task = load_task("two-armed-1")
     for hand, letter in (("left", "L"), ("right", "R")):
-        ticks, _ = isolated_reach(task, task.q0, 1, hand)
+        ticks, _ = subtasks.isolated_reach(task, task.q0, 1, hand)
         assert ticks == corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
-    assert isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
+    assert subtasks.isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
-    assert isolated_reach(unreachable, unreachable.q0, 3, "right") is None
+    assert subtasks.isolated_reach(unreachable, unreachable.q0, 3, "right") is None
 
 
 def test_other_hands_are_no_sacrifice():
@@ -247,22 +275,41 @@ def test_other_hands_are_no_sacrifice():
     task = as_released("two-armed-1")  # where the left hand is the slower one
     initial, other = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
     assert change_from(other, initial)[0] > 1  # the old comparison took this for a sacrifice
-    assert other.ticks < initial.ticks
-    frame = signatures(solved_study([(task, "every", [other.movements])]))
-    rows = frame.set_index("signature")
-    assert rows.loc["first subtask against the same hands"].value == 0
-    assert rows.loc["total against the same hands"].value == 0
+    cell = Trajectories(task, "", "", (trajectory(task, other.movements),))
+    assert [SIGNS[sign].of(cell).tolist() for sign in ("first", "whole")] == [[0], [0]]
+
+
+def test_signs_are_signatures_with_one_number_a_run():
+    """A learner's first movement is slower, the whole faster, than with the same hands."""
+    task = load_task("two-armed-1")
+    runs = [learn(task, "EC4", seed=seed, trials=400).solution for seed in (1, 2)]
+    cell = Trajectories(task, "", "", tuple(trajectory(task, solution) for solution in runs))
+    corrective = [corrective_trial(task, hands).ticks_by_goal() for hands in cell.sequences]
+    learned = [run.execution.ticks_by_goal() for run in cell.runs]
+    first, whole = SIGNS["first"].of(cell), SIGNS["whole"].of(cell)
+    assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
+    assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
+    nearer = [subtasks.preshaping(run, corrective_trial(task, "RRRR")) for run in cell.runs]
+    assert SIGNS["other arm"].of(cell) == pytest.approx([np.nanmean(run) for run in nearer])
+    each = [subtasks.served(run).mean(axis=0) for run in cell.runs]
+    assert SIGNS["cost"].of(cell) == pytest.approx([cost for cost, _ in each])
+    assert SIGNS["arm"].of(cell) == pytest.approx([gain for _, gain in each])
+    assert not any(sign.of(Trajectories(task, "", "", ())).size for sign in SIGNS.values())
+    one = load_task("ascending")
+    alone = Trajectories(one, "", "", (trajectory(one, corrective_trial(one, "RRR").movements),))
+    assert [sign.of(alone).size for sign in SIGNS.values()] == [0, 1, 1, 0, 1, 1]
 
 
 def test_choice_in_isolation():
     """Each hand beside its goal: the near one is the isolated choice."""
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
-    assert isolated_agreement(trajectory(task, corrective_trial(task, "RL").movements)) == [
-        True,
-        True,
-    ]
-    assert isolated_agreement(trajectory(task, corrective_trial(task, "LR").movements))[0] is False
+    paths = [trajectory(task, corrective_trial(task, hands).movements) for hands in ("RL", "LR")]
+    agrees = REGISTER["hand as in isolation"].measure(Trajectories(task, "", "", tuple(paths)))
+    assert agrees[:, 0].tolist() == [True, False]
+    assert agrees[0, 1]
+    assert SIGNS["hand"].of_run(np.array([[0.0, 1.0, 1.0]])) == 0.5  # not of the last goal
+    assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
 
 
 def test_best_corrective_sequences():
@@ -278,8 +325,8 @@ def test_best_corrective_sequences():
 def test_travel_is_of_the_arm_that_waits():
     task = tiny_task(goals=[[5.5, 0.1], [7.5, 0.1]], initial_hands="RL")
     path = trajectory(task, planned(posture(1.0, left_4=0.5), posture(4.0), hands="RL"))
-    assert travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
-    assert travel(path)[1] == 0.0  # the right arm, when the left hand works
+    assert subtasks.waiting_travel(path)[0] == pytest.approx(path.execution.configurations[0][5])
+    assert subtasks.waiting_travel(path)[1] == 0.0  # the right arm, when the left hand works
 
 
 def test_preshaping_by_the_arm_alone():
@@ -298,8 +345,8 @@ def test_preshaping_by_the_arm_alone():
         np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
         for of in (path.execution, initial)
     )
-    assert 0.2 < preshaping(path, initial)[0] == pytest.approx(1 - now / before)
-    assert np.isnan(preshaping(path, initial)[1])
+    assert 0.2 < subtasks.preshaping(path, initial)[0] == pytest.approx(1 - now / before)
+    assert np.isnan(subtasks.preshaping(path, initial)[1])
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -307,7 +354,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
     path = trajectory(task, corrective_trial(task, "LRLR").movements)
-    np.testing.assert_array_equal(preshaping(path, initial)[:3], [0, 0, 0])
+    np.testing.assert_array_equal(subtasks.preshaping(path, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
     goals = [robot.forward_kinematics(q, hand).tolist()
@@ -326,16 +373,8 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
         np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
         for q in (configurations[1], held, still.configurations[1])
     )
-    assert preshaping(path, still)[1] == pytest.approx((without - now) / before)
+    assert subtasks.preshaping(path, still)[1] == pytest.approx((without - now) / before)
     assert abs(without - now) > 0.05
-
-
-def test_waiting_arms_keep_still_under_condition_3_only():
-    for condition, moves in (("EC3", False), ("EC4", True)):
-        run = learn(load_task("two-armed-1"), condition, seed=1, trials=400)
-        path = trajectory(run.task, run.solution)
-        moved = preshaping(path, corrective_trial(run.task, "RRRR"))
-        assert (np.nan_to_num(moved) != 0).any() == moves
 
 
 # Form
@@ -343,7 +382,7 @@ def test_waiting_arms_keep_still_under_condition_3_only():
 
 def test_turning_angles():
     corners = np.array([[0, 0], [1, 0], [2, 0], [2, 3], [2, 1], [2, 1], [5, 5.0]])
-    angles = turning_angles(corners)
+    angles = subtasks.turning_angles(corners)
     np.testing.assert_allclose(angles[:3], [0, math.pi / 2, math.pi], atol=1e-12)
     assert np.isnan(angles[3:]).all()
 
@@ -362,11 +401,11 @@ def family_of(positions, goal=2, coordinate=1):
 
 def test_families():
     tasks = family_of([1.5, 2.0, 2.5, 3.5])
-    ((moving, positions),) = families({**tasks, "ascending": load_task("ascending")})
+    ((moving, positions),) = moved_goals({**tasks, "ascending": load_task("ascending")})
     assert moving == 2
     assert positions == pytest.approx({"v0": -0.875, "v1": -0.375, "v2": 0.125, "v3": 1.125})
-    assert families(family_of([1.5, 2.0])) == []
-    ((moving, across),) = families(family_of([4.0, 3.0, 5.0], goal=3, coordinate=0))
+    assert moved_goals(family_of([1.5, 2.0])) == []
+    ((moving, across),) = moved_goals(family_of([4.0, 3.0, 5.0], goal=3, coordinate=0))
     assert moving == 3
     assert list(across.values()) == pytest.approx([0, -1, 1], abs=1e-12)
 
@@ -375,7 +414,7 @@ def test_two_families_share_their_common_task():
     tasks = family_of([1.5, 2.0, 2.5]) | {
         f"w{k}": task for k, task in enumerate(family_of([3.5, 4.0], goal=3).values())
     }
-    assert {(moving, tuple(positions)) for moving, positions in families(tasks)} == {
+    assert {(moving, tuple(positions)) for moving, positions in moved_goals(tasks)} == {
         (2, ("v0", "v1", "v2")),
         (3, ("v1", "w0", "w1")),
     }
@@ -386,109 +425,181 @@ def test_locus_slopes_by_hand():
     q = np.array([[-1.0], [1.0], [1.0], [5.0], [5.0]])
     (slope,) = locus_slopes(q, [-1, -1, 0, 1, 1])
     half = 12.7062047 * math.sqrt(1.5 / 2)
-    assert slope[:3] == pytest.approx((2.5, 2.5 - half, 2.5 + half))
+    assert (slope.value, slope.low, slope.high) == pytest.approx((2.5, 2.5 - half, 2.5 + half))
+    # t = 2.5 / √(1.5 / 2), one degree of freedom: Cauchy's distribution, both tails.
+    assert slope.p == pytest.approx(1 - 2 * math.atan(2.5 / math.sqrt(0.75)) / math.pi)
     # However many runs there are of each task, the evidence is that of three positions.
     many = np.repeat(q, 50, axis=0), np.repeat([-1, -1, 0, 1, 1], 50)
     assert locus_slopes(*many)[0] == pytest.approx(slope)
 
 
-def test_a_curve_is_no_slope():
-    """200 runs on a parabola, whose line over all runs would be "significant"."""
-    places = np.repeat([-1.5, -1.0, -0.5, 0.0, 0.5, 1.0], 40)
-    curve = (0.01 * rng(12).standard_normal(240) + 0.1 * places**2)[:, None]
-    assert stats.linregress(places, curve[:, 0]).pvalue < 1e-6
-    assert locus_slopes(curve, places)[0].p > 0.1
-    assert slope_norm(curve, places, rng()).p > 0.1
+# Studies
 
 
-# The driver
+def cell_of(task, method, *solutions):
+    """Executed solutions of one method on one task."""
+    return Trajectories(task, method, "", tuple(trajectory(task, each) for each in solutions))
 
 
-def solved_study(solved):
-    """A study of ``(task, method, [movements of each run])``."""
-    rows, movements = [], {}
-    tasks = {task.name: task for task, _, _ in solved}
-    for task, method, solutions in solved:
-        for run, solution in enumerate(solutions):
-            run_id = f"{task.name}-{method}-{run}"
-            execution = execute(task, solution)
-            rows.append({"run_id": run_id, "task": task.name, "method": method, "variant": "",
-                         "status": "ok", "run": run, "reward": execution.reward,
-                         "hands": execution.hands})  # fmt: skip
-            movements[run_id] = pd.DataFrame(
-                {"order": order, "goal": m.goal, "hand": m.hand, "kind": m.kind, "ticks": m.ticks}
-                | dict(zip(task.robot.joint_names, m.target, strict=True))
-                for order, m in enumerate(execution.movements)
-            )
-        if not solutions:
-            rows.append({"run_id": f"{task.name}-{method}", "task": task.name, "method": method,
-                         "variant": "", "status": "infeasible", "run": 0})  # fmt: skip
-    study = study_of(pd.DataFrame(rows), list(tasks.values()))
-    return MadeUp(study, movements=(movements, {}))
+def study_with(*cells):
+    """A study of cells, those without solutions of one failed run; no replays."""
+    rows = [
+        row(cell.method, -300 if cell.runs else None, task=cell.task.name, run=run,
+            status="ok" if cell.runs else "infeasible")
+        for cell in cells for run in range(max(1, len(cell.runs)))
+    ]  # fmt: skip
+    solved = {(cell.task.name, cell.method): cell for cell in cells}
+    replays = {key: replace(cell, runs=()) for key, cell in solved.items()}
+    study = study_of(pd.DataFrame(rows), [cell.task for cell in cells])
+    return MadeUp(study, trajectories=made(solved), replays=made(replays))
 
 
 def test_frame_of_two_contexts():
     """The learner depends on context, the corrective process does not."""
-    tasks = [load_task("ascending"), load_task("descending")]
-    solved = []
-    for task in tasks:
+    cells = []
+    for task in (load_task("ascending"), load_task("descending")):
         runs = learn_many(task, "EC1", seeds=range(5), trials=1500)
-        solved += [
-            (task, "learner", [run.solution for run in runs]),
-            (task, "corrective", [corrective_trial(task, "RRR").movements]),
-            (task, "failed", []),
-        ]
-    frame = signatures(solved_study(solved))
-    assert frame.equals(signatures(solved_study(solved)))  # nothing is random but by its seed
+        initial = corrective_trial(task, "RRR").movements
+        cells += [cell_of(task, EC1, *(run.solution for run in runs))]
+        cells += [cell_of(task, "corrective", initial), cell_of(task, "failed")]
+    frame = signature_values(study_with(*cells))
+    assert frame.equals(signature_values(study_with(*cells)))  # nothing is random but by its seed
 
     def one(method, signature):
         rows = frame[(frame.task == "ascending") & (frame.method == method)]
         return rows[rows.signature == signature].iloc[0]
 
-    assert one("learner", "context dependence").p < 0.02  # 2 of 252 at best
-    assert one("learner", "motor-equivalent part").value > 5 * (
-        one("learner", "non-motor-equivalent part").value
-    )
+    assert one(EC1, "context dependence").p < 0.02  # 2 of 252 at best
+    parts = [one(EC1, f"{part}motor-equivalent part").value for part in ("", "non-")]
+    assert parts[0] > 5 * parts[1]
+    shortest = min(run.hits[0] for cell in cells for run in cell.runs if cell.method == EC1)
+    assert one(EC1, "lead time").longest == shortest
     assert one("corrective", "context distance").value == 0
-    assert one("corrective", "context dependence").why_not.startswith("one run a context")
-    assert one("learner", "total against the same hands").high < 0
-    assert one("learner", "hand as in isolation").why_not == "the task has one hand"
-    assert one("failed", "total against the same hands").why_not == "no run has a solution"
-    assert one("learner", "locus slope").why_not.startswith("fewer than 3 tasks")
-    assert list(frame.signature.unique()) == list(REGISTER)
+    for method, signature, why in (
+        ("corrective", "context dependence", "one run a context"),
+        ("corrective", "total against the same hands", "one run: no interval"),
+        (EC1, "hand as in isolation", "the task has one hand"),
+        ("failed", "total against the same hands", "no run has a solution"),
+        (EC1, "locus slope", "fewer than 3 tasks"),
+    ):
+        assert one(method, signature).why_not.startswith(why)
+    # The mean of five runs with Student's interval, four degrees of freedom.
+    total = one(EC1, "total against the same hands")
+    values = cells[0].against_same_hands.sum(axis=1)
+    half = 2.776445 * np.std(values, ddof=1) / math.sqrt(5)
+    expected = values.mean(), values.mean() - half, values.mean() + half, 5
+    assert (total.value, total.low, total.high, total.n) == pytest.approx(expected)
+    assert list(frame.signature.unique()) == [
+        each.name for each in REGISTER.values() if each.meaning
+    ]
     # A row has a value, or says why it has none.
     assert (frame.value.notna() | (frame.why_not != "")).all()
-    intervals = frame[frame.low.notna()]
-    assert (intervals.low <= intervals.value + 1e-9).all()
-    assert (intervals.value <= intervals.high + 1e-9).all()
-    assert set(frame.method) == {"learner", "corrective", "failed"}
+    p_holm = tables.contexts(study_with(*cells)).p_holm[f"ascending {EC1} goal 1 right"]
+    assert p_holm == one(EC1, "context dependence").p
 
 
 def test_frame_of_a_family():
     """The base is lower at goals 1 and 3 by a tenth of goal 2's height: slopes are known."""
-    solved = []
+    cells = []
     for task in family_of([1.5, 2.0, 2.5]).values():
         height = task.goals[1][1]
         lower = 0.02 * (height - 2.0)
         targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
-        solved.append((task, "planner", [planned(*targets, hands="RRR")] * 2))
-    frame = signatures(solved_study(solved))
+        cells.append(cell_of(task, "planner", *[planned(*targets, hands="RRR")] * 2))
+    frame = signature_values(study_with(*cells))
     slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
     assert set(slopes.moving) == {2}
     norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
-    reached = {
-        goal: [
-            execute(task, solution[0]).configurations[goal - 1, 1] for task, _, solution in solved
-        ]
-        for goal in (1, 3)
-    }
     for goal in (1, 3):
-        row = slopes.loc[goal, "right", "base_y"]
-        assert row.value == pytest.approx(reached[goal][2] - reached[goal][0])  # over length 1
-        assert row.n == 6
+        reached = [cell.runs[0].execution.configurations[goal - 1, 1] for cell in cells]
+        of_base = slopes.loc[goal, "right", "base_y"]
+        assert of_base.value == pytest.approx(reached[2] - reached[0])  # over length 1
+        assert (of_base.n, of_base.unit) == (6, "1")
         every = slopes.value.loc[goal, "right"]
         assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
         assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
     assert slopes.value[1, "right", "base_y"] > 0.001
-    contexts = frame[frame.signature == "context distance"]
-    assert contexts.why_not.str.contains("locus slopes").all()
+    assert (
+        slopes["where"][3, "right", "base_y"] == "goal 3, carry-over of goal 2, right hand, base_y"
+    )
+    assert frame[frame.signature == "context distance"].why_not.str.contains("locus slopes").all()
+    steepest = tables.slopes(study_with(*cells))
+    assert steepest.kind.tolist() == ["anticipatory", "carry-over"]
+    for goal, joint, slope in zip(steepest.goal, steepest.joint, steepest.slope, strict=True):
+        of_joint = slopes.value.loc[goal, "right"]
+        assert (joint, slope) == (of_joint.abs().idxmax(), of_joint[joint])
+
+
+def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
+    """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of the placebo."""
+    cells = []
+    for label, shift, count in ((EC1, apart, runs), (PLACEBO, of_placebo, placebo_runs)):
+        noise = 0.1 * rng(2).standard_normal(count)
+        for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
+            cells.append(posed(task, label, [posture(each) for each in noise + x]))
+    study = study_with(*cells)
+    study.runs.loc[study.runs.method == PLACEBO, "trials"] = placebo_trials
+    return study
+
+
+@pytest.mark.parametrize(
+    ("made_up", "seen", "answer"),
+    [
+        ({"apart": 2.0}, True, "Yes: at goal 1 base and joints lie 2.00 apart"),
+        ({"apart": 0.5}, False, "Not shown:"),
+        ({"apart": 0.5, "of_placebo": 2.0}, False, "Not shown:"),
+        ({"apart": 0.0}, False, "No significant difference:"),
+        ({"apart": 2.0, "runs": 2}, False, "Too few runs"),
+        ({"apart": 2.0, "placebo_runs": 0}, False, "Undecided:"),
+        ({"apart": 2.0, "placebo_trials": 9}, False, "Undecided:"),  # fewer than the learner's
+    ],
+)
+def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
+    study = beside_placebo(**made_up)
+    found = placebo.difference(study)
+    assert found.contexts.method == EC1
+    assert found.contexts.apart == pytest.approx(made_up["apart"])
+    assert found.seen == seen
+    assert sentences.answer(study).startswith(answer)
+    if found.placebo is not None:
+        assert found.placebo.apart == pytest.approx(made_up.get("of_placebo", 0.5))
+        assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)
+        assert placebo.context_beyond_p(study, found.contexts) == found.beyond_p
+        assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
+
+
+def test_slopes_beside_the_placebo():
+    """The learner follows a moved goal by 0.9 of its way, the placebo by 0.2."""
+    tasks, cells = family_of([1.5, 2.0, 2.5]), []
+    for label, slope in ((EC1, 0.9), (PLACEBO, 0.2)):
+        for number, task in enumerate(tasks.values()):
+            noise = 0.02 * rng(number).standard_normal(9)
+            at = slope * (task.goals[1][1] - 2.0)
+            cells.append(posed(task, label, [posture(each) for each in noise + at]))
+
+    def p_of(label, cells):
+        return placebo.slope_beyond_p(study_with(*cells), label, "v0", 1, 2, "right")
+
+    assert p_of(EC1, cells) < 0.01
+    exchanged = [replace(cell, method={EC1: PLACEBO, PLACEBO: EC1}[cell.method]) for cell in cells]
+    assert p_of(EC1, exchanged) == 1.0
+    assert math.isnan(p_of(PLACEBO, cells))
+    assert math.isnan(p_of(EC1, [*cells[:-1], replace(cells[-1], runs=cells[-1].runs[:1])]))
+    assert math.isnan(p_of(EC1, cells[:3]))
+
+
+def test_signs_beside_the_placebo():
+    """Both tails: a method may be slower or faster at first than the placebo."""
+    task = load_task("ascending")
+    reference = corrective_trial(task, "RRR").ticks_by_goal()
+    slower = {EC1: [9, 12, 10, 14], PLACEBO: [8, 9, 10, 12]}
+    runs = {
+        label: sum((posed(task, label, [posture()], np.add(reference, [ticks, 0, 0])).runs
+                    for ticks in of_label), ())
+        for label, of_label in slower.items()
+    }  # fmt: skip
+    study = study_with(*(Trajectories(task, label, "", runs[label]) for label in slower))
+    p = placebo.sign_beyond_p(study, task.name, EC1, "first")
+    assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
+    assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
+    assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))

@@ -13,12 +13,14 @@ from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report import facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.topics.comparison.groups import BY_TRIAL, UNTOLD, group_of
 from coartic.analysis.topics.comparison.runtimes import WAY, Targets, halfway, price, targets
 from coartic.analysis.topics.comparison.scores import (
     ALL_TASKS,
+    BY_TRIAL,
+    UNTOLD,
     apart,
     gaps,
+    group_of,
     initial_and_optimum,
     leaders,
     standings,

@@ -8,19 +8,20 @@ import time
 import warnings
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from coartic import CoarticError, Movement
 from coartic.analysis.study import load
-from coartic.benchmarks.provenance import command, environment, now
-from coartic.benchmarks.registry import Entry
+from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
-from coartic.benchmarks.worker import failed
+from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
-from coartic.runs.plan import BUILT_IN
-from coartic.runs.store import FILE, FORMAT, Store, open_store, writing
+from coartic.runs.run import Score
+from coartic.runs.store import FORMAT, RUNS_FILE, Store, open_store, writing
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     KNOWN,
@@ -38,7 +39,7 @@ STUCK = tiny_task(
 )  # fmt: skip
 NEAR = tiny_task(name="near", hands=["right"], goals=[[4.5, 1.0]], initial_hands="R")
 CELLS = [
-    Cell(STUCK, KNOWN["dual-process/EC4"], (("epsilon", 0.5),)),
+    Cell(STUCK, KNOWN["dual-process/EC4"], {"epsilon": 0.5}),
     Cell(NEAR, KNOWN["nullspace-qp/none"]),
 ]
 ONE = paper_cells(tasks=["ascending"])
@@ -50,9 +51,9 @@ def written(tmp_path_factory):
     """Runs as they were handed over, and a study of them."""
     handed, write_runs = {}, Store.write
 
-    def write(store, position, runs):
-        handed.update((run.run_id, run) for run in runs)
-        write_runs(store, position, runs)
+    def write(store, runs):
+        handed.update((run.key.id, run) for run in runs)
+        write_runs(store, runs)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "write", write)
@@ -67,74 +68,71 @@ def undisturbed(tmp_path_factory):
 def plain(run):
     """All of a run, numbers by their bytes."""
     parts = {
-        part: [
+        (part, score.reward, score.hands): [
             (m.goal, m.hand, m.kind, m.ticks, m.target.tobytes(),
              None if m.waypoints is None else m.waypoints.tobytes())
-            for m in movements
+            for m in score.movements
         ]
-        for part, movements in run.movements.items()
+        for part, score in run.scores.items()
     }  # fmt: skip
-    return run.row, run.environment, run.rewards, parts
+    return replace(run, scores=parts)
 
 
 def test_what_is_written_is_read_back(written):
     handed, study = written
     learner, _, planner = study.runs.run_id
     assert {None} < set(handed[learner].rewards)
-    assert handed[planner].movements["solution"][0].waypoints is not None
+    assert handed[planner].scores["solution"].movements[0].waypoints is not None
     with open_store(study.folder) as store:
-        for cell in study.plan.cells:
-            for run_id in study.cells[cell.task, cell.label].runs.run_id:
-                stored = store.run(run_id)
-                assert plain(stored.run) == plain(handed[run_id])
-                assert (stored.task, stored.method) == (study.tasks[cell.task], cell.method)
-                assert (stored.parameters, stored.model) == (cell.complete, study.model)
+        for run_id, run in handed.items():
+            assert plain(store.run(run_id)) == plain(run)
+        assert store.plan().cells == planned(CELLS, trials=40).cells
     for run_id, rewards in study.rewards():
         kept = [np.nan if reward is None else reward for reward in handed[run_id].rewards]
         np.testing.assert_array_equal(rewards, kept)
-
-
-def test_the_views_are_plain_sql(written):
-    handed, study = written
-    with closing(sqlite3.connect(study.folder / FILE)) as plain_sql:
-        rows = plain_sql.execute("SELECT run_id, reward FROM runs").fetchall()
-        assert dict(rows) == {run_id: run.row["reward"] for run_id, run in handed.items()}
+    with closing(sqlite3.connect(study.folder / RUNS_FILE)) as plain_sql:
         for run_id, run in handed.items():
-            solution = run.movements.get("solution", ())
-            query = 'SELECT base_x, right_4 FROM solutions WHERE run_id = ? ORDER BY "order"'
-            ends = plain_sql.execute(query, (run_id,)).fetchall()
-            assert ends == [(m.target[0], m.target[-1]) for m in solution]
-            query = 'SELECT right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
+            of_run = partial(read_values, plain_sql, run_id)
+            assert of_run("reward FROM runs WHERE run_id = ?") == [run.reward]
+            solution = run.scores["solution"].movements if run.scores else ()
+            ends = of_run('right_4 FROM solutions WHERE run_id = ? ORDER BY "order"')
+            assert ends == [m.target[-1] for m in solution]
             points = [q[6] for m in solution if m.waypoints is not None for q in m.waypoints]
-            assert [q for (q,) in plain_sql.execute(query, (run_id,))] == points
+            query = 'right_1 FROM paths WHERE run_id = ? ORDER BY "order", waypoint'
+            assert of_run(query) == points
 
 
-def test_a_lot_is_there_whole_or_not_at_all(written, tmp_path):
+def read_values(plain_sql, run_id, query):
+    return [value for (value,) in plain_sql.execute(f"SELECT {query}", (run_id,))]
+
+
+def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
     movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
-    run = replace(next(iter(written[0].values())), movements={"solution": movements})
+    solution = Score(-3, "L", movements)
+    run = replace(next(iter(written[0].values())), scores={"solution": solution})
 
     def some():
         yield run
         raise KeyboardInterrupt
 
     with writing(tmp_path) as store:
-        store.ask(planned(CELLS, trials=40).plan, environment(), command(), now())
+        store.ask(planned(CELLS, trials=40), current_environment(), command(), now())
         with pytest.raises(KeyboardInterrupt):
-            store.write(0, some())
+            store.write(some())
         assert store.count() == 0
         for _ in range(2):  # the second one replaces the first
-            store.write(0, [run])
+            store.write([run])
             assert store.count() == 1
-        unlike = replace(run, movements={"solution": movements, "initial": movements})
+        unlike = replace(run, scores={"solution": solution, "initial": solution})
         with pytest.raises(CoarticError, match="EC4 cannot be stored: UNIQUE"):
-            store.write(0, [unlike])  # paths of two parts
+            store.write([unlike])  # paths of two parts
     with open_store(tmp_path) as store:
-        assert plain(store.run(run.run_id).run) == plain(run)
+        assert plain(store.run(run.key.id)) == plain(run)
 
 
 def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
-    """Lots are of eight runs and of one: the second is not begun."""
+    """Batches are of eight runs and of one: the second is not begun."""
     plan = planned(ONE, **FEW)
 
     class Two(InProcess):
@@ -145,10 +143,10 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        plan.perform(tmp_path, executor=Two(), watch=watch)
+        perform(plan, tmp_path, executor=Two(), watch=watch)
     with pytest.raises(CoarticError, match=r"has 8 of 9 runs.*Repeat"):
         load(tmp_path)
-    assert plan.perform(tmp_path, executor=Two()).progress.done == 1
+    assert perform(plan, tmp_path, executor=Two()).progress.done == 1
     same_results(load(tmp_path), undisturbed)
 
 
@@ -158,7 +156,7 @@ MANY = {"runs": 60, "trials": 30}
 def perform_until_killed(folder, progress):
     """Perform runs and say how many are kept."""
     plan = planned(**MANY)
-    plan.perform(folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
+    perform(plan, folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
 @pytest.mark.skipif(
@@ -180,7 +178,7 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
         time.sleep(chance.uniform(0, 0.05))
         process.kill()
         process.join()
-        with closing(sqlite3.connect(folder / FILE)) as plain_sql:
+        with closing(sqlite3.connect(folder / RUNS_FILE)) as plain_sql:
             assert plain_sql.execute("PRAGMA integrity_check").fetchone() == ("ok",)
             there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
     assert there == sorted(there)
@@ -189,46 +187,48 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch):
-    opened = store_module.opened
-    monkeypatch.setattr(store_module, "opened", lambda where, _: opened(where, 0.01))
+    connect = store_module.connect
+    monkeypatch.setattr(store_module, "connect", lambda where, _: connect(where, 0.01))
     plan = planned(ONE, **FEW)
     busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
     with writing(tmp_path):
         with busy:
-            plan.perform(tmp_path, executor=InProcess())
+            perform(plan, tmp_path, executor=InProcess())
         with busy:
             load(tmp_path)
-    plan.perform(tmp_path, executor=InProcess())
+    perform(plan, tmp_path, executor=InProcess())
     same_results(load(tmp_path), undisturbed)
 
 
 class TooSlow(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):
-            yield number, failed(job, "timeout", "time limit exceeded", 1.0)
+            yield number, fail(job, "timeout", "time limit exceeded", 1.0)
 
 
 def test_what_is_performed_again(undisturbed, tmp_path):
-    def done(executor=None, *, time_limit_s=1.0, **how):
+    def counts(executor=None, *, time_limit_s=1.0, **how):
         plan = planned(ONE, time_limit_s=time_limit_s, **FEW)
-        return plan.perform(tmp_path, executor=executor or InProcess(), **how).progress.done
+        progress = perform(plan, tmp_path, executor=executor or InProcess(), **how).progress
+        return progress.present, progress.done, progress.failed, progress.crashed
 
-    assert done(TooSlow()) == 9
-    assert done() == 0  # with the same limit they would be too slow again
-    assert done(Failing(0), time_limit_s=2.0) == 9
+    assert counts(TooSlow()) == (0, 9, 9, 0)
+    assert counts() == (9, 0, 9, 0)  # with the same limit they would be too slow again
+    assert counts(time_limit_s=0.5) == (9, 0, 9, 0)
+    assert counts(Failing(0), time_limit_s=2.0) == (0, 9, 1, 1)
     assert load(tmp_path).runs.status.tolist() == ["crashed"] + ["ok"] * 8
-    assert done(time_limit_s=3.0) == 0
-    assert done(retry_failed=True) == 1
+    assert counts(time_limit_s=3.0) == (9, 0, 1, 1)
+    assert counts(retry_failed=True) == (8, 1, 0, 0)
     assert load(tmp_path).runs.result.tolist() == undisturbed.runs.result.tolist()
-    assert done(redo=True, time_limit_s=300.0) == 9
+    assert counts(redo=True, time_limit_s=300.0) == (0, 9, 0, 0)
     same_results(load(tmp_path), undisturbed)
 
 
 def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     (cell,) = ONE
-    other = Cell(cell.task, Entry(cell.entry.method, BUILT_IN, cell.entry.where, "0" * 12))
+    other = Cell(cell.task, replace(cell.method, code="0" * 12))
     run_and_write(tmp_path, [other], **FEW)
-    report = planned(ONE, **FEW).perform(tmp_path, executor=InProcess())
+    report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
     assert (report.progress.stale, report.progress.present, report.progress.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
     same_results(load(tmp_path), undisturbed)
@@ -270,8 +270,8 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
     def content():
         return {path: path.is_file() and path.read_bytes() for path in tmp_path.iterdir()}
 
-    (tmp_path / FILE).write_bytes((undisturbed.folder / FILE).read_bytes())
-    spoil(tmp_path / FILE)
+    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
+    spoil(tmp_path / RUNS_FILE)
     before = content()
     for use in (load, lambda folder: run_and_write(folder, ONE, **FEW)):
         with pytest.raises(CoarticError, match=words) as caught:

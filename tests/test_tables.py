@@ -12,9 +12,11 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.report.contents import TABLES
+from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation
-from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL
-from tests.support.made_up import MadeUp, made_up_optima, row, study_of
+from coartic.analysis.topics.comparison.scores import BY_FORMULA, BY_TRIAL
+from coartic.analysis.trajectories import Trajectories
+from tests.support.made_up import MadeUp, made, made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
@@ -179,7 +181,8 @@ def test_contexts(study, monkeypatch):
         for name, value in zip(names, values, strict=True)
     ]  # fmt: skip
     monkeypatch.setattr(coarticulation, "signature_values", lambda study: pd.DataFrame(rows))
-    monkeypatch.setattr(coarticulation, "placebo_p", lambda *what: 0.5 if CMA in what else NONE)
+    beyond = {CMA: 0.5, PLAN: NONE}
+    monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
     columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
                "other", "lead"]  # fmt: skip
     cells = {
@@ -187,6 +190,7 @@ def test_contexts(study, monkeypatch):
         f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08, NONE),
         f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16, 7.0),
     }
-    frame = coarticulation.contexts(MadeUp(study))
+    unsolved = {key: Trajectories(study.tasks[key[0]], key[1], "", ()) for key in study.cells}
+    frame = coarticulation.contexts(MadeUp(study, trajectories=made(unsolved)))
     same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
     assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]

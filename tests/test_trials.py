@@ -1,86 +1,72 @@
-"""Trials made by the compiled batch against the same trials executed one by one."""
+"""Sessions' trials in one call: what is taken, what is refused, and what is counted."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from coartic import MotionModel, Movement, corrective_trial, execute, hand_sequences, load_task
-from coartic.motion.trials import make_trials
-from coartic.tasks.catalogue import builtin_tasks
-from coartic.tasks.task import hands_of
-from tests.support.strategies import tiny_task, uneven_task
+from coartic import MotionModel, load_task
+from coartic.method import BudgetError, Information, Session, UndeclaredError
+from coartic.motion.trials import hand_codes, make_trials
+from coartic.optimisers import TOLD
+from tests.support.strategies import sample
 
-TASKS = [
-    *map(load_task, builtin_tasks()),
-    tiny_task(),
-    uneven_task(
-        [0.3],
-        [0.1, 0.4, -0.2, 0.2],
-        base=[0.5, -0.5],
-        goals=[[2.0, 1.0], [1.0, 0.5], [1.05, 0.5], [3.0, 0.0]],
-        initial_hands="RRRR",
-        locked_base=["x"],
-    ),
-]
+BLIND = frozenset({Information.REWARD_BY_TRIAL})
 
 
-@settings(max_examples=20)
-@given(
-    st.sampled_from(TASKS),
-    st.integers(0, 10**6),
-    st.sampled_from([0.0, 0.05, 0.5, 3.0]),
-    st.sampled_from([2, 100, 20_000]),
-)
-def test_equal_to_execution_one_by_one(task, seed, noise, max_iterations):
-    rng = np.random.default_rng(seed)
-    model = MotionModel(max_iterations=max_iterations)
-    hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), 8)]
-    goals, dof = len(task.goals), task.robot.dof
-    targets = np.tile(task.q0, (8, goals, 1)) + noise * rng.standard_normal((8, goals, dof))
-    for sequence in set(hands):
-        alone = corrective_trial(task, sequence).configurations  # fewer where it cannot reach
-        with_sequence = [chosen == sequence for chosen in hands]
-        targets[with_sequence, : len(alone)] += alone - task.q0
-    held = rng.random((8, goals, dof)) < 0.2
-    held[..., ["xy".index(coordinate) for coordinate in task.locked_base]] = True
-    held[rng.random((8, goals)) < 0.2] = True
-    targets[held] = np.nan
-    trials = make_trials(task, hands, targets, model=model)
+def test_hands_as_text_and_as_numbers():
+    task = load_task("two-armed-1")
+    hands, targets = sample(task, 6)
+    session = Session(task, 0, TOLD)
+    codes = hand_codes(task, hands, 6)
+    assert [["L", "R"][code] for code in codes[0]] == [*hands[0]]
+    both = session.trials(hands, targets), session.trials(codes, targets)
+    for one, other in zip(*both, strict=True):
+        np.testing.assert_array_equal(one, other)
+    for wrong in (codes[:5], codes[:, :3], codes + 1, hands[:5], "LLL"):
+        with pytest.raises(ValueError, match="hand"):
+            session.trials(wrong, targets)
 
-    iterations = corrections = evaluations = 0
-    for n in range(8):
-        movements = []
-        attempted = min(goals, (~np.isnan(trials.reached[n, :, 0])).sum() + 1)
-        for goal, hand in enumerate(hands_of(hands[n])):
-            if held[n, goal].all():
-                movements.append(Movement(goal + 1, hand, "corrective"))
-                evaluations -= goal < attempted
-                assert np.isnan(trials.targets[n, goal]).all()
-                continue
-            evaluations -= 2 * (goal < attempted)  # execute looks before it moves
-            target = trials.targets[n, goal]
-            if goal < attempted:
-                before = trials.reached[n, goal - 1] if goal else task.q0
-                np.testing.assert_array_equal(
-                    target, np.where(held[n, goal], before, targets[n, goal])
-                )
-            else:
-                target = task.q0  # not moved to, but a solution names one for every goal
-            movements.append(Movement(goal + 1, hand, "learned", target))
-        one = execute(task, movements, model=model)
-        assert trials.completed[n] == one.completed
-        assert trials.ticks[n] == one.ticks
-        np.testing.assert_array_equal(
-            trials.reached[n, : len(one.configurations)], one.configurations
-        )
-        assert np.isnan(trials.reached[n, len(one.configurations) :]).all()
-        iterations += one.iterations
-        corrections += one.corrections
-        evaluations += one.evaluations
-    assert trials.iterations.sum() == iterations
-    assert trials.corrections.sum() == corrections
-    assert trials.evaluations.sum() == evaluations
+
+def test_a_budget_that_ends_within_a_batch():
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 10)
+    unlimited = Session(task, 0, TOLD).trials(hands, targets)
+    session = Session(task, 0, TOLD, trial_budget=7)
+    assert len(session.trials(hands[:4], targets[:4]).ticks) == 4
+    rest = session.trials(hands[4:], targets[4:])
+    np.testing.assert_array_equal(rest.rewards, unlimited.rewards[4:7])
+    assert (session.meter.trials, session.trials_left, len(session.rewards)) == (7, 0, 7)
+    assert len(session.trials([], targets[:0]).ticks) == 0
+    with pytest.raises(BudgetError, match="all 7 trials"):
+        session.trials(hands, targets)
+
+
+def test_until_the_first_that_is_better():
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 12)
+    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
+    until = np.full(12, np.inf)
+    until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
+    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
+    alone.trials(hands[:6], targets[:6])
+    assert session.meter == alone.meter
+    assert session.rewards == alone.rewards
+
+
+def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
+    task = load_task("ascending")
+    hands, targets = sample(task, 3)
+    session = Session(task, 0, BLIND)
+    blind, told = session.trials(hands, targets), Session(task, 0, TOLD).trials(hands, targets)
+    np.testing.assert_array_equal(blind.rewards, told.rewards)
+    assert told.corrections.sum() > 0
+    hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
+    assert [len(field) for field in hidden] == [0] * 4
+    targets[1, 2] = np.nan
+    with pytest.raises(UndeclaredError, match="corrective process"):
+        session.trials(hands, targets)
+    with pytest.raises(UndeclaredError, match="reward by trial"):
+        Session(task, 0, TOLD - BLIND).trials(hands, targets)
 
 
 def test_one_hand_sequence_stands_for_all():

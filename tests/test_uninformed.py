@@ -14,7 +14,7 @@ from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
 
-METHODS = (*random_search.METHODS, *cma_es.METHODS)
+METHODS = (random_search.Pure, random_search.Climbing, *cma_es.METHODS)
 ONE_GOAL = tiny_task(
     hands=["right"],
     goals=[[-3.0, 0.0]],
@@ -259,17 +259,15 @@ def test_failed_trials_are_counted_and_survived(method):
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-def test_no_trial_completed_is_infeasible(method):
-    with pytest.raises(MethodError, match="no trial hit every goal") as caught:
-        solve(method, load_task("two-armed-2"), trials=50, model=MotionModel(max_iterations=2))
-    assert caught.value.outcome == "infeasible"
-
-
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-def test_no_trial_left_is_infeasible(method):
-    with pytest.raises(MethodError, match="leaves no trial") as caught:
-        solve(method, tiny_task(), budget=0)
-    assert caught.value.outcome == "infeasible"
+def test_without_a_trial_that_hits_every_goal_it_is_infeasible(method):
+    few = MotionModel(max_iterations=2)
+    for options, message in (
+        ({"trials": 50, "model": few}, "no trial hit every goal"),
+        ({"budget": 0}, "leaves no trial"),
+    ):
+        with pytest.raises(MethodError, match=message) as caught:
+            solve(method, load_task("two-armed-2"), **options)
+        assert caught.value.outcome == "infeasible"
 
 
 def test_a_policy_for_the_first_hands_is_paid_for():

@@ -19,16 +19,16 @@ from hypothesis import strategies as st
 
 from coartic import PAPER, Movement, execute, learn, load_task, move
 from coartic.analysis import verify as checker
-from coartic.benchmarks.outcome import result_of
 from coartic.motion.movement import follow
 from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
-from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
-from coartic.runs.store import FILE, PARTS, RESULTS, Run, writing
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import Cell, Plan, RunKey
+from coartic.runs.run import PARTS, Run, Score
+from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task, uneven_task
 
-NOWHERE: dict[str, object] = {}
 NARROW = {5: {"other_arm": "still"}, 6: {"base": "y"}}
 
 
@@ -45,21 +45,17 @@ def along_paths(task):
         yield Movement(goal, "right", "path", waypoints=np.array([aside, beyond]))
 
 
-def run_of(task, number, parts, **changes):
+def run_of(setting, number, parts, **more):
     """A run that made these movements, as it is stored."""
-    row = {name: "" if "NOT NULL" in kind else None for name, kind in RESULTS.items()}
-    row |= {"run": number, "seed": 0, "suite_seed": 0, "run_id": f"{task.name}-{number}"}
+    task = setting.task
     done = {part: execute(task, movements) for part, movements in parts.items()}
-    for part, execution in done.items():
-        row |= dict(zip(checker.COLUMNS[part], (execution.reward, execution.hands), strict=False))
     if solution := done.get("solution"):
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
-        row |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
-    row |= {"status": "ok", "details": "{}"} | changes
-    del row["setting"], row["environment"]
-    movements = {part: execution.movements for part, execution in done.items()}
-    row["result"] = result_of(row, movements, [])
-    return Run(row, NOWHERE, movements)
+        more |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
+    scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
+    key = RunKey(f"{task.name}-{number}", 0, number, 0)
+    return Run(key, setting, **{"status": "ok"} | more, reason="", environment={}, date="",
+               scores=scores)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -71,41 +67,36 @@ def true_folder(tmp_path_factory):
     learners = [learn(two_armed, "EC3", seed=seed, trials=300) for seed in range(2)]
     best = max(run.reward for run in learners)
     parts = [{part: getattr(run, part) for part in PARTS} for run in learners]
-    solved, failed = {"solution": learners[0].solution}, {"status": "timeout", "proven_bound": -999}
-    learned = [run_of(two_armed, number, movements) for number, movements in enumerate(parts)]
-    cells = [
-        (two_armed, {}, learned),
-        (tiny, {}, [run_of(tiny, 2, {"solution": corrected("right", "right")})]),
-        (straight, {}, [run_of(straight, 3, {"solution": along_paths(straight)})]),
-        (two_armed, {"other_arm": "free"}, [run_of(two_armed, 4, solved, proven_bound=best)]),
+    solved, failed = {"solution": learners[0].solution}, {"status": "timeout", "bound": -999}
+    asked = [
+        (two_armed, {}, [(number, movements, {}) for number, movements in enumerate(parts)]),
+        (tiny, {}, [(2, {"solution": corrected("right", "right")}, {})]),
+        (straight, {}, [(3, {"solution": along_paths(straight)}, {})]),
+        (two_armed, {"other_arm": "free"}, [(4, solved, {"bound": best})]),
     ]
     for run, parameters in NARROW.items():
-        cells.append((two_armed, parameters, [run_of(two_armed, run, {}, **failed)]))
-    method = DeclaredMethod("", "", (), (), True, {}, "", "code")
-    planned = [
-        PlannedCell(task.name, "method", "", parameters, parameters, 7)
-        for task, parameters, _ in cells
-    ]
-    tasks = {task.name: task.model_dump(mode="json") for task, _, _ in cells}
+        asked.append((two_armed, parameters, [(run, {}, failed)]))
+    method = MethodCard("method", "", "", (), (), True, {}, "", "code")
+    cells = tuple(Cell(task, method, each, each, 7) for task, each, _ in asked)
     with writing(folder) as store:
-        plan = Plan("suite", 0, 7, 300, (), None, None, tasks, {"method": method}, tuple(planned))
-        store.ask(plan, NOWHERE, [], "")
-        for position, (_, _, runs) in enumerate(cells):
-            store.write(position, runs)
+        plan = Plan("suite", 0, 7, 300, (), None, None, cells)
+        store.ask(plan, {}, [], "")
+        for setting, (_, _, runs) in zip(plan.settings, asked, strict=True):
+            store.write(run_of(setting, number, made, **more) for number, made, more in runs)
     return folder
 
 
 def edited(true_folder, tmp_path, statement):
     """A copy in which somebody made a change by hand."""
     folder = shutil.copytree(true_folder, tmp_path / "edited")
-    with closing(sqlite3.connect(folder / FILE)) as db:
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
         assert db.execute(statement).rowcount
         db.commit()
     return folder
 
 
 def test_nothing_is_wrong_with_what_was_not_edited(true_folder):
-    report = checker.verify(true_folder)
+    report = checker.check_runs(true_folder)
     assert report.wrong == []
     assert (report.runs, report.movements > 30) == (7, True)
     assert report.unchecked[-1] == "Runs without a solution: 2."
@@ -157,7 +148,7 @@ EDITS = {  # what is said: of which run, and what was edited
 @pytest.mark.parametrize("words", EDITS)
 def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
-    wrong = checker.verify(edited(true_folder, tmp_path, statement)).wrong
+    wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
     assert any(f"-{run}" in sentence and words in sentence for sentence in wrong), wrong
 
 
@@ -192,7 +183,7 @@ def test_it_stands_on_its_own():
     scale=st.sampled_from([1e-3, 0.1, 1.0, 9e4]),
     readings=st.fixed_dictionaries(
         {name: st.booleans() for name in ("corrective_arrival", "whole_last_step", "first_step")}
-        | {"arrival_tick": st.sampled_from([0, 1]), "step": st.sampled_from([0.01, 0.037])}
+        | {"step": st.sampled_from([0.01, 0.037])}
     ),
 )
 def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readings):
@@ -200,7 +191,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     robot, model, on_path = task.robot, PAPER._replace(**readings), kind == "path"
     model = model._replace(step=model.step * max(scale, 1.0))
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
-    judge = checker.read_task(task.model_dump_json(), json.dumps(model._asdict()))
+    judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))
     points = checker.path(q, [middle, target], model) if on_path else checker.line(q, target, model)
     through = round(aim[0] * (len(points.T) - 1))
     x, y = (row[through] for row in checker.hand_at(points, judge.arms[hand], on_path))
@@ -212,7 +203,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     else:
         stops = {"stop_on_arrival": kind == "learned" or model.corrective_arrival}
         due = move(robot, q, target, hand, goal, judge.radius, model=model, **stops)
-    movement = checker.Movement(0, 1, hand, kind, 0, target, [middle, target])
+    movement = checker.MoveRow(0, 1, hand, kind, 0, target, [middle, target])
     stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 

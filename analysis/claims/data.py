@@ -1,165 +1,160 @@
-"""What rules read of a results folder, with a record of the runs that each claim has read."""
+"""What claims read of a results folder, with a record of the runs that each claim has read."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from functools import partial
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from coartic import Execution, Task
-from coartic.analysis.claims.register import Finding, Side, is_method
-from coartic.analysis.methods import LEARNER, PLACEBO, most_exploring
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.methods import LEARNER, PLACEBO, name_of
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import FEWEST
+from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.families.sample import signs
-from coartic.analysis.topics.paper.published import TRIALS
+from coartic.analysis.topics.paper.published import (
+    published_cell,
+    published_exhaustive,
+    published_initial,
+)
 from coartic.analysis.trajectories import Trajectories, best_sequences, initial_solution
+from coartic.analysis.words import estimate, number, tally
 from coartic.learner.kernel import TENTHS
+from coartic.learner.learning import TRIALS
 from coartic.robot import Array
 
-PLAN = "trajectory-optimisation/squared-changes"
-"""Jordan's smoothness cost."""
+LEAST_CHANGES = "trajectory-optimisation/squared-changes"
+"""The plan of Jordan's smoothness cost."""
 
 
 class MissingError(Exception):
     """The folder lacks what a claim needs."""
 
 
-Judge: TypeAlias = "Callable[[Data], Finding]"
+Judge: TypeAlias = "Callable[..., Finding]"
 JUDGES: dict[str, Judge] = {}
-"""By the id of a claim, the function that judges it."""
+"""By the id of a claim, the function of :class:`Data` that judges it."""
 TESTS: dict[str, str] = {}
 """By the id of a claim, how it is tested, in words; margins in braces are put in."""
 
 
-def judges(
-    claim: str, test: str
-) -> Callable[[Callable[[Data], Finding]], Callable[[Data], Finding]]:
-    """A decorator: the function judges a claim of ``claims.toml``, by a test in words."""
+def judges(claim: str, test: str, **arguments: Any) -> Callable[[Judge], Judge]:
+    """A decorator: the function judges a claim of ``claims.toml``, by a test in words.
+
+    ``arguments`` are given to it; a function may judge several claims, each with its own.
+    """
 
     def register(judge: Judge) -> Judge:
-        JUDGES[claim], TESTS[claim] = judge, test
+        JUDGES[claim], TESTS[claim] = partial(judge, **arguments), test
         return judge
 
     return register
 
 
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """A value of each run, or one number, with the words by which evidence names them."""
+
+    task: str
+    who: str
+    """Whose they are: ``EC2 RRLR``, ``replay of EC1``, ``initial``, ``random guesses``."""
+    numbers: Array
+    """Shape ``(runs,)``; ``()`` of one number, which is exact."""
+    quantity: str = ""
+    """What is measured, in words; empty for rewards."""
+    printed: str = ""
+    """The reward that the paper prints, in words; empty where it prints none."""
+
+    @property
+    def name(self) -> str:
+        """Where they are from."""
+        return f"{self.task}, {self.who}"
+
+    @property
+    def in_ticks(self) -> bool:
+        """Whether it is counted in ticks."""
+        return not self.quantity or "ticks by which" in self.quantity
+
+    def __str__(self) -> str:
+        """One number, or the mean with its BCa interval."""
+        if not self.numbers.ndim:
+            return number(float(self.numbers))
+        return estimate(mean(self.numbers), 1 if self.in_ticks else 3)
+
+
+@dataclass(frozen=True)
+class RunCount:
+    """How many runs of a cell do something."""
+
+    number: int
+    total: int
+    words: str
+    """Beginning of the evidence."""
+
+    @property
+    def share(self) -> float:
+        """Share of the runs."""
+        return self.number / self.total
+
+
+@dataclass(frozen=True)
+class LearnedHands:
+    """Hand sequence that each run of a cell learned."""
+
+    task: str
+    condition: str
+    sequences: tuple[str, ...]
+
+    @property
+    def tally(self) -> Counter[str]:
+        """Runs by hand sequence."""
+        return Counter(self.sequences)
+
+    @property
+    def commonest(self) -> str:
+        """The sequence that most runs learned."""
+        return self.tally.most_common(1)[0][0]
+
+    def count(self, what: str, does: Sequence[bool] | NDArray[np.bool_]) -> RunCount:
+        """How many runs do something, which the evidence calls ``what``."""
+        words = f"{self.task} {self.condition} {what}"
+        count, total = int(np.sum(does)), len(does)
+        return RunCount(count, total, f"{words}: {count} of {total} runs ({tally(self.tally)})")
+
+    def are(self, *sequences: str, name: str) -> RunCount:
+        """How many runs learned one of some sequences, which the evidence calls ``name``."""
+        return self.count(name, [hands in sequences for hands in self.sequences])
+
+    def are_not(self, *sequences: str, name: str) -> RunCount:
+        """How many runs learned none of them."""
+        return self.count(f"not {name}", [hands not in sequences for hands in self.sequences])
+
+
 @dataclass
 class Data:
-    """A results folder as one claim reads it."""
+    """A results folder as one claim reads it. Methods raise MissingError for what it lacks.
+
+    A method of the folder is named by its label.
+    """
 
     study: Study
+    only: str = ""
+    """The one task on which means are compared, of claims that compare some on it."""
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
     failed: list[CellKey] = field(default_factory=list)
     """Cells that were asked for so far and not read, as some of their runs failed."""
 
-    def label(self, task: str, who: str) -> str:
-        """Label of a method: ``EC4`` is the learner's, ``EC`` its that explores most on a task."""
-        if who == "EC":
-            return most_exploring(self.task(task))
-        return who if is_method(who) else LEARNER + who
-
-    def runs(self, task: str, who: str, hands: str = "") -> pd.DataFrame:
-        """Solved runs of a method, of ``hands`` only those that learned that sequence.
-
-        Raises MissingError where they cannot be judged.
-        """
-        method = self.label(task, who)
-        cell = self.study.cells.get((task, method))
-        if cell is None or not len(cell.runs):
-            raise MissingError(f"this folder has no runs of {method} on {task}")
-        if len(cell.good) < len(cell.runs):
-            self.failed.append((task, method))
-            failed = len(cell.runs) - len(cell.good)
-            raise MissingError(
-                f"{failed} of {len(cell.runs)} runs of {method} on {task} failed, so "
-                "the mean of the others would mislead"
-            )
-        runs = cell.good[cell.good.hands == hands] if hands else cell.good
-        if method.startswith((LEARNER, PLACEBO)):
-            trials = sorted(set(cell.runs.trials))
-            if trials != [TRIALS]:
-                raise MissingError(
-                    f"the paper's runs have {TRIALS} trials; those of {method} on {task} have "
-                    f"{', '.join(map(str, trials))}"
-                )
-            if len(runs) < FEWEST:
-                learned = f" learned {hands}" if hands else ""
-                raise MissingError(f"fewer than {FEWEST} runs of {method} on {task}{learned}")
-        self.run_ids.extend(runs.run_id)
-        return runs
-
-    def values(self, task: str, side: Side) -> Array:
-        """One side of a comparison: a value of each run, or one number, shape ``()``.
-
-        Raises MissingError where it cannot be judged.
-        """
-        what, who, hands = side
-        if what == "number":
-            return np.array(float(side.who))
-        if who == "best":
-            return np.array(self.best_sequences(task)[1])
-        if who == "initial":
-            return np.array(self.initial(task).reward, dtype=np.float64)
-        runs = self.runs(task, who, hands)
-        if what == "reward":
-            rewards = runs.reward.to_numpy(dtype=np.float64)
-            # A method that draws nothing has one reward, which is exact.
-            method = self.study.cells[task, self.label(task, who)].method
-            stochastic = self.study.plan.methods[method].stochastic
-            return rewards if stochastic else np.array(rewards.mean())
-        if what == "replay":
-            # Not the learned reward, which as the best of all trials is never below trial 0's.
-            values = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        elif what in ("early", "late"):
-            # Trial 0 has no other movements by construction.
-            movements = (runs.trials - 1) * len(self.task(task).goals) / TENTHS
-            values = (runs[f"{what}_corrections"] / movements).to_numpy(dtype=np.float64)
-        elif what == "last":
-            values = (runs.solution_corrections / len(self.task(task).goals)).to_numpy(np.float64)
-        elif what == "resemblance":
-            values = self.resemblance(task, who)
-        else:
-            values = self.sign(task, self.label(task, who), what.replace("-", " "))
-        if not len(values) or not np.isfinite(values).all():
-            raise MissingError(f"{who} on {task} has no {what}")
-        return values
-
-    def sign(self, task: str, label: str, name: str) -> Array:
-        """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
-        if name.startswith("replayed "):
-            replays = self.study.replays(task, label)
-            return SIGNS[name.removeprefix("replayed ")].of(replays)
-        if self.task(task).family is not None:
-            return signs(self.study)[task, label].get(name, np.empty(0))
-        return SIGNS[name].of(self.study.trajectories(task, label))
-
-    def resemblance(self, task: str, who: str) -> Array:
-        """Share of the initial solution's distance to the plan that each run has covered."""
-        (plan,) = self.cell(task, PLAN).runs
-        planned = plan.execution.configurations
-
-        def apart(execution: Execution) -> float:
-            """Mean distance of postures at the goals, length unit and rad mixed."""
-            return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
-
-        before = apart(self.initial(task))
-        return np.array([1 - apart(run.execution) / before for run in self.cell(task, who).runs])
-
-    def hands(self, task: str, condition: str) -> Counter[str]:
-        """Runs of the paper's learner by learned hand sequence."""
-        return Counter(map(str, self.runs(task, condition).hands))
-
-    def cell(self, task: str, who: str) -> Trajectories:
-        """Executed solutions; raises MissingError where there are none."""
-        self.runs(task, who)
-        return self.study.trajectories(task, self.label(task, who))
+    def among(self, *tasks: str) -> Sequence[str]:
+        """Tasks on which means are compared: these, or the ``only`` one if it is one of them."""
+        return (self.only,) if self.only in tasks else tasks
 
     def task(self, name: str) -> Task:
         """A task of the folder."""
@@ -167,11 +162,141 @@ class Data:
             raise MissingError(f"this folder has no task {name}")
         return self.study.tasks[name]
 
-    def initial(self, name: str) -> Execution:
+    def runs(self, task: str, label: str, hands: str = "") -> pd.DataFrame:
+        """Solved runs of a method, of ``hands`` only those that learned that sequence."""
+        cell = self.study.cells.get((task, label))
+        if cell is None or not len(cell.runs):
+            raise MissingError(f"this folder has no runs of {label} on {task}")
+        if len(cell.good) < len(cell.runs):
+            self.failed.append((task, label))
+            failed = len(cell.runs) - len(cell.good)
+            raise MissingError(
+                f"{failed} of {len(cell.runs)} runs of {label} on {task} failed, so "
+                "the mean of the others would mislead"
+            )
+        runs = cell.good[cell.good.hands == hands] if hands else cell.good
+        if label.startswith((LEARNER, PLACEBO)):
+            trials = sorted(set(cell.runs.trials))
+            if trials != [TRIALS]:
+                raise MissingError(
+                    f"the paper's runs have {TRIALS} trials; those of {label} on {task} have "
+                    f"{', '.join(map(str, trials))}"
+                )
+            if len(runs) < FEWEST:
+                learned = f" learned {hands}" if hands else ""
+                raise MissingError(f"fewer than {FEWEST} runs of {label} on {task}{learned}")
+        self.run_ids.extend(runs.run_id)
+        return runs
+
+    def cell(self, task: str, label: str) -> Trajectories:
+        """Executed solutions of a method."""
+        self.runs(task, label)
+        return self.study.trajectories(task, label)
+
+    def hands(self, task: str, label: str) -> LearnedHands:
+        """Hand sequences that runs of the learner learned."""
+        learned = tuple(map(str, self.runs(task, label).hands))
+        return LearnedHands(task, who_is(label), learned)
+
+    def reward(self, task: str, label: str, hands: str = "") -> Measurement:
+        """Rewards of the best trials; of a method that draws nothing its one reward."""
+        rewards = self.runs(task, label, hands).reward.to_numpy(dtype=np.float64)
+        method = self.study.cells[task, label].method
+        if not self.study.plan.methods[method].stochastic:
+            rewards = np.array(rewards.mean())
+        return self._of(task, label, rewards, "reward", hands=hands)
+
+    def replay(self, task: str, label: str, hands: str = "") -> Measurement:
+        """Rewards of noiseless replays after learning.
+
+        The learned reward is that of the best trial, which is never below trial 0's.
+        """
+        runs = self.runs(task, label, hands)
+        rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        return self._of(task, label, rewards, "replay", hands=hands)
+
+    def initial(self, task: str) -> Measurement:
+        """Reward of a task's initial solution."""
+        reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
+        printed = published_initial(task)
+        return Measurement(task, "initial", reward, printed=printed.in_words if printed else "")
+
+    def best(self, task: str) -> Measurement:
+        """Highest reward of the corrective process alone over all hand sequences."""
+        printed = published_exhaustive(task)
+        reward = np.array(self.best_sequences(task)[1])
+        return Measurement(task, "best", reward, printed=printed.in_words if printed else "")
+
+    def corrections(self, task: str, label: str, tenth: Literal["early", "late"]) -> Measurement:
+        """Share of movements that are corrected, in the first or the last tenth of the trials.
+
+        Trial 0 does not count: it has no other movements by construction.
+        """
+        runs = self.runs(task, label)
+        movements = (runs.trials - 1) * len(self.task(task).goals) / TENTHS
+        shares = (runs[f"{tenth}_corrections"] / movements).to_numpy(dtype=np.float64)
+        when = "first" if tenth == "early" else "last"
+        words = f"share of movements that are corrected, in the {when} tenth of the trials"
+        return self._of(task, label, shares, tenth, words)
+
+    def last_corrections(self, task: str, label: str) -> Measurement:
+        """Share of movements that are corrected in the learned solution."""
+        corrections = self.runs(task, label).solution_corrections
+        shares = (corrections / len(self.task(task).goals)).to_numpy(np.float64)
+        words = "share of movements that are corrected, in the learned solution"
+        return self._of(task, label, shares, "last", words)
+
+    def sign(self, name: str, task: str, label: str) -> Measurement:
+        """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
+        self.runs(task, label)
+        if self.task(task).family is not None:
+            values = signs(self.study)[task, label].get(name, np.empty(0))
+        else:
+            values = SIGNS[name].of(self.study.trajectories(task, label))
+        return self._of(task, label, values, name, SIGNS[name].words)
+
+    def replayed_sign(self, name: str, task: str, label: str) -> Measurement:
+        """A sign of coarticulation in noiseless replays after learning."""
+        self.runs(task, label)
+        values = SIGNS[name].of(self.study.replays(task, label))
+        words = SIGNS[name].in_short or SIGNS[name].words
+        return self._of(task, label, values, name, f"in noiseless replays, {words}")
+
+    def resemblance(self, task: str, label: str) -> Measurement:
+        """Share of the initial solution's distance to the plan that each run has covered."""
+        self.runs(task, label)
+        (plan,) = self.cell(task, LEAST_CHANGES).runs
+        planned = plan.execution.configurations
+
+        def apart(execution: Execution) -> float:
+            """Mean distance of postures at the goals, length unit and rad mixed."""
+            return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
+
+        before = apart(self.initial_execution(task))
+        runs = self.cell(task, label).runs
+        shares = np.array([1 - apart(run.execution) / before for run in runs])
+        return self._of(
+            task, label, shares, "resemblance",
+            "share of the distance of the initial solution to the plan for least squared changes "
+            "that learning has covered (postures at the goals)",
+        )  # fmt: skip
+
+    def _of(
+        self, task: str, label: str, values: Array, name: str, quantity: str = "", hands: str = ""
+    ) -> Measurement:
+        """What is measured of runs of a method."""
+        if values.ndim and (not len(values) or not np.isfinite(values).all()):
+            raise MissingError(f"{who_is(label)} on {task} has no {name}")
+        replay = "replay of" * (name == "replay")
+        who = " ".join(filter(None, (replay, who_is(label), hands)))
+        printed = "" if quantity else printed_reward(task, label, hands)
+        return Measurement(task, who, values, quantity, printed)
+
+    def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        execution = initial_solution(self.task(name), self.study.model)
+        execution = initial_solution(self.task(task), self.study.model)
         if execution is None:
-            raise MissingError(f"the corrective process alone does not complete {name}")
+            raise MissingError(f"the corrective process alone does not complete {task}")
         return execution
 
     def sequences(self, task: str) -> dict[str, float]:
@@ -193,3 +318,15 @@ class Data:
                 f"the corrective process alone completes {task} with no hand sequence"
             )
         return best, rewards[best[0]]
+
+
+def who_is(label: str) -> str:
+    """A method as evidence names it: the learner by its condition."""
+    return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
+
+
+def printed_reward(task: str, label: str, hands: str) -> str:
+    """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
+    cell = published_cell(task, label.removeprefix(LEARNER))
+    summary = cell and (cell.sequences.get(hands) if hands else cell.summary)
+    return summary.in_words if summary else ""

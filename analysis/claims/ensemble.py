@@ -7,13 +7,12 @@ correction. Members are no random sample, so these counts are no probabilities.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-
-DATA = Path(__file__).with_name("ensemble.csv")
 
 
 @cache
@@ -22,23 +21,23 @@ def held_by(claim: str) -> tuple[Any, ...]:
 
     ``task`` whose goals are the members'; how often ``supported``, ``refuted``, of ``members``.
     """
-    table = pd.read_csv(DATA)
+    table = pd.read_csv(Path(__file__).with_suffix(".csv"))
     return tuple(table[table.claim == claim].itertuples())
 
 
-def held_in_words(claim: str) -> str:
+def held_in_words(rows: Iterable[Any]) -> str:
     """``231 of 242 (two-armed-1, refuted in 3)``, or that there is no count.
 
     There is none where all members were admitted by the claim, and where it takes other runs than
     the paper's conditions.
     """
     parts = []
-    for held in held_by(claim):
+    for held in rows:
         refuted = f", refuted in {held.refuted}" if held.refuted else ""
         parts.append(f"{held.supported} of {held.members} ({held.task}{refuted})")
     return "; ".join(parts) or "not counted"
 
 
-def rarely_supported(claim: str) -> bool:
+def rarely_supported(rows: Iterable[Any]) -> bool:
     """Whether at most half of the admissible goals of some task support a claim."""
-    return any(2 * held.supported <= held.members for held in held_by(claim))
+    return any(2 * held.supported <= held.members for held in rows)

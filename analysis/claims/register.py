@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
-from coartic.analysis.methods import KNOWN_METHODS, name_of
-from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import Estimate
+from coartic.analysis.statistics.estimates import LEVEL, Estimate
 from coartic.analysis.words import read_beside
 from coartic.inputs import FileData
 
-_FILE = read_beside(__file__, "claims")
-HISTORY: dict[str, dict[str, Any]] = _FILE.pop("margins")
+_REGISTER = read_beside(__file__, "claims")
+HISTORY: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
 """Every margin with its value, the reason for it, and its history where it was changed."""
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
@@ -22,62 +20,6 @@ Verdict = Literal["supported", "not supported", "undecided", "depends on the goa
 Group = Literal["paper", "beside", "families", "ours", "flawed"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
 families of random tasks; claims of our own, those on one suite, and those that are flawed apart."""
-
-_HANDS = "[LR]+"
-QUANTITIES = {
-    "replay": "reward of a replay without noise after learning",
-    "early": "share of movements that are corrected, in the first tenth of the trials",
-    "late": "share of movements that are corrected, in the last tenth of the trials",
-    "last": "share of movements that are corrected, in the learned solution",
-    "resemblance": "share of the distance of the initial solution to the plan for least squared "
-    "changes that learning has covered (postures at the goals)",
-}
-for _name, _sign in SIGNS.items():
-    QUANTITIES[_name.replace(" ", "-")] = _sign.words
-    QUANTITIES[f"replayed-{_name.replace(' ', '-')}"] = (
-        f"in noiseless replays, {_sign.in_short or _sign.words}"
-    )
-"""What is measured of runs beside their reward, by its name in comparisons."""
-_WHAT = "|".join(QUANTITIES)
-_METHODS = "|".join(name for name in KNOWN_METHODS if "/" not in name)
-_WHO = rf"EC\S*|initial|best|\S+/.+?|{_METHODS}"
-_SIDE = rf"(?:(?P<what>{_WHAT}) )?(?P<who>{_WHO})(?: (?P<hands>{_HANDS}))?"
-
-
-class Side(NamedTuple):
-    """One side of a comparison."""
-
-    what: str
-    """A name of :data:`QUANTITIES`, or ``reward``; ``number`` for 0."""
-    who: str
-    """Condition, ``initial`` solution, ``best`` hand sequence of the corrective process alone, or
-    label of a method."""
-    hands: str = ""
-    """Only the runs that learned this sequence, where it is named."""
-
-    def __str__(self) -> str:
-        who = name_of(self.who) if is_method(self.who) else self.who
-        return " ".join(filter(None, ("replay of" * (self.what == "replay"), who, self.hands)))
-
-
-def is_method(who: str) -> bool:
-    """Whether one side of a comparison is a method by its id or label."""
-    return "/" in who or who in KNOWN_METHODS
-
-
-def read_side(text: str) -> Side:
-    """A side as it is written, such as ``replay EC2 RRRR``."""
-    match = re.fullmatch(_SIDE, text)
-    if match is None:
-        return Side("number", text)
-    return Side(match["what"] or "reward", match["who"], match["hands"] or "")
-
-
-def read_comparison(pair: str) -> tuple[Side, Side, float]:
-    """Both sides of a comparison such as ``arm EC4 > 0 by ticks``, and its margin."""
-    first, second = pair.split(" > ")
-    second, _, margin = second.partition(" by ")
-    return read_side(first), read_side(second), MARGINS[margin] if margin else 0.0
 
 
 @dataclass(frozen=True)
@@ -91,29 +33,52 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Estimate, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
-    failed: tuple[tuple[str, str], ...] = ()
-    """Cells that it lacks, as some of their runs failed: task, and label of the method."""
+
+    @property
+    def p(self) -> float:
+        """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
+        return max((t.p for t in self.tests if not math.isnan(t.p)), default=math.nan)
+
+    @property
+    def opposite_p(self) -> float:
+        """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
+
+        The other tail of a test by resampling counts the observed sample as well. Exact tests
+        come with their opposites (``against``).
+        """
+        if self.against is not None:
+            every = [test.p for test in self.against]
+        else:
+            every = [min(1.0, 1 - test.p + 1 / (test.resamples + 1)) for test in self.tests]
+        tested = [p for p in every if not math.isnan(p)]
+        return min(1.0, min(tested) * len(tested)) if tested else math.nan
+
+    def verdict(self, p: float, opposite_p: float) -> Verdict:
+        """The verdict of the tests alone, by p-values that may be corrected."""
+        untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
+        if self.holds is None or (self.holds and untested):
+            return "undecided"
+        if self.holds:
+            # NaN: counted exactly, or no spread in any sample.
+            return "undecided" if p >= LEVEL else "supported"
+        certain = not self.tests or any(
+            test.value <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in self.tests
+        )
+        return "not supported" if certain or opposite_p < LEVEL else "undecided"
 
 
 class Claim(FileData):
-    """One statement, of the paper where it has a place, and how it is decided."""
+    """One statement, of the paper where it has a place."""
 
     id: str
     section: str
     statement: str
-    rule: str
-    test: str = ""
     exact: bool = False
     fitted: bool = False
+    beside: bool = False
+    families: bool = False
     short: str = ""
     """In a few words, for the three claims that carry the paper's point."""
-    beside: bool = False
-    pairs: Mapping[str, Sequence[str]] = {}
-    shown: Mapping[str, Sequence[str]] = {}
-    runs: Mapping[str, Sequence[str]] = {}
-    cells: Mapping[str, Sequence[str]] = {}
-    families: Sequence[str] = ()
-    compared: Sequence[str] = ()
     uncounted: str = ""
     """Why its verdict does not count for or against the model; empty where it does."""
     suite: str = ""
@@ -121,6 +86,15 @@ class Claim(FileData):
     place: str = ""
     quote: str = ""
     figure: str = ""
+    rule: str = ""
+    """Name of its rule, of a claim that no function is registered for."""
+    test: str = ""
+    cells: Mapping[str, Sequence[str]] = {}
+
+    @property
+    def on_random_tasks(self) -> bool:
+        """Whether it is about families of random tasks rather than the paper's tasks."""
+        return self.families or bool(self.suite)
 
     @property
     def group(self) -> Group | None:
@@ -136,7 +110,7 @@ class Claim(FileData):
 
 CLAIMS: Mapping[str, Claim] = {
     name: Claim(id=name, section=section, **row)
-    for section, rows in _FILE.items()
+    for section, rows in _REGISTER.items()
     for name, row in rows.items()
 }
 """Every claim by its id, in the order of the register."""

@@ -18,20 +18,19 @@ from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
 
 from coartic import CoarticError, Trajectory
-from coartic.analysis.figures.robot import MARKERS, box, numbered_below
+from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.files import check_output, write_output
 
-FORMATS = (".gif", ".mp4")
+FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
 """Seconds that the longest movement takes."""
 HOLD_S = 2.0
 """Seconds that the last frame stands."""
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
-_HIT = "0.55"  # of a goal; not black, which is the right hand
+_WEIGHT = 1.5  # of lines
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
 
 
@@ -50,7 +49,7 @@ def timing(ticks: int) -> tuple[int, float]:
     return stride, max(2, round(100 * stride / speed)) / 100
 
 
-def animate(
+def write_film(
     panels: Sequence[Panel],
     path: Path,
     *,
@@ -63,7 +62,7 @@ def animate(
 
     ``width`` of the picture is in pixels. A movement that ends before the others stands still.
     Without ``replace`` no file is written over. Raises CoarticError for an ending that is not in
-    :data:`FORMATS`, for MP4 without ffmpeg, and where the file cannot be written.
+    :data:`FILMS`, for MP4 without ffmpeg, and where the file cannot be written.
     """
     check_film(path, replace=replace)
     if not any(movement.ticks for _, movement in panels):
@@ -72,7 +71,7 @@ def animate(
     stride, interval_s = timing(ticks)
     rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
     held = max(1, round(HOLD_S / interval_s))
-    figure, scenes = figure_of(panels, width)
+    figure, scenes = set_stage(panels, width)
     rate: Any = 1 / interval_s
     # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
     gif_rate: Any = 1000 / (1000 * interval_s + 0.5)
@@ -99,8 +98,8 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
     An ending that is not supported, MP4 without ffmpeg, what :func:`check_output` refuses.
     """
-    if path.suffix.lower() not in FORMATS:
-        raise CoarticError(f"--out {path}: the name must end in {', '.join(FORMATS)}")
+    if path.suffix.lower() not in FILMS:
+        raise CoarticError(f"--out {path}: the name must end in {', '.join(FILMS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_output(path, replace=replace)
@@ -114,19 +113,8 @@ class Scene:
         task = trajectory.task
         self._paths = {hand: trajectory.hand_path(hand) for hand in task.hands}
         self._traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
-        self._base = Polygon(
-            task.robot.base_outline(task.q0), facecolor="0.85", edgecolor="black", linewidth=1
-        )
-        self._goals = [
-            Circle(goal, task.radius, facecolor="none", edgecolor="black", zorder=2.5)
-            for goal in task.goals
-        ]
-        for patch in (self._base, *self._goals):
-            axes.add_artist(patch)
-        self._arms = {
-            hand: axes.plot([], [], color="black", linewidth=1.4, **MARKERS[hand])[0]
-            for hand in task.hands
-        }
+        self._goals = draw_goals(axes, task, weight=_WEIGHT)
+        self._move = draw_robot(axes, task, task.q0, weight=_WEIGHT)
         self._status = axes.text(
             0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
         )
@@ -136,15 +124,11 @@ class Scene:
         trajectory = self._trajectory
         last = len(trajectory.configurations) - 1
         row = min(row, last)
-        q = trajectory.configurations[row]
-        robot = trajectory.task.robot
-        self._base.set_xy(robot.base_outline(q))
-        for hand, arm in self._arms.items():
-            arm.set_data(*robot.joint_positions(q, hand).T)
-            self._traces[hand].set_data(*self._paths[hand][: row + 1].T)
+        self._move(trajectory.configurations[row])
+        for hand, trace in self._traces.items():
+            trace.set_data(*self._paths[hand][: row + 1].T)
         hit = trajectory.hits <= row
-        for circle, is_hit in zip(self._goals, hit, strict=True):
-            circle.set_facecolor(_HIT if is_hit else "none")
+        fill_goals(self._goals, hit)
         state = "done"
         if not hit.all():
             goal = int(np.argmin(hit))
@@ -153,7 +137,7 @@ class Scene:
         self._status.set_text(f"reward {f'−{spent}' if spent else 0}   {state}")
 
 
-def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]:
+def set_stage(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]:
     """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
     movements = [movement for _, movement in panels]
     corners = np.array([box(movement.task, movement.configurations) for movement in movements])
@@ -169,15 +153,7 @@ def figure_of(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        task = movement.task
-        for number, ((x, y), below) in enumerate(
-            zip(task.goals, numbered_below(task), strict=True), 1
-        ):
-            side = -1 if below else 1
-            axes.annotate(
-                str(number), (x, y + side * task.radius), (0, 3 * side), fontsize=9,
-                textcoords="offset points", ha="center", va="top" if below else "bottom",
-            )  # fmt: skip
+        number_goals(axes, movement.task, weight=_WEIGHT, fontsize=9)
         axes.set_title(title, fontsize=9, loc="left", pad=18, parse_math=False)
         axes.tick_params(labelsize=8)
         axes.spines[["top", "right"]].set_visible(False)

@@ -17,7 +17,7 @@ import pandas as pd
 from coartic import CoarticError
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.figures.plot import Plot, picture, svg_for_page
-from coartic.analysis.report import facts
+from coartic.analysis.report import facts, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
@@ -26,6 +26,7 @@ from coartic.analysis.report.render import TONES, csv_table, html_table, latex_t
 from coartic.analysis.report.text import answers, environment, sentence
 from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
 from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, publish
 
@@ -111,7 +112,7 @@ def shown(study: Study) -> list[Section]:
 def finding(section: Section, study: Study) -> str:
     """The sentence of a section; empty where the runs say nothing."""
     if section.finding is not None:
-        return section.finding(study)
+        return text.shown(section.finding(study))
     of = getattr(facts, section.id)(study) if hasattr(facts, section.id) else None
     return "" if of is None else sentence(section.id, of)
 
@@ -195,8 +196,8 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them: by verdict, and first those that count."""
     order = get_args(Verdict)
     rows = TABLES["claims"](study).reset_index(names="id")
-    of = facts.claims(study)
-    if of and not of["decided"]:  # most of them lack their runs
+    entries = claims_shown(study)
+    if entries and mostly_undecided(entries):  # they lack their runs
         rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]
     return [
         {

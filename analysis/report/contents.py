@@ -16,7 +16,7 @@ from coartic.analysis.topics import horizon, objectives, stops, tasks
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.families import sentences as families
-from coartic.analysis.topics.human import sentences as human
+from coartic.analysis.topics.human import findings as human
 from coartic.analysis.topics.paper import sentences as paper
 
 for _module in walk_packages(topics.__path__, f"{topics.__name__}."):
@@ -27,7 +27,7 @@ __all__ = ["FIGURES", "SECTIONS", "TABLES"]
 SECTIONS: tuple[Section, ...] = (
     coarticulation.COARTICULATION,
     human.HUMAN,
-    paper.PAPER,
+    paper.PUBLISHED,
     paper.CLAIMS,
     comparison.NEAREST,
     comparison.PRICE,

@@ -12,12 +12,7 @@ from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
-import numpy as np
-from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL, UNTOLD, group_of
-
-from coartic.analysis.claims.judge import Judged, counts, judged
 from coartic.analysis.methods import (
-    CONDITIONS,
     KNOWN_METHODS,
     LEARNER,
     is_learner,
@@ -27,26 +22,24 @@ from coartic.analysis.methods import (
     most_exploring,
     name_of,
 )
-from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.context import smallest_p
-from coartic.analysis.signatures.register import placebo_of, selects, shared_goal
-from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.study import CellKey, Study, cached, one_by_one
 from coartic.analysis.table import TABLES
 from coartic.analysis.topics.comparison.runtimes import halfway
 from coartic.analysis.topics.comparison.runtimes import price as price_by_method
-from coartic.analysis.topics.comparison.scores import initial_and_optimum, leaders
+from coartic.analysis.topics.comparison.scores import (
+    BY_FORMULA,
+    BY_TRIAL,
+    UNTOLD,
+    group_of,
+    initial_and_optimum,
+    leaders,
+)
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.topics.human import judge
-from coartic.analysis.topics.paper.published import RUNS, TRIALS
-from coartic.analysis.topics.paper.rewards import beside_paper
+from coartic.analysis.topics.paper.published import RUNS
 from coartic.analysis.topics.paper.tables import best_condition
+from coartic.learner.learning import TRIALS
 
 Facts = dict[str, Any]
-PENALTIES = {"joints": "costly joints", "region": "a costly disc", "distinct": "postures alike"}
-"""Terms of a penalty in words."""
-FURTHER = {"2": "the second", "3": "the third", "4": "the fourth", "5+": "the others together"}
-"""Goals ahead beyond the first in words."""
 
 
 def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
@@ -66,11 +59,6 @@ def failed_behind(study: Study, cells: Iterable[CellKey]) -> Facts | None:
     return {"failed": failed.total(), "runs": sum(runs[label] for label in who), "who": names}
 
 
-def failed_of(study: Study, label: str) -> Facts | None:
-    """:func:`failed_behind` an answer about one method."""
-    return failed_behind(study, (cell for cell in study.cells if cell[1] == label))
-
-
 def failed_compared(study: Study, *groups: str) -> Facts | None:
     """:func:`failed_behind` an answer that compares methods on tasks with a known optimum."""
     tasks = initial_and_optimum(study)
@@ -83,62 +71,6 @@ def failed_compared(study: Study, *groups: str) -> Facts | None:
             if not groups or group_of(study, label) in groups
         ),
     )
-
-
-@cached
-def coarticulation(study: Study) -> Facts | None:
-    """How the posture at the first goal that two tasks share depends on the next goal."""
-    shared = shared_goal(study)
-    if shared is None:
-        return None
-    # A method whose runs differ by chance takes a test.
-    tested = study.plan.methods[study.cells[shared.tasks[0].name, shared.method].method].stochastic
-    differ = shared.p < LEVEL if tested else shared.apart > 0
-    chosen = selects(study, shared.method)
-    placebo = placebo_of(study, shared) if chosen else None
-    beyond = math.nan if placebo is None else shared.p_beyond(placebo)
-    replays = [study.replays(task.name, shared.method) for task in shared.tasks]
-    replayed = TwoContexts(replays[0], replays[1], shared.goal, shared.hand)
-    return {
-        "goal": shared.goal,
-        "method": name_of(shared.method),
-        "runs": sum(map(len, shared.postures)),
-        "apart": shared.apart,
-        "hands_apart": shared.hands_apart,
-        "spreads": shared.spreads,
-        "p": shared.p,
-        "tested": tested,
-        "differ": differ,
-        "seen": differ and (not chosen or beyond < LEVEL),
-        "too_few": tested and not smallest_p(*map(len, shared.runs)) < LEVEL,
-        "no_placebo": chosen and placebo is None,
-        "placebo": math.nan if placebo is None else placebo.apart,
-        "beyond": beyond,
-        "replayed": replayed.apart if all(replayed.runs) else math.nan,
-        "row": f"{shared.tasks[0].name} {shared.method} goal {shared.goal} {shared.hand}",
-        "failed": failed_behind(study, [(task.name, shared.method) for task in shared.tasks]),
-    }
-
-
-@cached
-def slopes(study: Study) -> Facts | None:
-    """The joint that follows a moved goal most, at a goal before it: of the learner if it ran.
-
-    ``seen``: whether the whole posture surely follows; places where it does come first.
-    """
-    rows = TABLES["slopes"](study)
-    rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
-    # A method that selects its solution from trials has to exceed the placebo as well.
-    chosen = [selects(study, str(label)) for label in rows.method]
-    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
-    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
-    for label in (*CONDITIONS, *main_methods(rows.method)):
-        of_method = rows[rows.method == label].sort_values(["seen", "size"])
-        for row in of_method.tail(1).to_dict("records"):
-            words = {"method": name_of(label), "joint": str(row["joint"]).replace("_", " ")}
-            failed = {"failed": failed_of(study, label)}
-            return {str(key): value for key, value in row.items()} | words | failed
-    return None
 
 
 @cached
@@ -161,62 +93,6 @@ def gain(study: Study) -> Facts | None:
         best["first"] = float(changes[:, 0].mean()) if len(changes) else math.nan
         best["failed"] = failed_behind(study, [(best["task"], best["label"])])
     return best
-
-
-@cached
-def paper(study: Study) -> Facts | None:
-    """What became of the paper's rewards and claims; None without its tasks and families."""
-    entries = [entry for entry in judged(study) if entry.claim.place]
-    if not entries or not (beside_paper(study) or any(entry.run_ids for entry in entries)):
-        return None
-    rows = [row for row in beside_paper(study) if not row["hands"]]
-    rewards = Counter(row["verdict"] for row in rows)
-    return {
-        # Undecided, though 0 is not in the interval.
-        "off": [
-            {
-                **{f"by{key}": row[f"difference{key}"] for key in ("", "_low", "_high")},
-                "condition": row["cell"].label.removeprefix(LEARNER),
-                "task": study.tasks[row["cell"].task].label,
-            }
-            for row in rows
-            if row["verdict"] == "undecided"
-            and (row["difference_low"] > 0 or row["difference_high"] < 0)
-        ],
-        "rewards": {name: rewards[name] for name in ("equivalent", "undecided", "different")},
-        **verdicts_of(entries),
-        "failed": failed_behind(study, (cell for e in entries for cell in e.finding.failed)),
-    }
-
-
-@cached
-def claims(study: Study) -> Facts | None:
-    """The verdicts on the paper's claims, or on ours where the folder is one of our studies."""
-    entries = judged(study)
-    return verdicts_of(entries) if entries and entries[0].claim.suite else paper(study)
-
-
-def verdicts_of(entries: list[Judged]) -> Facts:
-    """How many claims have each verdict, and whether most are decided.
-
-    ``central``: by verdict, the claims that carry the paper's point; ``others``: counts of the
-    others that count.
-    """
-    counted = [entry for entry in entries if not entry.claim.uncounted]
-    central: dict[str, list[str]] = {}
-    for entry in counted:
-        if entry.claim.short:
-            central.setdefault(entry.verdict, []).append(entry.claim.short)
-    by_verdict = counts(entries)
-    return {
-        "claims": by_verdict,
-        "central": central,
-        "others": counts(entry for entry in counted if not entry.claim.short),
-        "judged": len(counted),
-        "uncounted": len(entries) - len(counted),
-        # With few runs or trials most claims cannot be judged.
-        "decided": 2 * by_verdict["undecided"] < len(counted),
-    }
 
 
 @cached
@@ -314,22 +190,6 @@ def price(study: Study) -> Facts | None:
 
 
 @cached
-def hands(study: Study) -> Facts:
-    """Tasks on which the learner's best condition ends with other hands than it began with."""
-    changes, tasks = [], 0
-    for name, task in study.tasks.items():
-        label = best_condition(study, name)
-        good = study.cells[name, label].good if label else None
-        if good is not None and good.initial_hands.notna().any():
-            tasks += 1
-            before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
-            if before not in most_frequent:
-                change = f"{before} to {' or '.join(most_frequent)}"
-                changes.append({"task": task.label, "change": change})
-    return {"changes": changes, "tasks": tasks}
-
-
-@cached
 def learning(study: Study) -> list[Facts]:
     """Trials after which half of the gain of the learner that explores most is there, by task."""
     half = TABLES["learning"](study).half_gain
@@ -339,15 +199,6 @@ def learning(study: Study) -> list[Facts]:
         for task, row in rows
         if row in half.index and half[row] < math.inf
     ]
-
-
-@cached
-def signatures(study: Study) -> Facts | None:
-    """In how many methods the next goal changes more of what leaves the hand in place."""
-    rows = TABLES["contexts"](study)
-    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
-    larger = int((rows.equivalent > rows.other).sum())
-    return {"larger": larger, "methods": len(rows)} if len(rows) else {}
 
 
 @cached
@@ -377,76 +228,6 @@ def exploration(study: Study) -> list[Facts]:
     return [
         {str(k): v for k, v in row.items()} for row in rows.assign(**percent).to_dict("records")
     ]
-
-
-@cached
-def horizon(study: Study) -> Facts | None:
-    """Gaps of the planner by goals ahead over random tasks, and what goals gain on tasks that have
-    them."""
-    rows = TABLES["horizon"](study)
-    rows = rows[rows.group == "all"]
-    if not len(rows):
-        return None
-    columns = [f"{name}{end}" for name in ("gap", "gain") for end in ("", "_low", "_high")]
-    each = rows.assign(**100 * rows[columns]).to_dict("records")
-    return {
-        "tasks": each[0]["tasks"],
-        "by_h": {row["h"]: row for row in each},
-        "further": [
-            row | {"words": words}
-            for row in each
-            if (words := FURTHER.get(row["h"])) and not math.isnan(row["gain"])
-        ],
-    }
-
-
-@cached
-def stops(study: Study) -> list[Facts] | None:
-    """What postures are worth to the next goal when passing and with a full stop, by times.
-
-    Of minimum-jerk plans on random tasks with one arm.
-    """
-    rows = TABLES["stops"](study)
-    jerk = rows[(rows.group == "random, one arm") & rows.method.str.endswith("/jerk")]
-    both = []
-    for timing, words in (("free", "free"), ("fixed", "equal")):
-        at = jerk[jerk.timing == timing].set_index("stop")
-        if {0.0, 1.0} <= set(at.index):
-            both.append({"times": words, "passing": at.loc[0.0], "stopping": at.loc[1.0]})
-    return both or None
-
-
-@cached
-def objectives(study: Study) -> Facts | None:
-    """Regrets at the largest weight, by penalty, and where trial and error overtakes."""
-    rows = TABLES["objectives"](study)
-    if not len(rows):
-        return None
-    last = rows[rows.weight == rows.weight.max()]
-    by_term = {term: part.set_index("who") for term, part in last.groupby("term", sort=False)}
-    crossings = TABLES["crossings"](study)
-    return {
-        "tasks": int(rows.tasks.max()),
-        "weight": rows.weight.max(),
-        "penalties": [
-            {"term": PENALTIES[str(term)], "regret": part.regret.to_dict()}
-            for term, part in by_term.items()
-        ],
-        "crossings": [
-            {**row, "term": PENALTIES[row["term"]]}
-            for row in crossings[crossings.who == "learner"].to_dict("records")
-        ],
-    }
-
-
-@cached
-def human(study: Study) -> Facts | None:
-    """How often the learner agrees with findings about people, and where it could differ."""
-    rows = judge.judged(study).drop_duplicates(["finding", "model"])
-    if not len(rows):
-        return None
-    learner = rows[rows.model == "learner"].verdict.value_counts().to_dict()
-    return {"learner": learner, "findings": len(judge.FINDINGS), **judge.separating(study)}
 
 
 @cached

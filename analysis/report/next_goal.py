@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 
 from coartic import CoarticError, Task, load_task
-from coartic.analysis.figures.robot import box
 from coartic.analysis.methods import EC1, INITIAL, name_of
 from coartic.analysis.report.text import environment
 from coartic.analysis.study import Study
 from coartic.analysis.words import number
+from coartic.drawing import box
 from coartic.robot import Array
 
 TASK = "ascending"

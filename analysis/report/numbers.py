@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from coartic.analysis.claims.judge import counts
 from coartic.analysis.methods import is_variant, main_methods, name_of
 from coartic.analysis.report import facts
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import COLUMNS
+from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.paper.sentences import papers_claims, rewards_by_verdict
 
 MOST = 100
 _DIGITS = ("Zero", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
@@ -60,17 +63,17 @@ def with_interval(
 
 def numbers(study: Study) -> Iterator[Number]:
     """The headline first: verdicts, prices, gaps; then rewards."""
-    if paper := facts.paper(study):
-        for verdict, count in paper["claims"].items():
-            comment = f"claims that are {verdict}: table claims"
-            yield f"Claims{letters(verdict)}", str(count), comment
-        for verdict, count in paper["rewards"].items():
+    if entries := papers_claims(study):
+        for verdict_of_claim, count in counts(entries).items():
+            comment = f"claims that are {verdict_of_claim}: table claims"
+            yield f"Claims{letters(verdict_of_claim)}", str(count), comment
+        for verdict, count in rewards_by_verdict(study).items():
             comment = f"learned rewards of the paper's cells, {verdict}: table published"
             yield f"Rewards{letters(verdict)}", str(count), comment
-    if shared := facts.coarticulation(study):
-        comment = f"postures at the shared goal: table contexts, row '{shared['row']}'"
-        yield "PosturesApart", plain(shared["apart"], 2), comment
-        yield "PosturesApartSD", plain(shared["spreads"], 1), comment
+    if shared := shared_goal(study):
+        comment = f"postures at the shared goal: table contexts, row '{shared.row}'"
+        yield "PosturesApart", plain(shared.apart, 2), comment
+        yield "PosturesApartSD", plain(shared.spreads, 1), comment
     if price := facts.price(study):
         for of, label in (("Learner", price["learner"]), (price["rival"], price["rival_label"])):
             for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import Robot, Task, Trajectory, trajectory
-from coartic.analysis.figures.robot import numbered_below
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
 from coartic.analysis.report.facts import gain
-from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study, one_by_one, typical_run
+from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.trajectories import initial_solution
+from coartic.drawing import numbered_below
 from coartic.robot import HANDS
 
 TOLERANCE = 0.005

@@ -11,6 +11,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from coartic.analysis import words
 from coartic.analysis.report import facts
 from coartic.analysis.study import Study
+from coartic.analysis.topics.coarticulation import sentences as coarticulation
+from coartic.analysis.topics.paper import sentences as paper
 from coartic.text import one_line
 
 QUESTIONS = {
@@ -22,6 +24,12 @@ QUESTIONS = {
 """The four questions with their words on the terminal, by the facts that answer them."""
 INSTEAD = {"slopes": "slopes", "gain": "learning"}
 """Facts that answer the first question where no two tasks share a goal, with their sections."""
+ANSWERS = {
+    "coarticulation": coarticulation.answer,
+    "slopes": coarticulation.answer_by_slopes,
+    "paper": paper.answer,
+}
+"""Answers by the names in :data:`QUESTIONS`; the others are still macros with facts."""
 
 
 @cache
@@ -68,8 +76,12 @@ def answers(study: Study) -> list[dict[str, str]]:
     for name, (question, word) in QUESTIONS.items():
         sections = {name: name} | (INSTEAD if name == "coarticulation" else {})
         for of, section in sections.items():
-            if (values := getattr(facts, of)(study)) is not None:
-                text = sentence(f"{of}_short", values)
+            if of in ANSWERS:
+                text = shown(ANSWERS[of](study))
+            else:
+                values = getattr(facts, of)(study)
+                text = "" if values is None else sentence(f"{of}_short", values)
+            if text:
                 answered.append({"id": section, "question": question, "word": word, "text": text})
                 break
     return answered

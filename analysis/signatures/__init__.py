@@ -1,5 +1,4 @@
 """Signatures of coarticulation: how a method's solutions move, beyond their reward.
 
-One concept a file; each signature is a pure function of arrays or of tick-by-tick trajectories.
-:mod:`~.register` lists them and applies them to a study.
+:mod:`~.register` has them all; the other files have what they are computed from.
 """

@@ -1,4 +1,4 @@
-"""Signatures between tasks: the same goal in two contexts, or next to a goal that moves."""
+"""What signatures between tasks are of: one goal in two contexts, or beside a goal that moves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, product
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,28 +16,64 @@ from coartic import Hand, Task, Trajectory
 from coartic.analysis.signatures.context import (
     beyond_p,
     context_dependence,
-    distance,
-    lead_time,
+    distance_of_means,
     permutation_p,
 )
-from coartic.analysis.signatures.locus import LEAST, ContextFamily, locus_slopes, slope_norm
-from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence, subspaces
-from coartic.analysis.signatures.rows import (
-    FAMILIES,
-    REGISTER,
-    Row,
-    Rows,
-    estimated,
-    row,
-    where,
-    without,
-)
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.trajectories import Trajectories, last_ticks, postures
-from coartic.robot import HANDS, Array
+from coartic.analysis.signatures.locus import MovedGoal
+from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence
+from coartic.analysis.statistics.estimates import SEED, Estimate
+from coartic.analysis.trajectories import Trajectories, postures
+from coartic.robot import Array
 from coartic.runs.plan import label_of
 
-NO_SPREAD = "one run a context: no spread within contexts, no test"
+
+class Place(NamedTuple):
+    """Where in a solution, and between which tasks, a value belongs; None or empty: nowhere."""
+
+    goal: int | None = None
+    """Number of the goal, from 1."""
+    hand: str = ""
+    against: str = ""
+    """Task that is the other context."""
+    moving: int | None = None
+    """Number of the goal that moves between tasks."""
+    joint: str = ""
+    longest: int | None = None
+    """Ticks that a lead can have at most."""
+
+    def __str__(self) -> str:
+        """In words: ``goal 1, right hand, against descending, of at most 141``."""
+        parts = [] if self.goal is None else [f"goal {self.goal}"]
+        if self.moving is not None:
+            anticipatory = self.goal is None or self.goal < self.moving
+            kind = "anticipatory" if anticipatory else "carry-over"
+            parts.append(f"{kind} of goal {self.moving}")
+        parts += [f"{self.hand} hand"] if self.hand else []
+        parts += [f"against {self.against}"] if self.against else []
+        parts += [self.joint] if self.joint else []
+        parts += [] if self.longest is None else [f"of at most {self.longest}"]
+        return ", ".join(parts)
+
+
+NOWHERE = Place()
+
+
+class Value(NamedTuple):
+    """A value of a signature, or why there is none."""
+
+    place: Place = NOWHERE
+    estimate: Estimate = Estimate(math.nan)
+    n: int = 0
+    """Runs that went into it."""
+    why_not: str = ""
+    """Why there is no value, interval or test."""
+    unit: str | None = None
+    """Where it is not that of the signature."""
+
+
+def rng_of(signature: str, place: Place) -> np.random.Generator:
+    """A generator for each value of a signature, the same in every folder."""
+    return np.random.default_rng([SEED, zlib.crc32(f"{signature} {place}".encode())])
 
 
 @dataclass(frozen=True)
@@ -60,9 +97,14 @@ class TwoContexts:
         return label_of(self.first.method, self.first.variant)
 
     @property
-    def place(self) -> Row:
-        """Where every value belongs: the goal, the hand and the other task."""
-        return {"goal": self.goal, "hand": self.hand, "against": self.second.task.name}
+    def place(self) -> Place:
+        """The goal, the hand and the other task."""
+        return Place(self.goal, self.hand, self.second.task.name)
+
+    @property
+    def row(self) -> str:
+        """Name of the contexts' row in table *contexts*."""
+        return f"{self.first.task.name} {self.method} goal {self.goal} {self.hand}"
 
     @cached_property
     def runs(self) -> tuple[tuple[Trajectory, ...], tuple[Trajectory, ...]]:
@@ -82,9 +124,14 @@ class TwoContexts:
         return sum(map(len, self.runs))
 
     @property
+    def single(self) -> bool:
+        """Whether a context has one run, so that there is no test."""
+        return min(map(len, self.runs)) < 2
+
+    @property
     def apart(self) -> float:
         """Distance of the mean postures, length unit and rad."""
-        return distance(*self.postures)
+        return distance_of_means(*self.postures)
 
     @property
     def spreads(self) -> float:
@@ -103,7 +150,7 @@ class TwoContexts:
         """Joints that can move the hand, and its Jacobian in these, at the mean posture."""
         return jacobian_of(self.first.task, self.hand, np.concatenate(self.postures))
 
-    @property
+    @cached_property
     def parts(self) -> tuple[float, float]:
         """Parts of the difference of mean postures: leaving the hand in place, and moving it."""
         joints, jacobian = self.jacobian
@@ -115,12 +162,6 @@ class TwoContexts:
         """P-value of the permutation test over runs; NaN where a context has one run."""
         return self.p_within("context dependence")
 
-    def p_beyond(self, placebo: TwoContexts) -> float:
-        """P-value of the test that these runs lie further apart than a placebo's; NaN where a
-        context has one run."""
-        rng = rng_of(f"beyond {placebo.method}", self.place)
-        return beyond_p(self.postures, placebo.postures, rng)
-
     def p_within(self, signature: str, basis: Array | None = None) -> float:
         """P-value of that test within the span of an orthonormal ``basis`` (dof, d).
 
@@ -128,61 +169,39 @@ class TwoContexts:
         """
         return float(permutation_p(*self.postures, rng_of(signature, self.place), basis=basis))
 
+    def p_beyond(self, placebo: TwoContexts) -> float:
+        """P-value of the test that these runs lie further apart than a placebo's; NaN where a
+        context has one run."""
+        rng = rng_of(f"beyond {placebo.method}", self.place)
+        return beyond_p(self.postures, placebo.postures, rng)
 
-def between_contexts(contexts: TwoContexts) -> Rows:
-    """Rows of all signatures of two contexts, in the order of the register."""
-    place, n, few = contexts.place, contexts.n, min(map(len, contexts.runs)) < 2
-    yield row("context distance", place, value=contexts.apart, n=n)
-    spreads = contexts.spreads
-    why = "runs do not differ within contexts" if math.isnan(spreads) else ""
-    why = NO_SPREAD if few else why
-    yield row("context dependence", place, value=spreads, p=contexts.p, n=n, why_not=why)
-    joints, jacobian = contexts.jacobian
-    names = "motor-equivalent part", "non-motor-equivalent part"
-    why = "one run a context: no test" if few else ""
-    for name, value, basis in zip(names, contexts.parts, subspaces(jacobian), strict=True):
-        of_all_joints = np.zeros((contexts.first.task.robot.dof, basis.shape[1]))
-        of_all_joints[joints] = basis
-        p = contexts.p_within(name, of_all_joints)
-        yield row(name, place, value=value, p=p, n=n, why_not=why)
-    count = min(int(run.hits[contexts.goal - 1]) for group in contexts.runs for run in group) + 1
-    if few or count == 1:
-        why = NO_SPREAD if few else "a run hits it at the start"
-        yield row("lead time", place, n=n, why_not=why)
-        return
-    first, second = (last_ticks(group, contexts.goal, count) for group in contexts.runs)
-    ticks = lead_time(first, second, rng_of("lead time", place))
-    place["longest"] = count - 1
-    why = "not distinguishable at the hit" if ticks is None else ""
-    yield row("lead time", place, value=math.nan if ticks is None else ticks, n=n, why_not=why)
+    def value(self, value: float, p: float = math.nan, why_not: str = "") -> Value:
+        """A value of these contexts with its test."""
+        return Value(self.place, Estimate(value, p=p), self.n, why_not)
 
 
-def slopes(family: ContextFamily, cells: Mapping[str, Trajectories]) -> Rows:
-    """Slopes at the goals before (anticipatory) and after (carry-over) the moving one.
+@dataclass(frozen=True)
+class BesideMovedGoal:
+    """Postures of one method's runs at a goal beside one that differs between tasks."""
 
-    ``cells``: what one method did on tasks of the family, in their order.
-    """
-    task = next(iter(cells.values())).task
-    moving, position = family
-    beside = {moving - 1, moving + 1} & set(range(1, len(task.goals) + 1))
-    for goal, hand in product(sorted(beside), HANDS):
+    task: Task
+    """Any of the tasks."""
+    place: Place
+    """The goal, the hand and the goal that moves."""
+    configurations: Array
+    """Postures, a row a run, ``(n, dof)``, length unit and rad."""
+    positions: tuple[float, ...]
+    """Position of the moving goal in each run's task, length unit."""
+
+    @classmethod
+    def of(
+        cls, moved: MovedGoal, cells: Mapping[str, Trajectories], goal: int, hand: Hand
+    ) -> BesideMovedGoal | None:
+        """What one method did at a goal with a hand, by task; None where no run hits it so."""
         runs = {name: cell.with_hand(hand, goal) for name, cell in cells.items()}
-        places = [position[name] for name, of_task in runs.items() for _ in of_task]
-        n, place = len(places), {"goal": goal, "hand": hand, "moving": moving}
-        if not n:
-            continue
-        if len(set(places)) < LEAST:
-            why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-            yield from without(FAMILIES, why, place, n)
-            continue
-        q = postures(tuple(chain.from_iterable(runs.values())), goal)
-        for joint, slope in zip(task.robot.joint_names, locus_slopes(q, places), strict=True):
-            unit = "1" if joint.startswith("base") else REGISTER["locus slope"].unit
-            yield estimated("locus slope", {**place, "joint": joint}, slope, n, unit=unit)
-        norm = slope_norm(q, places, rng_of("locus slope norm", place))
-        yield estimated("locus slope norm", place, norm, n)
-
-
-def rng_of(signature: str, place: Row) -> np.random.Generator:
-    """A generator for each row of a signature, the same in every folder."""
-    return np.random.default_rng([SEED, zlib.crc32(f"{signature} {where(place)}".encode())])
+        positions = tuple(moved.positions[name] for name, of_task in runs.items() for _ in of_task)
+        if not positions:
+            return None
+        configurations = postures(tuple(chain.from_iterable(runs.values())), goal)
+        task = next(iter(cells.values())).task
+        return cls(task, Place(goal, hand, moving=moved.goal), configurations, positions)

@@ -14,13 +14,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, takewhile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coartic import Task
 from coartic.analysis.optima import KEPT
-from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred
+from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred, slices
 from coartic.robot import Array
 
-AT_ONCE = 500  # divisions or resamples in memory
+IN_MEMORY = 500
+"""Divisions or resamples of whole runs at once: thousands of runs would fill the memory."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -34,7 +36,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     return [pair for pair in pairs if pair[2]]
 
 
-def distance(first: Array, second: Array) -> float:
+def distance_of_means(first: Array, second: Array) -> float:
     """Distance between the mean configurations of two contexts, ≥ 0.
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Mixed units (see the module).
@@ -43,7 +45,7 @@ def distance(first: Array, second: Array) -> float:
 
 
 def context_dependence(first: Array, second: Array) -> float:
-    """:func:`distance` in pooled within-context standard deviations, 0 to ∞.
+    """:func:`distance_of_means` in pooled within-context standard deviations, 0 to ∞.
 
     The deviation is the root of the total variance (its trace) about each context's own
     mean, with n₁ + n₂ - 2 degrees of freedom: a multivariate form of Cohen's d (Cohen
@@ -55,7 +57,7 @@ def context_dependence(first: Array, second: Array) -> float:
         return math.nan
     squares = sum((centred(group) ** 2).sum() for group in (first, second))
     spread = float(np.sqrt(squares / freedom))
-    return distance(first, second) / spread if spread else math.nan
+    return distance_of_means(first, second) / spread if spread else math.nan
 
 
 def dependence_below(
@@ -63,6 +65,8 @@ def dependence_below(
     second: Array,
     bound: float,
     rng: np.random.Generator,
+    *,
+    resamples: int = RESAMPLES,
 ) -> float:
     """Probability of so little context dependence if it were ``bound`` (pooled SDs) or more.
 
@@ -73,17 +77,16 @@ def dependence_below(
     """
     if min(len(first), len(second)) < 2:
         return math.nan
-    means, squares = [], np.zeros(RESAMPLES)
+    means, squares = [], np.zeros(resamples)
     for group in (first, second):
-        means.append(np.empty((RESAMPLES, group.shape[1])))
-        for start in range(0, RESAMPLES, AT_ONCE):  # thousands of runs would fill the memory
-            rows = slice(start, min(start + AT_ONCE, RESAMPLES))
-            drawn = group[rng.integers(len(group), size=(rows.stop - start, len(group)))]
+        means.append(np.empty((resamples, group.shape[1])))
+        for rows in slices(resamples, IN_MEMORY):
+            drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
             means[-1][rows] = drawn.mean(axis=1)
             squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
     pooled = np.sqrt(squares / (len(first) + len(second) - 2))
     reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
-    return float(1 + reached.sum()) / (RESAMPLES + 1)
+    return float(1 + reached.sum()) / (resamples + 1)
 
 
 def permutation_p(
@@ -96,14 +99,12 @@ def permutation_p(
 ) -> Array:
     """Probability of so large a distance between means if the context did nothing.
 
-    One-sided permutation test over runs, exact where all divisions of the runs are no more
-    than ``resamples``. The statistic is :func:`distance`, which orders permutations as
-    :func:`context_dependence` does; with an orthonormal ``basis`` (dof, d) it is the distance
-    within its span. 0 < p ≤ 1; 1 where no run differs from another. NaN where a context has
-    one run only.
+    One-sided permutation test over runs of :func:`distance_of_means`, with an orthonormal
+    ``basis`` (dof, d) within its span; exact where all divisions of the runs are no more than
+    ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN where a context has one run.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with
-    a p each, shape ``(k,)``: the same divisions at every tick.
+    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with a p
+    each, ``(k,)``: the same divisions at every tick.
     """
     if min(len(first), len(second)) < 2:
         return np.full(first.shape[1:-1], math.nan)
@@ -130,25 +131,25 @@ def divisions(
 
     Blocks of shape ``(m, first + second)``: weights that give the first group's mean less the
     second's. All where they are no more than ``resamples``, else as many drawn at random.
-    Together they would fill the memory with thousands of runs.
     """
     runs = first + second
     exact = math.comb(runs, first) <= resamples
-    every = np.array(list(combinations(range(runs), first))) if exact else None
+    every = np.array(list(combinations(range(runs), first)), np.intp) if exact else None
 
     def blocks() -> Iterator[Array]:
-        count = resamples if every is None else len(every)
-        for start in range(0, count, AT_ONCE):
-            size = min(AT_ONCE, count - start)
-            if every is None:
-                chosen = rng.random((size, runs)).argpartition(first - 1, axis=1)[:, :first]
-            else:
-                chosen = every[start : start + size]
+        for rows in slices(resamples if every is None else len(every), IN_MEMORY):
+            size = rows.stop - rows.start
+            chosen = drawn_rows(runs, first, size, rng) if every is None else every[rows]
             weights = np.full((size, runs), -1 / second)
             np.put_along_axis(weights, chosen, 1 / first, axis=1)
             yield weights
 
     return blocks(), exact
+
+
+def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Numbers of the runs in a group, drawn without replacement ``size`` times, (size, chosen)."""
+    return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
 def p_values(null: Array, observed: Array, *, exact: bool) -> Array:
@@ -179,8 +180,8 @@ def beyond_p(
 
     ``method`` and ``placebo`` each have configurations ``(runs, dof)`` for every context. How far
     contexts lie apart is the length of the sum of their mean configurations, each times its number
-    in ``contrast``: their :func:`distance` for two, the slope for several positions. Permutation
-    test: within each context the runs of both are divided anew at random, and the statistic is the
+    in ``contrast``: their distance for two, the slope for several positions. Permutation test:
+    within each context the runs of both are divided anew at random, and the statistic is the
     method's length less the placebo's. Twice the upper tail, as wherever two methods are compared.
     0 < p ≤ 1. NaN where a method has one run in a context.
     """
@@ -194,42 +195,33 @@ def beyond_p(
         return np.asarray(np.linalg.norm(total, axis=-1))
 
     null = np.empty(resamples)
-    for start in range(0, resamples, AT_ONCE):
-        count = min(AT_ONCE, resamples - start)
+    for rows in slices(resamples, IN_MEMORY):
         of_method, of_placebo = [], []
         for pool, runs in zip(pools, method, strict=True):
             ours = len(runs)
-            rows = rng.random((count, len(pool))).argpartition(ours - 1, axis=1)[:, :ours]
-            chosen = pool[rows].sum(axis=1)
-            of_method.append(chosen / ours)
-            of_placebo.append((pool.sum(axis=0) - chosen) / (len(pool) - ours))
-        null[start : start + count] = length(of_method) - length(of_placebo)
+            chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
+            total = pool[chosen].sum(axis=1)
+            of_method.append(total / ours)
+            of_placebo.append((pool.sum(axis=0) - total) / (len(pool) - ours))
+        null[rows] = length(of_method) - length(of_placebo)
     observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, placebo))
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))
 
 
 def lead_time(
-    first: Array,
-    second: Array,
-    rng: np.random.Generator,
-    *,
-    alpha: float = LEVEL,
+    first: Array, second: Array, rng: np.random.Generator, *, alpha: float = LEVEL
 ) -> int | None:
     """How long before a hit two contexts become distinguishable, and stay so, in ticks.
 
-    ``first`` and ``second`` have shape ``(runs, k, dof)``: the last k control ticks of
-    each run up to the hit, which is entry -1. Going back from the hit, contexts count as
-    distinguishable at a tick while the test of :func:`permutation_p` gives at most
-    ``alpha`` there. The first tick that fails ends the count: tests in a fixed order (Maurer,
-    Hothorn & Lehmacher 1995), so that the error rate of the whole is ``alpha`` without
-    correction. 0 means at the hit only; None, not even there, or a context with one run. At most
-    k - 1, the whole movement.
+    ``first`` and ``second``, ``(runs, k, dof)``: the last k control ticks of each run up to the
+    hit, which is entry -1. Going back from the hit, ticks are told apart while the test of
+    :func:`permutation_p` gives at most ``alpha``; the first that fails ends the count, which keeps
+    the error rate of the whole at ``alpha`` (Maurer, Hothorn & Lehmacher 1995). 0: at the hit only;
+    None: not even there, or a context with one run. At most k - 1, the whole movement.
 
-    After Engel, Flanders & Soechting (1997), who looked for the moment at which hand
-    postures before the same piano key diverge by the notes to come. Caveat: from a common
-    start, straight movements diverge in proportion from their first tick on, so that here
-    a lead shorter than the movement speaks of noise or of different speeds, not of a late
-    decision.
+    After Engel, Flanders & Soechting (1997), on hand postures before the same piano key. Caveat:
+    from a common start, straight movements diverge from their first tick on, so that a lead shorter
+    than the movement speaks of noise or of different speeds, not of a late decision.
     """
     failed = ~(permutation_p(first, second, rng, resamples=999)[::-1] <= alpha)
     lead = int(failed.argmax()) if failed.any() else len(failed)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -27,18 +28,23 @@ from coartic.analysis.statistics.estimates import RESAMPLES, Estimate, centred, 
 from coartic.robot import Array
 
 LEAST = 3
-"""Positions of the moving goal that make a family."""
+"""Positions of a goal that make it a moved one."""
 
 
-ContextFamily = tuple[int, dict[str, float]]
-"""Tasks that differ in one goal: its number, from 1, and its position in each task, by name.
-Positions are along the line that it moves on, length unit, from the family's mean. The line is the
-first principal axis, pointing right (or up): the coordinate itself where only one changes."""
+class MovedGoal(NamedTuple):
+    """Tasks that differ in one goal alone."""
+
+    goal: int
+    """Its number, from 1."""
+    positions: dict[str, float]
+    """Its position in each task, by name, along the line that it moves on, length unit, from the
+    tasks' mean. The line is the first principal axis, pointing right (or up): the coordinate itself
+    where only one changes."""
 
 
-def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
+def moved_goals(tasks: Mapping[str, Task]) -> list[MovedGoal]:
     """The largest sets of at least three tasks that are the same but for one goal."""
-    moving = []
+    moved = []
     groups: dict[tuple[int, str], list[str]] = {}
     for name, task in tasks.items():
         shared = task.model_dump_json(include={*KEPT})
@@ -48,39 +54,39 @@ def families(tasks: Mapping[str, Task]) -> list[ContextFamily]:
     for (index, _), names in groups.items():
         goals = np.array([tasks[name].goals[index] for name in names])
         if len(np.unique(goals, axis=0)) >= LEAST:
-            moving.append((index + 1, dict(zip(names, _along(goals).tolist(), strict=True))))
-    return moving
+            positions = dict(zip(names, _along(goals).tolist(), strict=True))
+            moved.append(MovedGoal(index + 1, positions))
+    return moved
 
 
-def variants(groups: Sequence[ContextFamily]) -> list[set[str]]:
-    """Tasks that families join, directly or through tasks that they share."""
-    joined = DisjointSet(name for _, positions in groups for name in positions)
-    for _, positions in groups:
-        for name in positions:
-            joined.merge(next(iter(positions)), name)
+def joined_tasks(moved: Sequence[MovedGoal]) -> list[set[str]]:
+    """Tasks that moved goals join, directly or through tasks that they share."""
+    joined = DisjointSet(name for each in moved for name in each.positions)
+    for each in moved:
+        for name in each.positions:
+            joined.merge(next(iter(each.positions)), name)
     sets: list[set[str]] = joined.subsets()
     return sets
 
 
 def _along(points: Array) -> Array:
-    centred = points - points.mean(axis=0)
-    axis = np.linalg.svd(centred, full_matrices=False)[2][0]
+    """Positions of points (n, 2) along their first principal axis, from their mean, (n,)."""
+    offsets = points - points.mean(axis=0)
+    axis = np.linalg.svd(offsets, full_matrices=False)[2][0]
     main = axis[np.argmax(np.abs(axis))]
     # Rounded, so that tasks that are the same have one position.
-    positions: Array = np.round(centred @ (axis if main > 0 else -axis), 9)
+    positions: Array = np.round(offsets @ (axis if main > 0 else -axis), 9)
     return positions
 
 
 def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> list[Estimate]:
     """One slope per joint, by least squares over the mean posture at each position.
 
-    Length unit (base) or rad (joint) per length unit, -∞ to ∞; 0 no dependence, of which ``p``
-    is the two-sided test. ``configurations`` has shape ``(n, dof)``: postures at goal g, one row
-    a run; ``positions`` ``(n,)`` those of the neighbouring goal in each run's task. Estimate and
-    test have positions - 2 degrees of freedom (``scipy.stats.linregress``), whether methods are
-    run once or often, and take what departs from the line as independent and of equal variance
-    between positions: curvature widens the interval. Joints that do not change have slope 0 and
-    p 1.
+    Length unit (base) or rad (joint) per length unit, with the two-sided test of 0.
+    ``configurations`` ``(n, dof)``: postures at a goal, a row a run; ``positions`` ``(n,)``: those
+    of the neighbouring goal. Estimate and test have positions - 2 degrees of freedom, whether
+    methods are run once or often, and take departures from the line as independent and of equal
+    variance: curvature widens the interval. Joints that do not change have slope 0 and p 1.
     """
     x, means = _by_position(configurations, positions)
     slopes = []
@@ -94,24 +100,28 @@ def locus_slopes(configurations: Array, positions: Sequence[float] | Array) -> l
     return slopes
 
 
-def slope_norm(
-    configurations: Array, positions: Sequence[float] | Array, rng: np.random.Generator
+def slope_length(
+    configurations: Array,
+    positions: Sequence[float] | Array,
+    rng: np.random.Generator,
+    *,
+    resamples: int = RESAMPLES,
 ) -> Estimate:
     """Length of the vector of all joints' slopes (:func:`locus_slopes`), without interval.
 
     Length unit and rad mixed, per length unit; ≥ 0 and so biased upwards. Permutation test: the
-    mean postures are put in every order along the line (up to seven positions, else 9999 orders
-    drawn), so that with k positions p is at least 2/k!. It takes the means as exchangeable where
-    nothing depends on the position.
+    mean postures are put in every order along the line (up to seven positions, else ``resamples``
+    orders drawn), so that with k positions p is at least 2/k!. It takes the means as exchangeable
+    where nothing depends on the position.
     """
     x, means = _by_position(configurations, positions)
     means, x = centred(means), centred(x)
     weights = x / (x**2).sum()
-    exact = math.factorial(len(x)) <= RESAMPLES
+    exact = math.factorial(len(x)) <= resamples
     if exact:
         ways = np.array(list(permutations(range(len(x)))))
     else:
-        ways = rng.permuted(np.tile(np.arange(len(x)), (RESAMPLES, 1)), axis=1)
+        ways = rng.permuted(np.tile(np.arange(len(x)), (resamples, 1)), axis=1)
     observed = np.asarray(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
     return Estimate(float(observed), p=float(p_values(null, observed, exact=exact)))

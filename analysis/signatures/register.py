@@ -1,178 +1,377 @@
-"""All signatures of coarticulation of a study, of every method and task.
+"""The register of signatures: functions that say how a movement depends on the other goals.
 
-To add one: a row of ``register.toml``, which says what it is; a function that computes it, in the
-file of its concept; and in :mod:`~.within` (one method's runs on one task) or :mod:`~.between`
-(tasks) a line that yields it, at the same place.
+To add one, write its function here, decorated with its kind, name, unit and words: tables and
+documentation then have it. By its kind it is of
+
+- ``runs`` of one method on one task, and returns a value for each run, ``(n,)``, or for each run
+  and goal, ``(n, G)``; NaN where a run has none, booleans for shares of runs;
+- ``contexts``: one goal before two different successors, and returns a :class:`~.between.Value`;
+- ``moved goals``: a goal beside one that differs between tasks, and returns a list of values.
+
+Rows of the tables have the order of this file. In formulas, run i hits goal g at configuration
+q(i, g) after t(i, g) ticks since the goal before; q(i, 0) is the start; c(i, g) are the ticks of
+the corrective process alone with the hands of run i; means are over runs.
 """
 
 from __future__ import annotations
 
 import math
-from itertools import chain, product
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
 
 import numpy as np
-import pandas as pd
 
-from coartic.analysis.methods import CONDITIONS, PLACEBO, main_methods
-from coartic.analysis.signatures.between import TwoContexts, between_contexts, slopes
-from coartic.analysis.signatures.context import beyond_p, context_pairs
-from coartic.analysis.signatures.locus import LEAST, families, variants
-from coartic.analysis.signatures.rows import (
-    COLUMNS,
-    CONTEXTS,
-    FAMILIES,
-    PLACE,
-    REGISTER,
-    WITHIN,
-    Rows,
-    without,
+from coartic.analysis.signatures import subtasks
+from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts, Value, rng_of
+from coartic.analysis.signatures.context import lead_time
+from coartic.analysis.signatures.locus import locus_slopes, slope_length
+from coartic.analysis.signatures.manifold import subspaces
+from coartic.analysis.trajectories import Trajectories, last_ticks
+from coartic.robot import Array
+
+Scope = Literal["runs", "contexts", "moved goals"]
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How a signature is measured, and in which words."""
+
+    name: str
+    kind: Scope
+    measure: Callable[[Any], Any]
+    unit: str
+    extent: str = ""
+    """Unit and range, for people."""
+    meaning: str = ""
+    """Meaning of a value, as Markdown. A sign without one is not in tables of signatures."""
+    sources: tuple[str, ...] = ()
+    """Keys of references.bib."""
+    two_hands: bool = False
+    """Whether it applies to tasks with two hands alone."""
+    missing: str = ""
+    """Why no run may have a value."""
+    sign: str = ""
+    """Name in claims, if it is also a sign: one number for each run."""
+    words: str = ""
+    """The sign in words."""
+    in_short: str = ""
+    """The same for tables."""
+    of_run: Callable[[Array], Array] = np.asarray
+    """The signs (n,) from the values of the runs, (n,) or (n, G)."""
+
+    def of(self, runs: Trajectories) -> Array:
+        """The sign of each run that has one, shape ``(n,)``."""
+        if not runs.runs or (self.two_hands and len(runs.task.hands) < 2):
+            return np.empty(0)
+        values = np.asarray(self.measure(runs), dtype=np.float64)
+        signs = self.of_run(values) if values.size else np.empty(0)
+        return signs[np.isfinite(signs)]
+
+
+REGISTER: dict[str, Signature] = {}
+"""All signatures by name."""
+
+
+def of_kind(kind: Scope) -> list[Signature]:
+    """The signatures of a kind that tables have, in their order."""
+    return [each for each in REGISTER.values() if each.kind == kind and each.meaning]
+
+
+def signature(name: str, kind: Scope = "runs", **about: Any) -> Callable[[Function], Function]:
+    """A decorator: the function measures the signature, ``about`` are fields of it."""
+
+    def enter(measure: Function) -> Function:
+        REGISTER[name] = Signature(name, kind, measure, **about)
+        return measure
+
+    return enter
+
+
+def mean_over_goals(values: Array) -> Array:
+    """Mean of the values (n, G - 1) of each run that has some, ``(n,)``."""
+    some = values[~np.isnan(values).all(axis=1)]
+    # The last goal counts as a missing value: the order of summation decides the last bit.
+    return np.asarray(np.nanmean(np.pad(some, ((0, 0), (0, 1)), constant_values=np.nan), axis=1))
+
+
+# One method's runs on one task
+
+
+@signature(
+    "first subtask against the same hands",
+    unit="ticks",
+    extent="ticks",
+    meaning="Ticks for the first goal, minus those of the corrective process alone with the hands "
+    "of the run, so that the choice of hands does not count. If it is positive while the total is "
+    "negative, the first subtask is sacrificed for the whole (Shah, Barto & Fagg 2013).",
+    sign="first",
+    words="ticks by which the first movement is longer than the corrective process's with the same "
+    "hands",
+    in_short="ticks by which the first movement is slower",
+    of_run=lambda values: values[:, 0],
 )
-from coartic.analysis.signatures.within import measured_within
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
-from coartic.analysis.trajectories import Trajectories, postures
-from coartic.robot import HANDS, Array, Hand
-
-__all__ = ["CONTEXTS", "FAMILIES", "REGISTER", "WITHIN", "signatures"]
-NO_CONTEXT = "the method did no other task that shares the start and the first goals"
-IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
-NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
+def first_subtask(runs: Trajectories) -> Array:
+    """t(i, 1) - c(i, 1), shape ``(n, 1)``, of the runs with whose hands the corrective process
+    ends."""
+    return np.asarray(runs.against_same_hands[:, :1])
 
 
-@cached
-def signatures(study: Study) -> pd.DataFrame:
-    """Every signature of every method and task of a study, a value a row.
+@signature(
+    "total against the same hands",
+    unit="ticks",
+    extent="ticks",
+    meaning="The same difference for the whole task.",
+    sign="whole",
+    words="ticks by which the whole is shorter than the corrective process's",
+    in_short="ticks by which the whole task is faster",
+    of_run=np.negative,
+)
+def total(runs: Trajectories) -> Array:
+    """Σ_g t(i, g) - c(i, g), of the runs with whose hands the corrective process ends.
 
-    Columns ``task``, ``method``, ``variant``, those of :data:`~.rows.COLUMNS` (``where``: the place
-    in words) and of :data:`~.rows.PLACE`, and ``label``. Signatures over runs are means with
-    Student's interval, shares of runs have Wilson's.
+    As a sign, Σ_g c(i, g) - t(i, g).
     """
-    frame = pd.DataFrame(
-        rows_of_cells(study), columns=["task", "method", "variant", *COLUMNS, *PLACE, "label"]
-    )
-    return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))
+    return np.asarray(runs.against_same_hands.sum(axis=1))
 
 
-def rows_of_cells(study: Study) -> Rows:
-    """Every signature of every method and task of a study.
+def share_of_false(values: Array) -> Array:
+    """Share of the goals before the last at which no value is true, ``(n,)``."""
+    return 1.0 - values[:, :-1].mean(axis=1) if values.shape[1] > 1 else np.empty(0)
 
-    Differences between contexts stand with the first task of the pair and name the other; tasks
-    that locus families join are no pairs, their slopes say how each depends on the others.
+
+@signature(
+    "hand as in isolation",
+    unit="1",
+    extent="share of runs, by goal",
+    two_hands=True,
+    meaning="Runs that hit the goal with the hand that the corrective process would bring there in "
+    "fewest ticks from the same posture. 0: the hand is chosen for the sake of other goals.",
+    sign="hand",
+    words="share of the goals that others follow which are hit with the slower hand for them alone",
+    in_short="share of goals hit with the slower hand for them",
+    of_run=share_of_false,
+)
+def hand_as_in_isolation(runs: Trajectories) -> Array:
+    """a(i, g) = [r(h) = min over hands of r], for the ticks r of a reach to g from q(i, g - 1).
+
+    As a sign, the mean of 1 - a(i, g) over g < G.
     """
-    alone = one_by_one(study)
-    trajectories = {key: study.trajectories(*key) for key in study.cells if key[0] in alone}
-    groups, pairs = families(study.tasks), pairs_of_contexts(study)
-    for (task, label), cell in trajectories.items():
-        of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
-        moving = [group for group in groups if task in group[1]]
-        rows = [measured_within(cell)]
-        partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
-        for first, second, shared in partners:
-            if first == task:
-                rows.append(of_pair(cell, of_method[second], shared))
-        if not partners:
-            rows.append(without(CONTEXTS, IN_FAMILY if moving else NO_CONTEXT))
-        for group in moving:
-            cells = {name: of_method[name] for name in group[1] if name in of_method}
-            if task == next(iter(cells)):
-                rows.append(slopes(group, cells))
-        if not moving:
-            rows.append(without(FAMILIES, NO_FAMILY))
-        identity = {"task": task, "method": cell.method, "variant": cell.variant, "label": label}
-        yield from ({**row, **identity} for row in chain(*rows))
+    return np.array([subtasks.ticks_slower(run) == 0 for run in runs.runs])
 
 
-def of_pair(first: Trajectories, second: Trajectories, shared: int) -> Rows:
-    """Rows for every shared goal and every hand that hit it in both contexts."""
-    for goal in range(1, shared + 1):
-        by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
-        in_both = [contexts for contexts in by_hand if all(contexts.runs)]
-        for contexts in in_both:
-            yield from between_contexts(contexts)
-        if not in_both:
-            place = {"goal": goal, "against": second.task.name}
-            yield from without(CONTEXTS, "no hand hit the goal in both contexts", place)
+@signature(
+    "preshaping of the other arm",
+    unit="1",
+    extent="−∞ to ∞, by goal",
+    two_hands=True,
+    missing="the other hand hits no later goal",
+    meaning="How much nearer the waiting hand is to its own next goal because the arm has moved "
+    "since its own last hit, over its distance in the initial solution. It is 0 if the arm keeps "
+    "still while it waits, whatever the base does; negative: it is farther away.",
+    sign="other arm",
+    words="share of the initial distance to its next goal by which the waiting arm brings its hand "
+    "nearer (mean over goals)",
+    in_short="share of its way that the waiting hand makes",
+    of_run=mean_over_goals,
+)
+def preshaping_of_the_other_arm(runs: Trajectories) -> Array:
+    """(d_held(i, g) - d(i, g)) / d_initial(g), g < G, as :func:`~.subtasks.preshaping` says.
 
-
-def pairs_of_contexts(study: Study) -> list[tuple[str, str, int]]:
-    """Pairs of tasks that differ only after their first goals, and how many they share.
-
-    Tasks that differ in one moved goal only are left out: slopes say how postures follow it.
+    As a sign, the mean over the goals that have it. Empty without an initial solution.
     """
-    moved = variants(families(study.tasks))
-    pairs = context_pairs(study.tasks)
-    return [pair for pair in pairs if not any({*pair[:2]} <= names for names in moved)]
+    if runs.initial is None:
+        return np.empty(0)
+    return np.array([subtasks.preshaping(run, runs.initial)[:-1] for run in runs.runs])
 
 
-def selects(study: Study, label: str) -> bool:
-    """Whether a method's solution may be one of many trials, selected by its reward.
+@signature(
+    "travel of the other arm",
+    unit="rad",
+    extent="rad, ≥ 0, by goal",
+    two_hands=True,
+    meaning="Distance in joint space between the postures of the waiting arm at the previous hit "
+    "(or the start) and at this one.",
+)
+def travel_of_the_other_arm(runs: Trajectories) -> Array:
+    """‖q_w(i, g) - q_w(i, g - 1)‖, w the joints of the arm that does not hit g.
 
-    Then it shows signs that selection alone shows, and has to exceed the placebo's.
+    Column ``other_arm_travel`` is its sum.
     """
-    method = label.partition(" ")[0]
-    return method != PLACEBO and group_of(study, label) == BY_TRIAL
+    return np.array([subtasks.waiting_travel(run) for run in runs.runs])
 
 
-def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The placebo in the same two contexts; None without one that made as many trials."""
-    keys = [(task.name, PLACEBO) for task in contexts.tasks]
-    if not all(key in study.cells and len(study.cells[key].good) for key in keys):
-        return None
-    for name, label in keys:
-        method = study.cells[name, contexts.method].runs.trials.max()
-        if study.cells[name, label].runs.trials.max() < method:
-            return None
-    first, second = (study.trajectories(*key) for key in keys)
-    placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
-    return placebo if all(placebo.runs) else None
+@signature(
+    "turning angle",
+    unit="rad",
+    extent="rad, 0 to π, by goal",
+    missing="a subtask without displacement",
+    meaning="Angle in joint space between the displacement to the goal and the displacement on to "
+    "the next one. 0: straight on; π: back.",
+)
+def turning_angle(runs: Trajectories) -> Array:
+    """∠(q(i, g) - q(i, g - 1), q(i, g + 1) - q(i, g)), g < G."""
+    start = np.array(runs.task.q0)
+    paths = [np.vstack([start, run.execution.configurations]) for run in runs.runs]
+    return np.array(list(map(subtasks.turning_angles, paths)))
 
 
-def slope_beyond_p(
-    study: Study, label: str, task: str, goal: int, moving: int, hand: Hand
-) -> float:
-    """P of the test that postures at a goal follow a moving one more than the placebo's do.
+@signature(
+    "cost at this goal",
+    unit="ticks",
+    sign="cost",
+    words="ticks that the way to this goal takes longer",
+    of_run=lambda values: np.asarray(values.mean(axis=1)),
+)
+def cost_at_this_goal(runs: Trajectories) -> Array:
+    """t(i, g) - r(i, g), g < G, as :func:`~.subtasks.served` says; as a sign, the mean over g."""
+    return np.array([subtasks.served(run)[:, 0] for run in runs.runs])
 
-    ``task``: one of those that differ in goal ``moving``. NaN for a method that selects nothing,
-    and without runs of the placebo at all places.
+
+@signature(
+    "gain at the next goal",
+    unit="ticks",
+    sign="arm",
+    words="ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
+    "waiting arm where it was (mean over goals)",
+    in_short="ticks by which the next goal is nearer",
+    of_run=lambda values: np.asarray(values.mean(axis=1)),
+)
+def gain_at_the_next_goal(runs: Trajectories) -> Array:
+    """r'(i, g + 1) - r(i, g + 1), g < G, as :func:`~.subtasks.served` says; as a sign, the mean
+    over g."""
+    return np.array([subtasks.served(run)[:, 1] for run in runs.runs])
+
+
+# One goal before two different successors
+
+NO_SPREAD = "one run a context: no spread within contexts, no test"
+
+
+@signature(
+    "context distance",
+    "contexts",
+    unit="length unit, rad",
+    extent="length unit and rad mixed, ≥ 0",
+    meaning="Distance between the mean postures at the same goal before two different successors.",
+)
+def context_distance(contexts: TwoContexts) -> Value:
+    """‖mean q₁ - mean q₂‖, of the runs of either context at the goal."""
+    return contexts.value(contexts.apart)
+
+
+@signature(
+    "context dependence",
+    "contexts",
+    unit="pooled SD",
+    extent="pooled within-context SD, ≥ 0",
+    meaning="The same distance in standard deviations of the runs within a context, with a "
+    "permutation test over runs. Without any effect its expected square is about 1/n₁ + 1/n₂, "
+    "not 0.",
+)
+def dependence_on_context(contexts: TwoContexts) -> Value:
+    """‖mean q₁ - mean q₂‖ / s with s² = (Σ‖q₁ - mean q₁‖² + Σ‖q₂ - mean q₂‖²) / (n₁ + n₂ - 2)."""
+    why = "runs do not differ within contexts" if math.isnan(contexts.spreads) else ""
+    return contexts.value(contexts.spreads, contexts.p, NO_SPREAD if contexts.single else why)
+
+
+def part_of_the_difference(contexts: TwoContexts, name: str, number: int) -> Value:
+    """One of both parts of the difference of mean postures, with a test within its subspace."""
+    joints, jacobian = contexts.jacobian
+    basis = subspaces(jacobian)[number]
+    of_all_joints = np.zeros((contexts.first.task.robot.dof, basis.shape[1]))
+    of_all_joints[joints] = basis
+    why = "one run a context: no test" if contexts.single else ""
+    return contexts.value(contexts.parts[number], contexts.p_within(name, of_all_joints), why)
+
+
+@signature(
+    "motor-equivalent part",
+    "contexts",
+    unit="length unit, rad, per root of dimension",
+    extent="as the distance, per root of dimension",
+    meaning="The part of the difference between mean postures that leaves the hand in place "
+    "(Mattos, Latash and colleagues). If it exceeds the other part, the contexts differ mainly in "
+    "what the hand does not show.",
+)
+def motor_equivalent_part(contexts: TwoContexts) -> Value:
+    """‖Nᵀ(mean q₁ - mean q₂)‖ / √d, N (k, d) an orthonormal basis of the Jacobian's nullspace."""
+    return part_of_the_difference(contexts, "motor-equivalent part", 0)
+
+
+@signature(
+    "non-motor-equivalent part",
+    "contexts",
+    unit="length unit, rad, per root of dimension",
+    extent="as the distance, per root of dimension",
+    meaning="The part of that difference that moves the hand.",
+)
+def other_part(contexts: TwoContexts) -> Value:
+    """‖Mᵀ(mean q₁ - mean q₂)‖ / √d, M (k, d) an orthonormal basis of the Jacobian's row space."""
+    return part_of_the_difference(contexts, "non-motor-equivalent part", 1)
+
+
+@signature(
+    "lead time",
+    "contexts",
+    unit="ticks",
+    extent="ticks, ≥ 0",
+    meaning="How long before the hit the postures of the two contexts can be told apart at every "
+    "tick (after Engel, Flanders & Soechting 1997).",
+    sources=("engel1997",),
+)
+def lead(contexts: TwoContexts) -> Value:
+    """max {k: p(j) ≤ α for all j ≤ k}, p(j) of the test of postures j ticks before the hit.
+
+    It ends where the shortest run begins.
     """
-    if not selects(study, label):
-        return math.nan
-    (positions,) = (
-        tasks for number, tasks in families(study.tasks) if number == moving and task in tasks
-    )
-    runs: dict[str, list[Array]] = {label: [], PLACEBO: []}
-    places = np.unique(list(positions.values()))
-    for place, method in product(places, runs):
-        at = [name for name, where in positions.items() if where == place]
-        cells = [study.cells[name, method] for name in at if (name, method) in study.cells]
-        with_hand = [
-            run
-            for cell in cells
-            for run in study.trajectories(cell.task, method).with_hand(hand, goal)
-        ]
-        if len(with_hand) < 2:
-            return math.nan
-        runs[method].append(postures(tuple(with_hand), goal))
-    x = places - places.mean()
-    rng = np.random.default_rng([SEED, goal, moving])
-    return beyond_p(runs[label], runs[PLACEBO], rng, contrast=x / (x**2).sum())
+    hit = contexts.goal - 1
+    longest = min(int(run.hits[hit]) for group in contexts.runs for run in group)
+    if contexts.single or longest == 0:
+        why = NO_SPREAD if contexts.single else "a run hits it at the start"
+        return contexts.value(math.nan, why_not=why)
+    first, second = (last_ticks(group, contexts.goal, longest + 1) for group in contexts.runs)
+    ticks = lead_time(first, second, rng_of("lead time", contexts.place))
+    why = "not distinguishable at the hit" if ticks is None else ""
+    value = contexts.value(math.nan if ticks is None else ticks, why_not=why)
+    return value._replace(place=contexts.place._replace(longest=longest))
 
 
-@cached
-def shared_goal(study: Study) -> TwoContexts | None:
-    """The first goal that two tasks share before they differ, by the paper's learner if it ran.
+# A goal beside one that differs between tasks
 
-    None where no method has solved runs on two such tasks.
-    """
-    labels = [label for _, label in study.cells]
-    for label in dict.fromkeys([*CONDITIONS, *main_methods(labels), *labels]):
-        for *names, _ in pairs_of_contexts(study):
-            keys = [(name, label) for name in names]
-            if all(key in study.cells and len(study.cells[key].good) for key in keys):
-                first, second = (study.trajectories(*key) for key in keys)
-                both = [TwoContexts(first, second, 1, hand) for hand in HANDS]
-                for contexts in both:
-                    if all(contexts.runs):
-                        return contexts
-    return None
+
+@signature(
+    "locus slope",
+    "moved goals",
+    unit="rad per length unit",
+    extent="rad or length unit per length unit, by joint",
+    meaning="Slope of the mean posture at a goal against the position of a neighbouring goal that "
+    "differs between tasks: the next goal (anticipatory) or the previous one (carry-over). The "
+    "name is that of locus equations in speech (Lindblom 1963; Sussman, McCaffrey & Matthews "
+    "1991).",
+    sources=("sussman1991",),
+)
+def slope_by_joint(beside: BesideMovedGoal) -> list[Value]:
+    """b = Σ (x - mean x)(m(x) - mean m) / Σ (x - mean x)², m(x) the mean posture at position x."""
+    slopes = locus_slopes(beside.configurations, beside.positions)
+    place, n = beside.place, len(beside.positions)
+    return [
+        Value(place._replace(joint=joint), slope, n, unit="1" if joint[:4] == "base" else None)
+        for joint, slope in zip(beside.task.robot.joint_names, slopes, strict=True)
+    ]
+
+
+@signature(
+    "locus slope norm",
+    "moved goals",
+    unit="length unit, rad, per length unit",
+    extent="mixed, per length unit, ≥ 0",
+    meaning="Length of the vector of all joints' slopes, with a permutation test over positions. "
+    "With k positions (up to seven) p is at least 2/k!: 0.0028 with six.",
+)
+def norm_of_slopes(beside: BesideMovedGoal) -> list[Value]:
+    """‖b‖ over all joints."""
+    rng = rng_of("locus slope norm", beside.place)
+    norm = slope_length(beside.configurations, beside.positions, rng)
+    return [Value(beside.place, norm, len(beside.positions))]

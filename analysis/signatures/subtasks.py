@@ -16,6 +16,11 @@ NO_LENGTH = 1e-9
 """Length of a displacement in joint space below which it is rounding."""
 
 
+def other(hand: Hand) -> Hand:
+    """The hand that is not chosen."""
+    return "right" if hand == "left" else "left"
+
+
 def isolated_reach(task: Task, q: Array, goal: int, hand: Hand) -> tuple[int, Array] | None:
     """Ticks in which a hand reaches a goal from ``q`` by the corrective process alone, and where.
 
@@ -49,7 +54,7 @@ def served(path: Trajectory) -> Array:
         if alone is None:
             continue
         hit = np.array(execution.configurations[k])
-        waiting = task.robot.joints("left" if now == "right" else "right")
+        waiting = task.robot.joints(other(now))
         hit[waiting] = alone[1][waiting]
         nexts = [isolated_reach(task, q, k + 2, after) for q in (alone[1], hit)]
         if nexts[0] is not None and nexts[1] is not None:
@@ -66,8 +71,9 @@ def ticks_slower(path: Trajectory) -> Array:
     """Ticks by which each goal's hand is slower for that goal alone, shape ``(G,)``.
 
     Slower than the hand with which the corrective process alone reaches the goal in the fewest
-    ticks from the posture before; 0 for that hand and one as quick. Infinite where the corrective
-    process does not reach the goal with the hand.
+    ticks from the posture before; 0 for that hand and one as quick. Where it is above 0, the choice
+    of hand serves other goals than its own. Infinite where the corrective process does not reach
+    the goal with the hand.
     """
     slower = np.empty(len(path.hands))
     befores = postures_before(path.execution, path.task)
@@ -76,14 +82,6 @@ def ticks_slower(path: Trajectory) -> Array:
         ticks = {each: reach[0] for each, reach in reaches.items() if reach is not None}
         slower[k] = ticks[hand] - min(ticks.values()) if hand in ticks else np.inf
     return slower
-
-
-def isolated_agreement(path: Trajectory) -> list[bool]:
-    """Whether each goal is hit with the hand that would be chosen for it by itself.
-
-    Where :func:`ticks_slower` is above 0, the choice of hand serves other goals than its own.
-    """
-    return [bool(ticks == 0) for ticks in ticks_slower(path)]
 
 
 def turning_angles(postures: Array) -> Array:
@@ -101,11 +99,6 @@ def turning_angles(postures: Array) -> Array:
     along = np.linalg.norm(units[1:] + units[:-1], axis=1)
     angles: Array = 2 * np.arctan2(apart, along)
     return angles
-
-
-def other(hand: Hand) -> Hand:
-    """The hand that is not chosen."""
-    return "right" if hand == "left" else "left"
 
 
 def preshaping(path: Trajectory, initial: Execution) -> Array:
@@ -139,11 +132,8 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
     return nearer
 
 
-def travel(path: Trajectory) -> Array:
-    """Joint travel of the arm that is not chosen in each subtask, rad, shape ``(G,)``.
-
-    From hit to hit, as in column ``other_arm_travel``, which is its sum; ≥ 0.
-    """
+def waiting_travel(path: Trajectory) -> Array:
+    """Joint travel of the arm that is not chosen, from hit to hit, rad, shape ``(G,)``."""
     moved = path.execution.configurations - postures_before(path.execution, path.task)
     waiting = [path.task.robot.joints(other(hand)) for hand in path.hands]
     return np.array(

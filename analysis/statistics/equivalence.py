@@ -14,23 +14,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import (
-    Estimate,
-    centred,
-    sample,
-    samples_of,
-    student,
-)
+from coartic.analysis.statistics.estimates import Estimate, centred, samples_of, student, vector
 from coartic.robot import Array
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
+Equivalence = Literal["equivalent", "different", "undecided"]
 
 
-Verdict = Literal["equivalent", "different", "undecided"]
-
-
-def verdict(estimate: Estimate, margin: float) -> Verdict:
+def verdict(estimate: Estimate, margin: float) -> Equivalence:
     """Compare the interval of a difference with ±margin.
 
     Equivalent where the interval lies within the margin, different where it lies outside,
@@ -50,7 +42,7 @@ def difference_to_printed(
 
     Where no SD is printed (None) the published mean is taken as exact.
     """
-    values = sample(ours)
+    values = vector(ours)
     theirs = [] if sd is None or runs < 2 else [(sd**2, runs)]
     return _welch(float(values.mean()) - published, [_variance(values), *theirs])
 

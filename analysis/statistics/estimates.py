@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -36,9 +36,11 @@ SEED = 0
 """Seed of every resampling."""
 FEWEST = 3
 """Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
-LARGE, RESAMPLES_OF_LARGE = 500, 1_999
-"""Beyond so many values an interval is the percentiles of so many resamples: BCa takes time in the
-square of the number of values, and corrects nothing there."""
+FEWER_RESAMPLES = 1_999
+"""For intervals of which each resample takes long: of many values, and over instances."""
+LARGE = 500
+"""Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
+in the square of the number of values, and corrects nothing there."""
 NEGLIGIBLE = 1e-9
 """Values that differ by less than this share of their size do not differ: it is rounding."""
 
@@ -67,22 +69,28 @@ def interval(name: str, estimate: Estimate | None) -> dict[str, float]:
     return {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
 
 
-def sample(values: ArrayLike) -> Array:
-    """Values as a vector. Raises ValueError where it is empty or holds NaN or infinity.
+def vector(values: ArrayLike) -> Array:
+    """A sample as a vector (n,). Raises ValueError where it is empty or holds NaN or infinity.
 
     Runs without a solution have no reward: the caller decides what becomes of them.
     """
-    vector = np.asarray(values, dtype=np.float64)
-    if vector.ndim != 1 or vector.size == 0 or not np.isfinite(vector).all():
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 1 or sample.size == 0 or not np.isfinite(sample).all():
         raise ValueError("a sample is a vector of at least one value, all of them finite")
-    return vector
+    return sample
 
 
 def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
     """Two samples, or where ``second`` is a number one sample of differences to it."""
     if np.ndim(second) == 0:
-        return (np.subtract(sample(first), second, dtype=np.float64),)
-    return sample(first), sample(second)
+        return (np.subtract(vector(first), second, dtype=np.float64),)
+    return vector(first), vector(second)
+
+
+def slices(count: int, most: int) -> Iterator[slice]:
+    """Slices of at most ``most`` places that cover ``count`` places, in their order."""
+    for start in range(0, count, most):
+        yield slice(start, min(start + most, count))
 
 
 def varies(values: Array, axis: int = 0) -> Array:
@@ -107,7 +115,7 @@ def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Ar
 
 def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
     """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
-    return bootstrap_estimate((sample(values),), np.mean, resamples)
+    return bootstrap_estimate((vector(values),), np.mean, resamples)
 
 
 def difference_of_means(
@@ -149,7 +157,7 @@ def bootstrap_estimate(
     if not any(map(varies, samples)):
         return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
-    resamples = min(resamples, RESAMPLES_OF_LARGE) if large else resamples
+    resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
     with warnings.catch_warnings():
         # scipy warns where BCa is undefined; that case is dealt with below.
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)

@@ -26,15 +26,14 @@ from coartic.analysis.statistics.estimates import (
     SEED,
     Estimate,
     centred,
-    sample,
     samples_of,
+    slices,
+    vector,
 )
 
 Alternative = Literal["greater", "less", "two-sided"]
-AT_ONCE = 1 << 18
+IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
-MOST_TABLES = 1_000_000
-"""Tables of counts up to which Fisher's test enumerates them."""
 
 
 def bootstrap_test(
@@ -66,10 +65,8 @@ def bootstrap_test(
     rng = np.random.default_rng(SEED)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
     for values, sign in zip(shifted, (1, -1), strict=False):
-        rows = max(1, AT_ONCE // len(values))
-        for start in range(0, resamples, rows):
-            part = slice(start, min(start + rows, resamples))
-            drawn = values[rng.integers(len(values), size=(part.stop - start, len(values)))]
+        for part in slices(resamples, max(1, IN_CACHE // len(values))):
+            drawn = values[rng.integers(len(values), size=(part.stop - part.start, len(values)))]
             sums[part] += sign * drawn.mean(axis=1)
             variances[part] += drawn.var(axis=1, ddof=1) / len(values)
     # What is rounding is none: resamples of equal values have no spread, means can be equal.
@@ -96,7 +93,7 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
     pair the two are exchangeable. All 2^n signs are enumerated where there are no more than
     :data:`RESAMPLES` (13 pairs), otherwise as many are drawn. NaN with fewer than two pairs.
     """
-    values = sample(differences)
+    values = vector(differences)
     mean, n = float(values.mean()), (len(values),)
     if len(values) < 2:
         return Estimate(mean, n=n)
@@ -106,7 +103,7 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
         permutation_type="samples",
         vectorized=True,
         n_resamples=RESAMPLES,
-        batch=max(1, min(1_000, AT_ONCE // len(values))),
+        batch=max(1, min(1_000, IN_CACHE // len(values))),
         rng=np.random.default_rng(SEED),
     )
     least = 2 / min(2 ** len(values), 1 + RESAMPLES)
@@ -122,12 +119,14 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Estimate(count / total - share, p=p, n=(total,))
 
 
-def independence_test(first: Sequence[int], second: Sequence[int]) -> Estimate:
+def independence_test(
+    first: Sequence[int], second: Sequence[int], *, most_tables: int = 1_000_000
+) -> Estimate:
     """Fisher's exact test that two rows of counts share one distribution over categories.
 
     Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all
     tables that are no likelier than the one seen, by enumeration in integers where there are no
-    more than :data:`MOST_TABLES`, else of those that are drawn. (Of more than two columns scipy
+    more than ``most_tables``, else of those that are drawn. (Of more than two columns scipy
     draws them always.) The estimate is the total variation distance of the two shares, 0 to 1.
     Raises ValueError for rows of different length, or one without counts.
     """
@@ -138,7 +137,7 @@ def independence_test(first: Sequence[int], second: Sequence[int]) -> Estimate:
     apart = float(np.abs(rows[0] / n - rows[1] / m).sum() / 2)
     pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
     *columns, (last, of_first) = sorted(pairs)
-    if math.prod(count + 1 for count, _ in columns) > MOST_TABLES:
+    if math.prod(count + 1 for count, _ in columns) > most_tables:
         method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
         p = float(stats.fisher_exact(rows, method=method).pvalue)
         return Estimate(apart, p=p, n=(n, m))

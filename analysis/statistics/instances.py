@@ -20,19 +20,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import (
-    FEWEST,
-    NEGLIGIBLE,
-    SEED,
-    TAILS,
-    Estimate,
-    bootstrap_estimate,
-    sample,
-)
+from coartic.analysis.statistics import estimates
+from coartic.analysis.statistics.estimates import FEWER_RESAMPLES, Estimate
 from coartic.robot import Array
 
-RESAMPLES = 1_999
-"""Resamples of instances and runs, for an interval of one number."""
 Runs = tuple[Array, ...]
 """Scores of the runs (n,) on an instance; of two methods, whose difference counts: first less
 second."""
@@ -46,7 +37,7 @@ def task_mean(values: Mapping[str, ArrayLike]) -> Estimate:
     def statistic(*strata: Array, axis: int = -1) -> Array:
         return np.asarray(sum(runs.mean(axis) for runs in strata) / len(strata))
 
-    return bootstrap_estimate(tuple(map(sample, values.values())), statistic)
+    return estimates.bootstrap_estimate(tuple(map(estimates.vector, values.values())), statistic)
 
 
 def value(runs: Runs) -> float:
@@ -54,7 +45,7 @@ def value(runs: Runs) -> float:
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
-def other_tasks(scores: Scores) -> Estimate:
+def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
     The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
@@ -66,25 +57,21 @@ def other_tasks(scores: Scores) -> Estimate:
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
     values = {family: np.array(list(map(value, instances))) for family, instances in scores.items()}
-    estimate = float(np.mean([instances.mean() for instances in values.values()]))
+    mean = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
-    if min(n) < FEWEST:
-        return Estimate(estimate, n=n)
-    deviations = np.zeros(RESAMPLES)
+    if min(n) < estimates.FEWEST:
+        return Estimate(mean, n=n)
+    deviations = np.zeros(resamples)
     for place, (family, instances) in enumerate(scores.items()):
-        rng = np.random.default_rng([SEED, place])
-        deviations += resampled_deviations(instances, values[family], rng)
-    if np.abs(deviations).max() <= NEGLIGIBLE * abs(estimate):
-        return Estimate(estimate, estimate, estimate, n=n)
-    low, high = estimate + np.quantile(deviations / len(values), TAILS)
-    least = np.mean(
-        [min(-greatest_value(runs, -1) for runs in instances) for instances in scores.values()]
-    )
-    most = np.mean(
-        [max(greatest_value(runs, 1) for runs in instances) for instances in scores.values()]
-    )
-    ends = max(float(low), float(least)), min(float(high), float(most))
-    return Estimate(estimate, *ends, n=n)
+        rng = np.random.default_rng([estimates.SEED, place])
+        deviations += resampled_deviations(instances, values[family], rng, resamples)
+    if np.abs(deviations).max() <= estimates.NEGLIGIBLE * abs(mean):
+        return Estimate(mean, mean, mean, n=n)
+    low, high = mean + np.quantile(deviations / len(values), estimates.TAILS)
+    families = scores.values()
+    least = np.mean([min(-greatest_value(runs, -1) for runs in family) for family in families])
+    most = np.mean([max(greatest_value(runs, 1) for runs in family) for family in families])
+    return Estimate(mean, max(float(low), float(least)), min(float(high), float(most)), n=n)
 
 
 def greatest_value(runs: Runs, sign: int) -> float:
@@ -94,11 +81,11 @@ def greatest_value(runs: Runs, sign: int) -> float:
 
 
 def resampled_deviations(
-    instances: Sequence[Runs], values: Array, rng: np.random.Generator
+    instances: Sequence[Runs], values: Array, rng: np.random.Generator, resamples: int
 ) -> Array:
-    """Deviations of resampled means of one family from its mean, shape ``(RESAMPLES,)``."""
+    """Deviations of resampled means of one family from its mean, shape ``(resamples,)``."""
     count = len(instances)
-    which = rng.integers(count, size=(RESAMPLES, count))
+    which = rng.integers(count, size=(resamples, count))
     drawn = values[which]
     for number, samples in enumerate(instances):
         chosen = which == number

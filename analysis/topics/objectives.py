@@ -2,52 +2,55 @@
 
 from __future__ import annotations
 
-import itertools
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from coartic import Movement, Task, execute
-from coartic.analysis.claims.data import Data, MissingError
-from coartic.analysis.claims.register import MARGINS, Claim, Finding
+from coartic.analysis.claims.data import Data, MissingError, judges
+from coartic.analysis.claims.register import MARGINS, Finding
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.section import Section
-from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED, mean
-from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED, TAILS, mean
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES, mean_of, one_sentence
-from coartic.analysis.words import estimate
-from coartic.learner.rows import movements_from
+from coartic.analysis.topics import random_tasks
+from coartic.analysis.words import capital, estimate, number
 from coartic.robot import Array
+from coartic.runs.run import movements_from
 from coartic.tasks.task import address_of
 
-Solution = tuple[Movement, ...]
+Solution = tuple[tuple[Movement, ...], CellRuns]
+"""A solution and the runs behind it."""
 TERMS = {"joints": "costly joints", "region": "costly disc", "distinct": "postures alike"}
 """Penalties, each by its one weight, in words."""
-WHO = {
-    "told": "the planner told of the penalty",
-    "ticks": "the planner of ticks",
-    "smooth": "the planner of smoothness",
-    "learner": "the learner",
-    "from plan": "the learner from the plan of ticks",
-    "cma-es": "CMA-ES",
+WHO: dict[str, tuple[str, str, Any]] = {
+    "told": ("the planner told of the penalty", style.INK, style.SOLID),
+    "ticks": ("the planner of ticks", style.VERMILLION, style.SOLID),
+    "smooth": ("the planner of smoothness", style.ORANGE, style.DASHED),
+    "learner": ("the learner", style.BLUE, style.SOLID),
+    "from plan": ("the learner from the plan of ticks", style.SKY, style.DASHED),
+    "cma-es": ("CMA-ES", style.GREEN, style.SOLID),
 }
-"""Who makes movements, in words: planners that are told of the penalty, that believe that ticks
-count alone, that believe in smoothness; the learner, from the corrective process and from the plan
-of ticks; CMA-ES."""
-UNTOLD = ("learner", "cma-es")
-"""Who learns by trial and error, and from no plan."""
-_METHODS = {
+"""Who makes movements, in words, with colour and dash: planners that are told of the penalty, that
+believe that ticks count alone, that believe in smoothness; the learner, from the corrective process
+and from the plan of ticks; CMA-ES."""
+SCORED = {
     "believed-reward/plan": "told",
     "dual-process": "learner",
     "believed-reward/EC1": "from plan",
     "believed-reward/EC4": "from plan",
     "cma-es/bandit": "cma-es",
 }
-_PLANNERS = {"believed-reward/plan": "ticks", "trajectory-optimisation/squared-changes": "smooth"}
+"""Who makes the runs on tasks with a penalty, by method."""
+WITHOUT_PENALTY = {
+    "believed-reward/plan": "ticks",
+    "trajectory-optimisation/squared-changes": "smooth",
+}
+"""Who makes the plans for tasks without one, which are executed under each penalty."""
 
 
 def base_of(task: str) -> str:
@@ -83,7 +86,7 @@ def rewards(study: Study) -> pd.DataFrame:
         best = -np.inf
         for (run_on, label), cell in study.cells.items():
             method = label.partition(" ")[0]
-            who = _METHODS.get(method) or _METHODS.get(method.partition("/")[0])
+            who = SCORED.get(method) or SCORED.get(method.partition("/")[0])
             if run_on == name and who is not None and len(cell.good):
                 seen[who] = float(cell.rewards.mean()), cell
                 best = max(best, float(cell.rewards.max()))
@@ -102,12 +105,12 @@ def rewards(study: Study) -> pd.DataFrame:
 
 
 @cached
-def plans_without_penalty(study: Study) -> dict[str, dict[str, tuple[Solution, CellRuns]]]:
+def plans_without_penalty(study: Study) -> dict[str, dict[str, Solution]]:
     """Plans of those that know of no penalty, and their runs, by task without a penalty."""
     movements, waypoints = study.movements
-    plans: dict[str, dict[str, tuple[Solution, CellRuns]]] = {}
+    plans: dict[str, dict[str, Solution]] = {}
     for (name, label), cell in study.cells.items():
-        who = _PLANNERS.get(label.partition(" ")[0])
+        who = WITHOUT_PENALTY.get(label.partition(" ")[0])
         if who and study.tasks[name].penalty is None and len(cell.good):
             run = str(cell.good.run_id.iloc[0])
             task = study.tasks[name]
@@ -154,33 +157,6 @@ def crossing(weights: Array, means: Array) -> float:
     return float(weights[k] + share * (weights[k + 1] - weights[k]))
 
 
-def crossing_weights(study: Study) -> pd.DataFrame:
-    """Where trial and error overtakes the planner of ticks, by term: the weight, with its interval.
-
-    Percentiles of 9,999 bootstrap resamples of random tasks within their families, 95 %, which are
-    not widened as means over tasks are: a crossing can be infinite. An infinite end: beyond the
-    largest weight, if at all.
-    """
-    rows = []
-    for term, who in itertools.product(TERMS, UNTOLD):
-        table = advantage(study, who, "ticks", term)
-        if len(table) < FEWEST:
-            continue
-        weights = np.array(table.columns, dtype=np.float64)
-        rng = np.random.default_rng(SEED)
-        by_family = [part.to_numpy() for _, part in table.groupby(level="family")]
-        drawn = [
-            part[rng.integers(len(part), size=(RESAMPLES, len(part)))].mean(axis=1)
-            for part in by_family
-        ]
-        each = [crossing(weights, resample) for resample in np.mean(drawn, axis=0)]
-        low, high = np.quantile(each, [0.025, 0.975], method="inverted_cdf")
-        centre = np.mean([part.mean(axis=0) for part in by_family], axis=0)
-        rows.append((term, who, len(table), crossing(weights, centre), low, high))
-    columns = ["term", "who", "tasks", "crossing", "crossing_low", "crossing_high"]
-    return pd.DataFrame(rows, columns=columns)
-
-
 @table("term, weight, who, tasks, regret[], helps[]")
 def objectives(study: Study) -> Rows:
     """Regret under the true reward by penalty, its weight and who, means over random tasks.
@@ -198,9 +174,9 @@ def objectives(study: Study) -> Rows:
             key=lambda part: (part[0][0], list(WHO).index(str(part[0][1]))),
         ):
             row: Row = {"term": term, "weight": weight, "who": who, "tasks": len(rows)}
-            row |= mean_of("regret", rows.regret)
+            row |= random_tasks.mean_of("regret", rows.regret)
             if who == "from plan" and weight in helped.columns:
-                row |= mean_of("helps", helped[weight])
+                row |= random_tasks.mean_of("helps", helped[weight])
             yield f"{term} {weight:g} {who}", row | runs_of(*rows.cell)
 
 
@@ -208,25 +184,31 @@ def objectives(study: Study) -> Rows:
 def crossings(study: Study) -> Rows:
     """The weight from which trial and error regrets less than the planner that believes in ticks.
 
-    Infinite: beyond the largest weight, if at all.
+    Its interval: percentiles of bootstrap resamples of random tasks within their families, which
+    are not widened as means over tasks are, as a crossing can be infinite: beyond the largest
+    weight, if at all.
     """
     frame = on_random_tasks(study)
-    for at in crossing_weights(study).to_dict("records"):
-        row: Row = {str(name): value for name, value in at.items()}
-        of_both = frame[(frame.term == row["term"]) & frame.who.isin([row["who"], "ticks"])]
-        cells = {id(cell): cell for cell in of_both.cell}
-        yield f"{row['term']} {row['who']}", row | runs_of(*cells.values())
-
-
-WHO_LOOKS: dict[str, tuple[str, Any]] = {
-    "told": (style.INK, style.SOLID),
-    "ticks": (style.VERMILLION, style.SOLID),
-    "smooth": (style.ORANGE, style.DASHED),
-    "learner": (style.BLUE, style.SOLID),
-    "from plan": (style.SKY, style.DASHED),
-    "cma-es": (style.GREEN, style.SOLID),
-}
-"""Colour and dash of each line."""
+    for term in TERMS:
+        for who in ("learner", "cma-es"):
+            table = advantage(study, who, "ticks", term)
+            if len(table) < FEWEST:
+                continue
+            weights = np.array(table.columns, dtype=np.float64)
+            rng = np.random.default_rng(SEED)
+            by_family = [part.to_numpy() for _, part in table.groupby(level="family")]
+            drawn = [
+                part[rng.integers(len(part), size=(RESAMPLES, len(part)))].mean(axis=1)
+                for part in by_family
+            ]
+            each = [crossing(weights, resample) for resample in np.mean(drawn, axis=0)]
+            low, high = np.quantile(each, TAILS, method="inverted_cdf")
+            centre = crossing(weights, np.mean([part.mean(axis=0) for part in by_family], axis=0))
+            row: Row = {"term": term, "who": who, "tasks": len(table), "crossing": centre}
+            of_both = frame[(frame.term == term) & frame.who.isin([who, "ticks"])]
+            cells = {id(cell): cell for cell in of_both.cell}
+            ends = {"crossing_low": low, "crossing_high": high}
+            yield f"{term} {who}", row | ends | runs_of(*cells.values())
 
 
 @figure(
@@ -254,13 +236,13 @@ def draw_objectives(study: Study) -> Parts:
         axes.set_xlim(0, edge)
         axes.set_xlabel("weight (ticks)")
         for at in weights_of_crossings[weights_of_crossings.term == term].to_dict("records"):
-            band: Any = {"color": WHO_LOOKS[at["who"]][0], "alpha": 0.15, "linewidth": 0}
+            band: Any = {"color": WHO[at["who"]][1], "alpha": 0.15, "linewidth": 0}
             axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
-        for who, (color, dash) in WHO_LOOKS.items():
+        for who, (words, color, dash) in WHO.items():
             rows = data[(data.term == term) & (data.who == who)]
             line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
             axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
-            axes.plot(rows.weight, rows.regret, **line, label=WHO[who].removeprefix("the "))
+            axes.plot(rows.weight, rows.regret, **line, label=words.removeprefix("the "))
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("regret (%)")
     style.letters(panels)
@@ -269,28 +251,67 @@ def draw_objectives(study: Study) -> Parts:
     return drawing, data, f"Regret by penalty, weight and who. {'; '.join(each)}.", ()
 
 
-def less_regret(data: Data, claim: Claim) -> Finding:
-    """one-tailed bootstrap tests over random tasks that the first regrets less than the second by \
-more than {regret:g} % of the best known reward"""
-    tests = []
-    by_pair: dict[str, list[str]] = {}
-    for where, (first, second) in claim.cells.items():
-        terms, _, weight = where.partition(" ")
-        for term in TERMS if terms == "every" else (terms,):
-            table = advantage(data.study, first, second, term)
-            if len(table) < FEWEST or float(weight) not in table.columns:
-                raise MissingError(f"this folder has too few tasks with {term} {weight}")
-            values = np.array(table[float(weight)], dtype=np.float64)
-            test = bootstrap_test(values, MARGINS["regret"], resamples=RESAMPLES_OF_STUDIES)
-            tests.append(test)
-            at = f"at weight {weight} ({TERMS[term]})" if float(weight) else "without a penalty"
-            by_pair.setdefault(f"{WHO[first]} regrets less than {WHO[second]}", []).append(
-                f"{estimate(mean(values), 1)} points {at} on {len(values)} random tasks"
-            )
+def finding_of_objectives(study: Study) -> str:
+    """Regrets at the largest weight, by penalty, and where the learner overtakes the planner."""
+    data = objectives(study)
+    last = data[data.weight == data.weight.max()]
+    regrets = last.pivot_table("regret", "term", "who", sort=False)
+    if not {"ticks", "learner"} <= set(regrets.columns):
+        return ""
+    words = {term: "a costly disc" if term == "region" else TERMS[term] for term in TERMS}
+    loses = [f"{number(regret, 1)} %" for regret in regrets.ticks]
+    loses[0] += " of the best known reward"
+    with_terms = (f"{of} with {words[t]}" for of, t in zip(loses, regrets.index, strict=True))
+    sentence = (
+        f"On {last.tasks.max()} random tasks with a penalty of weight {number(data.weight.max())} "
+        f"a planner that believes that ticks alone count loses {', '.join(with_terms)}, the "
+        f"learner {', '.join(f'{number(regret, 1)} %' for regret in regrets.learner)}."
+    )
+    overtakes = [
+        f"{random_tasks.interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
+        for row in crossings(study).to_dict("records")
+        if row["who"] == "learner"
+    ]
+    if overtakes:
+        overtaken = "The learner overtakes that planner at a weight of"
+        sentence += f" {overtaken} {', '.join(overtakes)}."
+    return sentence
+
+
+def less_regret(
+    data: Data, first: str, second: str, weight: float, terms: tuple[str, ...]
+) -> Finding:
+    """Whether ``first`` regrets less than ``second`` under penalties of a weight."""
+    tests, parts = [], []
+    for term in terms:
+        table = advantage(data.study, first, second, term)
+        if len(table) < FEWEST or weight not in table.columns:
+            raise MissingError(f"this folder has too few tasks with {term} {weight:g}")
+        tests.append(random_tasks.over_tasks(table[weight], MARGINS["regret"]))
+        at = f"at weight {weight:g} ({TERMS[term]})" if weight else "without a penalty"
+        parts.append(f"{estimate(mean(table[weight]), 1)} points {at} on {len(table)} random tasks")
     data.run_ids.extend(data.study.runs.run_id)
-    seen = one_sentence([f"{pair}: {', '.join(parts)}" for pair, parts in by_pair.items()])
-    seen += " Points are per cent of the best known reward."
+    pair = f"{capital(WHO[first][0])} regrets less than {WHO[second][0]}"
+    seen = f"{pair}: {', '.join(parts)}. Points are per cent of the best known reward."
     return Finding(all(test.value > 0 for test in tests), seen, tuple(tests))
+
+
+CLAIMED: dict[str, tuple[str, str, float, tuple[str, ...]]] = {
+    "right-objective-plans-better": ("ticks", "learner", 0, ("distinct",)),
+    "learner-overtakes-wrong-plans": ("learner", "ticks", 300, (*TERMS,)),
+    "cma-es-overtakes-sooner": ("cma-es", "ticks", 100, ("joints", "distinct")),
+    "learner-finds-distinct-postures": ("learner", "smooth", 300, ("distinct",)),
+    "slightly-wrong-plan-helps": ("from plan", "learner", 30, (*TERMS,)),
+    "very-wrong-plan-hurts": ("learner", "from plan", 300, ("joints",)),
+    "truth-beats-trial-and-error": ("told", "learner", 100, (*TERMS,)),
+}
+"""Who regrets less than whom by a claim, at which weight of which penalties."""
+for _claim, (_first, _second, _weight, _terms) in CLAIMED.items():
+    judges(
+        _claim,
+        test="one-tailed bootstrap tests over random tasks that the first regrets less than the "
+        "second by more than {regret:g} % of the best known reward",
+    )(partial(less_regret, first=_first, second=_second, weight=_weight, terms=_terms))
 
 
 OBJECTIVES = Section(
@@ -300,6 +321,7 @@ OBJECTIVES = Section(
     caption=(
         "Regret under the true reward, in per cent of the best known: means over random tasks"
     ),
+    finding=finding_of_objectives,
     figure="objectives",
     table="objectives",
     note=(

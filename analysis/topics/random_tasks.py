@@ -1,38 +1,39 @@
-"""Means over random tasks, each of which counts alike, for tables and claims."""
+"""Means over random tasks, each of which counts alike, for tables, sentences and claims."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.claims.data import Data, MissingError
+from coartic.analysis.claims.data import MissingError
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.statistics.estimates import FEWEST, Estimate, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.study import CellRuns, Study
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row
-from coartic.analysis.words import estimate
+from coartic.analysis.words import capital, estimate, in_brackets, number
 from coartic.robot import Array
 
+RECEDING_HORIZON = "receding-horizon"
+"""The planner whose goals ahead are varied."""
 RESAMPLES_OF_STUDIES = 99_999
 """Resamples of a test, as many as on families of tasks: p-values are corrected over many claims."""
 
 
-def reported(data: Data, name: str) -> bool:
-    """Whether a task is one of those that methods were not tuned on."""
-    return data.task(name).split != "development"
-
-
-def solved_cells(study: Study, method: str) -> Iterator[tuple[CellRuns, dict[str, Any]]]:
-    """Cells of a method with a solved run, each with its parameters."""
+@cached
+def solved_cells(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, Any]]]]:
+    """Cells with a solved run, each with its parameters, by method."""
+    cells: dict[str, list[tuple[CellRuns, dict[str, Any]]]] = {}
     for cell in study.cells.values():
-        if cell.method == method and len(cell.good):
-            yield cell, json.loads(str(cell.good.parameters.iloc[0]))
+        if len(cell.good):
+            parameters = json.loads(str(cell.good.parameters.iloc[0]))
+            cells.setdefault(cell.method, []).append((cell, parameters))
+    return cells
 
 
 def over_tasks(values: pd.Series, margin: float = 0.0) -> Estimate:
@@ -43,27 +44,18 @@ def over_tasks(values: pd.Series, margin: float = 0.0) -> Estimate:
     return bootstrap_test(there, margin, resamples=RESAMPLES_OF_STUDIES)
 
 
-def in_words(sentence: str, values: pd.Series) -> str:
-    """A sentence with the mean over tasks and its interval, and with how many tasks there are."""
-    there = values.dropna()
-    seen = estimate(mean(there.to_numpy(dtype=np.float64)), 2)
-    return f"{sentence.format(seen)} ({len(there)} tasks)"
+def means_over_tasks(parts: Mapping[str, tuple[pd.Series, float, int]]) -> Finding:
+    """The finding of a claim on means over tasks, by sentences that each have a place for one.
 
-
-def finding(parts: dict[str, tuple[pd.Series, float, int]]) -> Finding:
-    """What is seen of values, by sentences that each have a place for a mean over tasks.
-
-    With each: the values by task, a bound, and 1 where they should be above it, -1 below.
+    With each: the values by task, a bound, and 1 where their mean should be above it, -1 below.
     """
     tests = tuple(over_tasks(sign * v, sign * bound) for v, bound, sign in parts.values())
-    seen = [in_words(sentence, values) for sentence, (values, _, _) in parts.items()]
-    return Finding(all(test.value > 0 for test in tests), one_sentence(seen), tests)
-
-
-def one_sentence(parts: list[str]) -> str:
-    """Parts of the evidence as one sentence."""
-    words = "; ".join(parts)
-    return f"{words[0].upper()}{words[1:]}."
+    seen = []
+    for sentence, (values, _, _) in parts.items():
+        there = values.dropna().to_numpy(dtype=np.float64)
+        seen.append(f"{sentence.format(estimate(mean(there), 2))} ({len(there)} tasks)")
+    evidence = f"{capital('; '.join(seen))}."
+    return Finding(all(test.value > 0 for test in tests), evidence, tests)
 
 
 def mean_of(name: str, values: pd.Series) -> Row:
@@ -77,3 +69,11 @@ def mean_or_nan(values: Sequence[float] | Array) -> float:
     there = np.asarray(values, dtype=np.float64)
     there = there[~np.isnan(there)]
     return float(there.mean()) if len(there) else math.nan
+
+
+def interval_in_words(
+    row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
+) -> str:
+    """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
+    value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()

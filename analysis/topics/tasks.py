@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -11,9 +12,9 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.figures.robot import box, draw_goals, draw_robot, legend_entries
 from coartic.analysis.section import Section
 from coartic.analysis.study import Study, one_by_one
+from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
 @figure(
@@ -61,6 +62,7 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0)
         draw_goals(axes, task)
+        number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
         variants = [other.label for other in tasks].count(task.label) > 1
@@ -73,7 +75,15 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_aspect("equal")
         axes.set_xlabel("x (length unit)")
         axes.set_ylabel("y (length unit)")
-    style.legend(drawing, legend_entries(hand for task in tasks for hand in task.hands), 3)
+    hands = {hand for task in tasks for hand in task.hands}
+    arms = [
+        style.entry(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
+        for hand, look in MARKERS.items()
+        if hand in hands
+    ]
+    circle: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
+    goal = style.entry("goal", linestyle="", color=style.INK, **circle)
+    style.legend(drawing, [*arms, goal], 3)
     return drawing
 
 

@@ -44,11 +44,13 @@ def _options(
     pass
 
 
-for module in (run, read, draw):
-    for command in module.COMMANDS:
-        name = command.__name__.removesuffix("_")
-        app.command(name=name)(command)
-app.add_typer(paper.app, name="paper")
+for command in (
+    *(run.run, run.list_, run.check, run.reproduce),
+    *(read.report, read.trace, read.compare, read.verify, read.cite),
+    *(draw.draw, draw.animate),
+):
+    app.command(name=command.__name__.removesuffix("_"))(command)
+app.add_typer(paper.group, name="paper")
 
 
 def main() -> None:

@@ -43,11 +43,11 @@ Readings = Annotated[
         help="How the paper is read (`coartic paper readings`), such as ties=right.",
     ),
 ]
-Runs = Annotated[
+RunCount = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", help="Runs of each cell."),
 ]
-Trials = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
+TrialCount = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
 Jobs = Annotated[int, typer.Option(min=-1, metavar="N", help="Processes; -1 is one for each core.")]
 Tasks = Annotated[str | None, typer.Option(metavar="A,B", help="Only these tasks.")]
 Methods = Annotated[str | None, typer.Option(metavar="X,Y", help="Only these methods.")]
@@ -85,7 +85,7 @@ Redo = Annotated[bool, typer.Option("--redo", help="Repeat every run.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 
 
-def names_in(text: str | None, option: str) -> list[str]:
+def split_names(text: str | None, option: str) -> list[str]:
     """A comma-separated list. Raises CoarticError for an empty name."""
     if text is None:
         return []

@@ -10,7 +10,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.text import counted, one_line
+from coartic.text import counted
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -66,7 +66,7 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import animate, check_film
+    from coartic.analysis.figures.animation import check_film, write_film
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
 
@@ -75,18 +75,15 @@ def animate(
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []
     for name in (run_id,) if other is None else (run_id, other):
-        _, stored = find_run(name, folder)
-        movement, number = trajectory_of(stored), stored.run.row["run"]
-        title = one_line(f"{movement.task.label}: {name_of(stored.method)}, run {number}")
+        _, run = find_run(name, folder)
+        movement, number = trajectory_of(run), run.key.number
+        title = f"{movement.task.label}: {name_of(run.setting.method)}, run {number}"
         panels.append((title, movement))
     if initial:
         task = panels[0][1].task
-        hands = initial_hands(task, model=stored.model)
-        movements = corrective_trial(task, hands, model=stored.model).movements
-        initial_solution = trajectory(task, movements, model=stored.model)
+        hands = initial_hands(task, model=run.setting.model)
+        movements = corrective_trial(task, hands, model=run.setting.model).movements
+        initial_solution = trajectory(task, movements, model=run.setting.model)
         panels.insert(0, (f"{task.label}: initial solution", initial_solution))
-    frames, ticks_a_second = animate(panels, out, width=width, replace=replace)
+    frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
-
-
-COMMANDS = (draw, animate)

@@ -129,11 +129,11 @@ def verify(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""
-    from coartic.analysis.verify import verify
+    from coartic.analysis.verify import check_runs
     from coartic.runs.store import open_store
 
     with open_store(folder):  # or it says what is the matter
-        report = verify(folder)
+        report = check_runs(folder)
     say(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
         *(report.wrong or ["Nothing differs."]),
@@ -143,10 +143,10 @@ def verify(
     different = bool(report.wrong)
     if again:
         from coartic.benchmarks.registry import registry
-        from coartic.benchmarks.reproduce import some_again
+        from coartic.benchmarks.reproduce import perform_some_again
 
         registered, count = registry(method_file or []), 0
-        for run_id, changes in some_again(folder, again, registered):
+        for run_id, changes in perform_some_again(folder, again, registered):
             count += 1
             for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
@@ -173,12 +173,9 @@ def cite(
     from coartic.runs.store import open_store
 
     made_with = None
-    declared = {name: entry.declared for name, entry in built_in().items()}
+    declared = built_in()
     if folder is not None:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
     text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
-
-
-COMMANDS = (report, trace, compare, verify, cite)

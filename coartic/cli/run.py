@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import names_in
+from coartic.cli.arguments import split_names
 from coartic.cli.terminal import Display, interruptible, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -16,14 +16,15 @@ from coartic.text import counted, unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
-    from coartic.benchmarks.registry import Entry, Registry
+    from coartic.benchmarks.registry import Registry
+    from coartic.runs.card import MethodCard
 
 
 def run(
     suite: given.SuiteName,
     folder: given.Out = None,
-    runs: given.Runs = None,
-    trials: given.Trials = None,
+    runs: given.RunCount = None,
+    trials: given.TrialCount = None,
     jobs: given.Jobs = -1,
     tasks: given.Tasks = None,
     methods: given.Methods = None,
@@ -42,13 +43,14 @@ def run(
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
     from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.planning import Selection, plan_suite
     from coartic.benchmarks.pool import Local
-    from coartic.benchmarks.run import Selection, plan_suite
+    from coartic.benchmarks.run import perform
     from coartic.benchmarks.suites import load_suite
 
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    wanted = names_in(tasks, "--tasks"), names_in(methods, "--methods")
+    wanted = split_names(tasks, "--tasks"), split_names(methods, "--methods")
     select = Selection(*wanted, task_file or (), method_file or ())
     plan = plan_suite(
         chosen,
@@ -68,8 +70,8 @@ def run(
 
     with interruptible(saved), display:
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
-        report = plan.perform(
-            out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
+        report = perform(
+            plan, out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
         )
     say(str(report))
     pairs = []
@@ -98,10 +100,10 @@ def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
     from coartic import builtin_tasks
     from coartic.benchmarks.suites import suites
-    from coartic.tasks.families import families
+    from coartic.tasks.families import shipped_families
 
     yield "Tasks", ", ".join(builtin_tasks())
-    yield "Families", ", ".join(families())
+    yield "Families", ", ".join(shipped_families())
     yield "Suites", ""
     for name, suite in suites().items():
         yield f"  {name}", suite.title
@@ -122,7 +124,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     """
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import methods_named, suites
-    from coartic.tasks.families import families
+    from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
     if name in suites():
@@ -141,8 +143,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
         source = "reconstructed" if task.reconstructed else "printed in the paper"
         yield "Goals are", "drawn at random" if task.family else source
-    elif name in families() or f"{name}/v1" in families():
-        family = families().get(name) or families()[f"{name}/v1"]
+    elif name in shipped_families() or f"{name}/v1" in shipped_families():
+        family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
         yield "Instances", f"{family.name}/i000, ... (test); {family.name}/d000, ... (development)"
         yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
@@ -150,27 +152,26 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         try:
             methods = methods_named(name, registered)
         except CoarticError as error:
-            names = [*suites(), *builtin_tasks(), *families(), *registered]
+            names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
             raise CoarticError(unknown("task, suite, method or family", name, names)) from error
         for method in methods:
             yield from describe_method(registered[method])
 
 
-def describe_method(entry: Entry) -> Iterator[tuple[str, str]]:
+def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
     """What a method is told and takes, and the tasks that it applies to."""
     from coartic import builtin_tasks, load_task
     from coartic.tasks.readings import readings
 
-    method = entry.method
     read = {each.field for each in readings()}
-    parameters = [f"{k}={v}" for k, v in entry.defaults.items() if k not in read]
-    tasks = [name for name in builtin_tasks() if entry.why_not(load_task(name)) is None]
-    yield "Method", f"{method.name}: {method.title}"
-    yield "Told", ", ".join(entry.told)
+    parameters = [f"{k}={v}" for k, v in card.defaults.items() if k not in read]
+    tasks = [name for name in builtin_tasks() if card.why_not(load_task(name)) is None]
+    yield "Method", f"{card.name}: {card.title}"
+    yield "Told", ", ".join(card.told)
     yield "Parameters", ", ".join(parameters) or "none"
     yield "Tasks", ", ".join(tasks) or "none of the four"
-    yield "Runs", "differ by seed" if method.stochastic else "are all the same"
-    yield "Cites", method.citation or "nothing"
+    yield "Runs", "differ by seed" if card.stochastic else "are all the same"
+    yield "Cites", card.citation or "nothing"
 
 
 def reproduce(
@@ -180,25 +181,25 @@ def reproduce(
 ) -> None:
     """Perform a run again and say whether the result is identical."""
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.reproduce import differences, find_run, performed_again
+    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
-    _, stored = find_run(run_id, folder)
-    run, registered = stored.run, registry(method_file or [])
-    if stored.method not in registered:
-        raise CoarticError(f"unknown method {stored.method!r}: pass --method-file FILE")
-    result = f"reward {run.row['reward']}, hands {run.row['hands']}"
+    _, run = find_run(run_id, folder)
+    key, asked, registered = run.key, run.setting, registry(method_file or [])
+    if asked.method not in registered:
+        raise CoarticError(f"unknown method {asked.method!r}: pass --method-file FILE")
+    result = f"reward {run.reward}, hands {run.hands}"
     say_pairs(
         [
-            ("Run", f"{run.run_id}: {stored.method} on {stored.task.name}, run {run.row['run']}"),
-            ("Seed", str(run.row["seed"])),
-            ("Parameters", ", ".join(f"{k}={v}" for k, v in stored.parameters.items())),
-            ("Result", result if run.status == "ok" else f"{run.status}: {run.row['reason']}"),
+            ("Run", f"{key.id}: {asked.method} on {asked.task.name}, run {key.number}"),
+            ("Seed", str(key.seed)),
+            ("Parameters", ", ".join(f"{k}={v}" for k, v in asked.parameters.items())),
+            ("Result", result if run.status == "ok" else f"{run.status}: {run.reason}"),
         ]
     )
-    again, code = performed_again(stored, registered), registered[stored.method].code
-    if code != stored.code:
-        say(f"Another version of the code made the run ({stored.code}; this is {code}).")
-    changes = differences(run, again)
+    again, code = perform_again(run, registered), registered[asked.method].code
+    if code != asked.code:
+        say(f"Another version of the code made the run ({asked.code}; this is {code}).")
+    changes = compare_runs(run, again)
     if changes:
         say("Performed again, it is different:", *(f"- {difference}" for difference in changes))
         sys.exit(1)
@@ -235,6 +236,3 @@ def show_laws(name: str, laws: Sequence[Law]) -> int:
     passed = sum(law.passed for law in laws)
     say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
     return len(laws) - passed
-
-
-COMMANDS = (run, list_, check, reproduce)

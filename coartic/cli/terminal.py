@@ -51,7 +51,7 @@ def console() -> Console:
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
     """Print words and what is to be said of each, below each other; long text is wrapped."""
-    kept = [(one_line(word), one_line(text)) for word, text in pairs]
+    kept = list(pairs)
     indent = max((len(word) for word, _ in kept), default=0) + 2
     width = max(console().width, indent + READABLE)
     for word, text in kept:

@@ -25,6 +25,8 @@ from coartic.text import short_repr, unknown
 if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
+METHOD_PREFIX = "dual-process/"
+"""A condition or variant as a method has this before its id."""
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
@@ -33,7 +35,6 @@ Ties = Literal["left", "right", "random", "nearest", "previous"]
 EqualDistance = Literal["random", "computed"]
 FirstTrial = Literal["learns", "forgotten"]
 UnknownTarget = Literal["corrects", "explores"]
-Update = Literal["greater", "not-less"]
 Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
 State = Literal["previous-hand", "goal"]
@@ -76,8 +77,6 @@ class ExplorationCondition:
     unknown_target: UnknownTarget = "corrects"
     """Of a pair (s, a) without a stored target: **A** acts at once, or first the noise, from
     where the robot stands."""
-    update: Update = "greater"
-    """Whether a trial replaces what is stored where R > Q, or where R >= Q."""
     state: State = "previous-hand"
     """What Q and q* are learned for: a goal and the hand before it, or a goal alone."""
     learned: Learned = "best"
@@ -162,7 +161,7 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
             "name of one, such as 'EC4'"
         )
     try:
-        return (CONDITIONS | VARIANTS)[condition.removeprefix("dual-process/")]
+        return (CONDITIONS | VARIANTS)[condition.removeprefix(METHOD_PREFIX)]
     except KeyError:
         ids = CONDITIONS | VARIANTS
         raise CoarticError(unknown("exploration condition", condition, ids)) from None

@@ -62,7 +62,6 @@ class Rules(NamedTuple):
     rounding: float  # distances that differ by no more are equal
     first_learns: bool
     explores_unknown: bool
-    update_equal: bool
     goal_alone: bool
     by_subtask: bool
     discount: float
@@ -139,7 +138,6 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         rounding=_EQUALLY_NEAR if condition.equal_distance == "random" else -1.0,
         first_learns=condition.first_trial == "learns",
         explores_unknown=condition.unknown_target == "explores",
-        update_equal=condition.update == "not-less",
         goal_alone=condition.state == "goal",
         by_subtask=condition.credit == "subtask",
         discount=float(condition.discount),
@@ -476,7 +474,7 @@ def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> N
         knows = number > 0 and not rules.goal_alone
         before = log.hits[n, number - 1].hand if knows else NO_HAND
         learned = tables[n, number, before, hit.hand]
-        if credit > learned.value or (rules.update_equal and credit == learned.value):
+        if credit > learned.value:
             learned.value = credit
             fill_row(learned.target, hit.q)
 

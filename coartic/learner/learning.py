@@ -1,19 +1,15 @@
-"""Runs of the dual-process learner (:mod:`coartic.learner.kernel`) and everything they found."""
+"""Run the dual-process learner, whose trials :mod:`coartic.learner.kernel` makes."""
 
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coartic.errors import CoarticError, NotApplicableError
+from coartic.errors import NotApplicableError
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNT,
@@ -27,159 +23,22 @@ from coartic.learner.kernel import (
     rules_of,
     work_for,
 )
+from coartic.learner.run import LearningRun
 from coartic.method import Meter
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
 from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
 from coartic.motion.problem import problem_of
-from coartic.motion.solution import Execution, Movement, execute, hands_in, movements_by_goal
+from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
-from coartic.text import short_repr
+from coartic.threads import threads_for
 
 TRIALS = 10_000  # trials of one run (printed)
-METHOD_PREFIX = "dual-process/"
-CORRECTIONS = "corrections"
-"""Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
-
-
-@dataclass(frozen=True)
-class LearningRun:
-    """One run of the learner and everything it found (:func:`learn`)."""
-
-    task: Task
-    """The task."""
-    condition: ExplorationCondition
-    """What the learner explored."""
-    model: MotionModel
-    """The constants of movement and of the corrective process."""
-    seed: int
-    """Seed of the run's random numbers."""
-    first_hands: str
-    """Hands of trial 0, such as ``"RRRR"``."""
-    rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
-    """Total reward of each trial, shape ``(trials,)``: minus its control ticks, and minus its
-    penalty where the task has one; masked where the trial failed."""
-    best_trial: int | None
-    """First trial with the highest total reward; None where none was completed."""
-    initial: tuple[Movement, ...]
-    """Movements of trial 0; none where it failed."""
-    solution: tuple[Movement, ...]
-    """Movements of the best trial."""
-    replay: tuple[Movement, ...]
-    """Movements of one noiseless greedy trial with the final tables."""
-    replay_reward: int | None
-    """Its reward; None where it did not hit every goal."""
-    values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
-    0: total rewards, or returns from that goal on where the condition credits subtasks; -inf
-    where nothing was learned."""
-    targets: Array
-    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
-    -inf."""
-    corrections: NDArray[np.int64]
-    """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
-    counters: Meter
-    """What it spent; the replay is not part of it."""
-    wall_s: float
-    """Its share of the time that it and the runs beside it took, seconds."""
-
-    def __repr__(self) -> str:
-        return short_repr(
-            self,
-            task=self.task.name,
-            condition=self.condition.id,
-            seed=self.seed,
-            trials=len(self.rewards),
-            hands=self.hands,
-            reward=self.reward,
-            initial_reward=self.initial_reward,
-            replay_reward=self.replay_reward,
-        )
-
-    @property
-    def completed(self) -> NDArray[np.bool_]:
-        """Whether each trial hit every goal, shape ``(trials,)``.
-
-        The others failed: they changed neither ``values`` nor ``targets``.
-        """
-        return ~np.ma.getmaskarray(self.rewards)
-
-    @property
-    def learned(self) -> tuple[Movement, ...]:
-        """Movements of what was learned: the best trial, or the replay where the condition
-        says so; none where there is no such trial."""
-        if self.condition.learned == "best":
-            return self.solution
-        return self.replay if self.replay_completed else ()
-
-    @property
-    def status(self) -> str:
-        """``"ok"``, or ``"infeasible"`` where nothing was learned."""
-        return "ok" if self.learned else "infeasible"
-
-    @property
-    def reason(self) -> str:
-        """Why the run has no solution; empty where it has one."""
-        if self.status == "ok":
-            return ""
-        if self.best_trial is not None:
-            return "the replay of what was learned did not hit every goal"
-        return (
-            f"the corrective process failed in all {self.counters.trials} trials; "
-            "no trial hit every goal"
-        )
-
-    @property
-    def reward(self) -> int | None:
-        """Learned reward: the highest total reward of any trial, which is max Q of state 1 if
-        trial 0 learns and the overall reward is credited; that of the replay where the condition
-        says so. Where subtasks are credited, what the tables lead to is the replay
-        (:attr:`replay_reward`): the best trial is one that noise made good."""
-        if self.condition.learned == "replay":
-            return self.replay_reward
-        return None if self.best_trial is None else int(self.rewards[self.best_trial])
-
-    @property
-    def hands(self) -> str | None:
-        """Hand sequence of what was learned."""
-        return hands_in(self.learned) if self.learned else None
-
-    @property
-    def initial_reward(self) -> int | None:
-        """Reward of trial 0."""
-        return int(self.rewards[0]) if self.completed[0] else None
-
-    @property
-    def replay_completed(self) -> bool:
-        """Whether the replay hit every goal."""
-        return self.replay_reward is not None
-
-    @property
-    def replay_hands(self) -> str | None:
-        """Hand sequence of the replay."""
-        return hands_in(self.replay) if self.replay_completed else None
-
-    def execute(self) -> Execution:
-        """Execute what was learned again, apart from the learner.
-
-        Returns
-        -------
-        Execution
-            What happened; its reward is that of the run.
-
-        Raises
-        ------
-        CoarticError
-            Nothing was learned.
-        """
-        if not self.learned:
-            raise CoarticError(f"nothing to execute: {self.reason}")
-        return execute(self.task, self.learned, model=self.model)
 
 
 def learn(
@@ -224,7 +83,7 @@ def learn(
         The task is neither a Task nor a text nor a path, or the condition is none.
     ValueError
         The seed is negative, there is no trial, no movement can be made with the model, or the
-        task was changed into none.
+        task was changed so that it contradicts itself.
 
     Notes
     -----
@@ -284,7 +143,7 @@ def learn_many(
         The movements of ``start`` break the task's rules.
     ValueError
         A seed is negative, there is no trial, no movement can be made with the model, or the task
-        was changed into none.
+        was changed so that it contradicts itself.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -293,34 +152,25 @@ def learn_many(
         raise NotApplicableError(reason)
     if trials < 1:
         raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
-    checked_model(model, radius=task.radius)
+    check_model(model, radius=task.radius)
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(seeds)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
-    lots = [ordered[first : first + together] for first in range(0, len(ordered), together)]
+    batches = [ordered[first : first + together] for first in range(0, len(ordered), together)]
 
-    def perform(lot: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, first_hands, lot, trials, start)
+    def perform(batch: Sequence[int]) -> list[LearningRun]:
+        return learn_together(task, condition, model, first_hands, batch, trials, start)
 
     compile_learner(task, condition, model, first_hands)
     if threads == 1:
-        return [run for lot in lots for run in perform(lot)]
+        return [run for batch in batches for run in perform(batch)]
     with ThreadPoolExecutor(threads) as pool:
-        return [run for runs in pool.map(perform, lots) for run in runs]
+        return [run for runs in pool.map(perform, batches) for run in runs]
 
 
 _compiled_for: set[int] = set()
 """Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
-
-
-def threads_for(jobs: int) -> int:
-    """A number of threads or processes as it is asked for: -1 for one a core."""
-    if jobs > 0:
-        return jobs
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def learn_together(
@@ -339,6 +189,7 @@ def learn_together(
     runs, dof = len(seeds), task.robot.dof
     first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
     for number, movements in movements_by_goal(task, list(start)) if start else ():
+        first_targets[number - 1] = 0.0  # beyond the joints of a smaller robot
         first_targets[number - 1, :dof] = movements[0].target
     codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
     if len(codes) != len(task.goals):

@@ -10,24 +10,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from itertools import chain
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from coartic.learner.conditions import (
     CONDITIONS,
+    METHOD_PREFIX,
     MOST_NOISE,
     VARIANTS,
     EqualDistance,
     ExplorationCondition,
     FirstTrial,
-    Learned,
     State,
     Ties,
     UnknownTarget,
-    Update,
 )
-from coartic.learner.learning import CORRECTIONS, METHOD_PREFIX, TRIALS, LearningRun, learn_many
+from coartic.learner.learning import TRIALS, learn_many
+from coartic.learner.run import CORRECTIONS, LearningRun
 from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
 from coartic.motion.lanes import LANES
 from coartic.motion.solution import Movement
@@ -48,10 +48,17 @@ class DualProcessParameters(Parameters):
     equal_distance: EqualDistance = "random"
     first_trial: FirstTrial = "learns"
     unknown_target: UnknownTarget = "corrects"
-    update: Update = "greater"
     state: State = "previous-hand"
-    learned: Learned = "best"
     """What the paper leaves open (:class:`coartic.learner.conditions.ExplorationCondition`)."""
+    of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "best"}
+
+    @model_validator(mode="before")
+    @classmethod
+    def drop_old_parameters(cls, given: Any) -> Any:
+        """Drop what version 1.0 stored and is now fixed; another value is an unknown parameter."""
+        if not isinstance(given, dict):
+            return given
+        return {name: v for name, v in given.items() if cls.of_version_1.get(name) != v}
 
 
 class SubtaskParameters(DualProcessParameters):
@@ -59,8 +66,7 @@ class SubtaskParameters(DualProcessParameters):
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
     """γ of the return from a goal on; 0 is the reward of its own subtask alone."""
-    learned: Literal["replay"] = "replay"
-    """The best trial of the whole task is picked by a reward that it is not told."""
+    of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "replay"}
 
 
 class DualProcess(Method):
@@ -143,7 +149,8 @@ def _told(condition: ExplorationCondition) -> frozenset[Information]:
     return frozenset(told)
 
 
-def _method(condition: ExplorationCondition) -> type[DualProcess]:
+def method_for(condition: ExplorationCondition) -> type[DualProcess]:
+    """The learner under a condition as a method."""
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
     if condition.credit == "subtask":
@@ -172,5 +179,5 @@ def _method(condition: ExplorationCondition) -> type[DualProcess]:
 
 
 METHODS: tuple[type[DualProcess], ...] = tuple(
-    map(_method, chain(CONDITIONS.values(), VARIANTS.values()))
+    map(method_for, chain(CONDITIONS.values(), VARIANTS.values()))
 )

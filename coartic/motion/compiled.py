@@ -31,7 +31,7 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
 _KEPT_S = 30 * 24 * 3600.0
-_LONGEST_COMPILATION_S, _LOOK_S = 120.0, 0.05
+_LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -112,8 +112,7 @@ def lanewise(function: F) -> F:
 
 
 def for_any_number(dispatcher: Any) -> Any:
-    """Compile it once, not once more for a number whose value the compiler knows: ``count = 0``
-    before a loop is one."""
+    """The function, not compiled again for literal integers such as ``count = 0``."""
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda given, names: template(
         tuple(map(types.unliteral, given)), names
@@ -163,12 +162,12 @@ class MachineCode(FunctionCache):
             import fcntl
 
             file = open(f"{self.cache_path}/{self._py_func.__name__}.lock", "w")  # noqa: SIM115
-            for _ in range(round(_LONGEST_COMPILATION_S / _LOOK_S)):
+            for _ in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     self.lock = file
                     return True
-                time.sleep(_LOOK_S)
+                time.sleep(_RETRY_S)
             file.close()
         return False
 
@@ -194,7 +193,7 @@ def entry(function: F) -> F:
     return kernel
 
 
-def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
+def mangling_args(record: types.Record) -> tuple[str, tuple[int, ...]]:
     """A name of a record by what is in it."""
     return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
@@ -202,7 +201,7 @@ def mangled(record: types.Record) -> tuple[str, tuple[int, ...]]:
 # Machine code on disk calls functions by names that say their types. Numba names a record by its
 # number in the process that compiles, so a process that loads code of two such processes may call
 # one's function with the other's record. What is in the record is a name that holds everywhere.
-types.Record.mangling_args = property(mangled)
+types.Record.mangling_args = property(mangling_args)
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
@@ -251,11 +250,11 @@ def fill_row(row: Any, values: Any) -> None:
         row[j] = values[j]
 
 
-_chain = inner(chain)
+chain_by = inner(chain)
 joint_lever = inner(lever)
 
 
 @inner
 def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
     """:func:`coartic.robot.chain` with the kernels' cosine and sine."""
-    _chain(q, arm, xs, ys, cosine, sine)
+    chain_by(q, arm, xs, ys, cosine, sine)

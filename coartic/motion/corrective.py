@@ -12,7 +12,7 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, inlined, inner, joint_lever, lanewise
 from coartic.motion.lanes import (
     GOING,
@@ -21,17 +21,17 @@ from coartic.motion.lanes import (
     lanes_for,
     leave,
     near,
-    padded,
+    padded_count,
     place,
     runs_for,
     winding,
 )
-from coartic.motion.movement import checked_goal, configuration, largest_square
+from coartic.motion.movement import check_goal, configuration, largest_square
 from coartic.motion.trigonometry import LARGEST
 from coartic.robot import BASE_DOF, Array, Hand, Robot
 from coartic.text import short_repr
 
-_CONVERGED, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
+_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 
 
 class Corrector(NamedTuple):
@@ -61,12 +61,12 @@ class Correction(NamedTuple):
 def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
         fate = GOING if error < math.inf else _FAILED
-        at.fate[i] = _CONVERGED if error <= square else fate
+        at.fate[i] = _AT_GOAL if error <= square else fate
 
 
 @inlined
@@ -75,7 +75,7 @@ def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, 
     ended = 0
     far = 0
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         going = at.fate[i] == GOING
@@ -120,7 +120,7 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
                     continue
                 run = runs[at.run[lane]]
                 leave(at, lane, run.target)
-                run.converged = at.fate[lane] == _CONVERGED
+                run.converged = at.fate[lane] == _AT_GOAL
                 run.iterations = iteration + (at.fate[lane] == _STUCK)
                 run.evaluations += run.iterations + 1
                 count -= 1
@@ -189,9 +189,9 @@ def correct(
     run["target"][figures] = configuration(robot, q)
     correct_kernel(
         robot.arm(hand),
-        checked_goal(goal),
+        check_goal(goal),
         Corrector("x" not in locked_base, "y" not in locked_base),
-        checked_model(model),
+        check_model(model),
         lanes_for(robot),
         runs,
     )

@@ -22,7 +22,7 @@ from coartic.tasks.task import (
     Task,
     TaskLike,
     as_task,
-    checked_hands,
+    check_hands,
     hands_of,
     letters_of,
 )
@@ -62,7 +62,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Source: paper, section *The Corrective Process*.
     """
     task = as_task(task)
-    hands = checked_hands(task, hands)
+    hands = check_hands(task, hands)
     return execute(task, corrective_movements(hands), model=model)
 
 

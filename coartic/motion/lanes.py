@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.compiled import inlined, inner, lanewise, record_type
+from coartic.motion.compiled import chain_by, inlined, inner, lanewise, record_type
 from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
-from coartic.robot import BASE_DOF, Arm, Robot, chain
+from coartic.robot import BASE_DOF, Arm, Robot
 
 LANES = 72
 """Most lanes at once: they and their rows stay in the innermost cache."""
@@ -176,7 +176,7 @@ def fill(rows: Any, lane: int, last: int) -> None:
 
 
 @inner
-def padded(count: int) -> int:
+def padded_count(count: int) -> int:
     """Lanes in the vectors that hold ``count``: the last ones, of no run, are worked on as well.
 
     A loop over whole vectors leaves no lanes over that would be worked on one by one.
@@ -184,14 +184,11 @@ def padded(count: int) -> int:
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
-_chain = inner(chain)
-
-
 @lanewise
 def near(at: Any, count: int) -> bool:
-    """Whether all angles are surely small enough for the kernels' own cosine: by a bound."""
+    """Whether a bound shows that all angles are in the range of the fast cosine."""
     far = 0
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
     return far == 0
 
@@ -212,7 +209,7 @@ def chains_by(cos: Any, sin: Any) -> Any:
     def chains(at: Any, count: int) -> None:
         for i in range(count):
             arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
-            _chain(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
+            chain_by(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
 
     return chains
 
@@ -225,6 +222,6 @@ _far_chains = chains_by(cosine, sine)
 def place(at: Any, count: int, is_near: bool) -> None:
     """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
-        _near_chains(at, padded(count))
+        _near_chains(at, padded_count(count))
     else:
-        _far_chains(at, padded(count))
+        _far_chains(at, padded_count(count))

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.compiled import entry, fill_row, inner, lanewise
 from coartic.motion.lanes import (
@@ -32,7 +32,7 @@ from coartic.motion.lanes import (
     depart,
     fill,
     lanes_for,
-    padded,
+    padded_count,
     place,
     runs_for,
     winding,
@@ -47,8 +47,8 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_HIT, _MISSED = 1.0, 2.0  # fates of a lane
-LARGEST = 1e5  # of any entry of a configuration or goal, length unit or rad
+_IN_GOAL, _MISSED = 1.0, 2.0  # fates of a lane
+LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
 class Goal(NamedTuple):
@@ -110,9 +110,12 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @lanewise
 def set_off(at: Any, count: int, model: Any) -> bool:
-    """Rates, bounds and number of steps of every lane; whether all surely stay near."""
+    """Set rates, bounds and number of steps of every lane.
+
+    Returns True if all angles stay in the range of the fast cosine (:func:`near`).
+    """
     far = 0
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
         per_step = model.step / distance if distance > 0.0 else 0.0
         base_x = (at.target[0, i] - at.start[0, i]) * per_step
@@ -143,7 +146,7 @@ def set_off(at: Any, count: int, model: Any) -> bool:
 @lanewise
 def place_between(at: Any, count: int, model: Any) -> None:
     """The point at which each lane is now."""
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         fraction = at.step[i] * model.step / at.distance[i]
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
@@ -162,7 +165,7 @@ def look(
     """
     ended = 0
     tip = len(at.length)
-    for i in range(padded(count)):
+    for i in range(padded_count(count)):
         velocity_x = at.base_rate[0, i]
         velocity_y = at.base_rate[1, i]
         for k in range(tip):
@@ -182,7 +185,7 @@ def look(
             rim = model.arrival_tolerance + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
-        fate = _HIT if to_goal <= hit else fate
+        fate = _IN_GOAL if to_goal <= hit else fate
         early = (at.step[i] == 0.0) & (at.last[i] > 0.0)
         fate = GOING if model.first_step & early else fate
         # Every step up to step + clear is clear of both discs.
@@ -234,8 +237,8 @@ def move_lanes(
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
                 q[j] = target[j] if at_end else between
-            run.hit = at.fate[lane] == _HIT
-            run.ticks = int(at.step[lane]) + model.arrival_tick
+            run.hit = at.fate[lane] == _IN_GOAL
+            run.ticks = int(at.step[lane]) + 1
             run.evaluations += evaluations
             count -= 1
             fill(lanes.moved, lane, count)
@@ -308,9 +311,9 @@ def move(
     )
     move_kernel(
         robot.arm(hand),
-        checked_goal(goal, radius),
+        check_goal(goal, radius),
         stop_on_arrival,
-        checked_model(model),
+        check_model(model),
         lanes_for(robot),
         runs,
     )
@@ -337,7 +340,7 @@ def follow(
     for :func:`move`, whose readings of the first and the last step hold here too
     (:class:`coartic.model.MotionModel`). Raises ValueError for a wrong shape.
     """
-    checked_goal(goal, radius), checked_model(model)
+    check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
@@ -345,7 +348,7 @@ def follow(
     if model.first_step and last:
         inside = inside[inside > 0]
     k = int(inside[0]) if inside.size else last
-    return MoveResult(np.array(points[k]), k + model.arrival_tick, bool(inside.size), k + 1)
+    return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
@@ -373,17 +376,21 @@ def configuration(robot: Robot, q: Any) -> Array:
     array = np.array(q, dtype=np.float64)
     if array.shape != (robot.dof,):
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
-    if not (np.abs(array) <= LARGEST).all():
-        what = f"has a figure beyond {LARGEST:g}" if np.isfinite(array).all() else "is not finite"
+    if not (np.abs(array) <= LARGEST_ENTRY).all():
+        what = (
+            f"has a figure beyond {LARGEST_ENTRY:g}"
+            if np.isfinite(array).all()
+            else "is not finite"
+        )
         raise ValueError(f"configuration {array.tolist()} {what}")
     return array
 
 
-def checked_goal(centre: Any, radius: float = 0.0) -> Goal:
-    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST``."""
+def check_goal(centre: Any, radius: float = 0.0) -> Goal:
+    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
     x, y = float(centre[0]), float(centre[1])
-    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
-        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST:g}")
-    if not 0.0 <= radius <= LARGEST:
-        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST:g}")
+    if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
+        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
+    if not 0.0 <= radius <= LARGEST_ENTRY:
+        raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST_ENTRY:g}")
     return Goal(x, y, float(radius))

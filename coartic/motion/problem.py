@@ -9,7 +9,7 @@ import numpy as np
 from coartic.model import MotionModel
 from coartic.motion.compiled import inlined
 from coartic.motion.corrective import Corrector
-from coartic.motion.movement import Goal, checked_goal, configuration
+from coartic.motion.movement import Goal, check_goal, configuration
 from coartic.motion.penalty import Terms, terms_of
 from coartic.robot import Arm
 from coartic.tasks.task import Task
@@ -31,11 +31,11 @@ class Problem(NamedTuple):
 def problem_of(task: Task, model: MotionModel) -> Problem:
     """The task for a kernel.
 
-    Raises ValueError for a task that is none any more: a copy with changed fields is unchecked,
-    and kernels would read beyond their arrays.
+    Raises ValueError for an invalid task: a copy with changed fields is unchecked, and kernels
+    would read beyond their arrays.
     """
     locked = task.locked_base
-    goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
+    goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
     return Problem(
         start=configuration(task.robot, task.q0),
         goals=np.array(goals, dtype=np.float64),

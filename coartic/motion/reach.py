@@ -44,7 +44,7 @@ class Reached(NamedTuple):
     """Forward-kinematics evaluations reached."""
 
 
-class Arms(NamedTuple):
+class Requests(NamedTuple):
     """What the kernel reads: N arms in K groups, each to G goals in turn."""
 
     starts: Any  # (N, dof)
@@ -55,7 +55,7 @@ class Arms(NamedTuple):
     goals: Any  # (K, G, 2)
 
 
-class Rules(NamedTuple):
+class Setup(NamedTuple):
     """Robot, constants and options."""
 
     left: Any
@@ -67,7 +67,7 @@ class Rules(NamedTuple):
     looks: bool
 
 
-class Work(NamedTuple):
+class Batch(NamedTuple):
     """What a lot of arms works on, each now at the same goal."""
 
     runs: Any  # records: see runs_for
@@ -86,15 +86,15 @@ def is_empty(target: Any) -> bool:
 
 
 @inlined
-def set_targets(first: int, count: int, g: int, arms: Any, work: Any) -> None:
+def set_targets(first: int, count: int, g: int, arms: Any, batch: Any) -> None:
     """Set the targets; an arm without one stays where it is."""
     for i in range(count):
-        run, target = work.runs[i], arms.targets[first + i, g]
+        run, target = batch.runs[i], arms.targets[first + i, g]
         run.hit = False
         run.evaluations = 0
         fill_row(run.target, run.q)
-        work.aims[i] = work.going[i] and not is_empty(target)
-        if work.aims[i]:
+        batch.aims[i] = batch.going[i] and not is_empty(target)
+        if batch.aims[i]:
             for j in range(len(target)):
                 if not math.isnan(target[j]):
                     run.target[j] = target[j]
@@ -103,95 +103,95 @@ def set_targets(first: int, count: int, g: int, arms: Any, work: Any) -> None:
 
 @inner
 def move_acting(
-    first: int, count: int, g: int, goal: Any, stops: bool, arms: Any, rules: Any, work: Any
+    first: int, count: int, g: int, goal: Any, stops: bool, arms: Any, setup: Any, batch: Any
 ) -> None:
     """Move the acting arms to their targets."""
     lane = 0
     for i in range(count):
-        run = work.runs[i]
+        run = batch.runs[i]
         if run.acting:
             depart(
-                work.lanes.at, lane, i, run.q, run.target, arm_of(rules, arms.hands[first + i, g])
+                batch.lanes.at, lane, i, run.q, run.target, arm_of(setup, arms.hands[first + i, g])
             )
             lane += 1
     if lane > 0:
-        move_lanes(work.lanes, lane, goal, stops, rules.model, work.runs)
+        move_lanes(batch.lanes, lane, goal, stops, setup.model, batch.runs)
 
 
 @inlined
 def attempt(
-    first: int, count: int, g: int, goal: Any, arms: Any, rules: Any, reached: Any, work: Any
+    first: int, count: int, g: int, goal: Any, arms: Any, setup: Any, reached: Any, batch: Any
 ) -> None:
     """Move to the targets; see whether arms without one are in the goal already."""
     for stops in (True, False):
         for i in range(count):
-            aims = work.aims[i]
+            aims = batch.aims[i]
             # A movement to where an arm is tells whether it hits; it needs no other end.
-            needed = work.going[i] and (aims or rules.looks)
-            work.runs[i].acting = needed and (aims and arms.stops[first + i, g]) == stops
-        move_acting(first, count, g, goal, stops, arms, rules, work)
+            needed = batch.going[i] and (aims or setup.looks)
+            batch.runs[i].acting = needed and (aims and arms.stops[first + i, g]) == stops
+        move_acting(first, count, g, goal, stops, arms, setup, batch)
         for i in range(count):
-            if work.runs[i].acting and work.aims[i]:
-                reached.ticks[first + i, g] = work.runs[i].ticks
+            if batch.runs[i].acting and batch.aims[i]:
+                reached.ticks[first + i, g] = batch.runs[i].ticks
 
 
 @inlined
 def correct_missed(
-    first: int, count: int, g: int, goal: Any, arms: Any, rules: Any, reached: Any, work: Any
+    first: int, count: int, g: int, goal: Any, arms: Any, setup: Any, reached: Any, batch: Any
 ) -> None:
     """Have **A** finish what was missed."""
     lane = 0
     for i in range(count):
-        run = work.runs[i]
-        run.acting = work.going[i] and not run.hit
+        run = batch.runs[i]
+        run.acting = batch.going[i] and not run.hit
         if run.acting:
             fill_row(run.target, run.q)
-            board(work.lanes.at, lane, i, run.q, arm_of(rules, arms.hands[first + i, g]))
+            board(batch.lanes.at, lane, i, run.q, arm_of(setup, arms.hands[first + i, g]))
             lane += 1
-    correct_lanes(work.lanes, lane, goal, rules.corrector, rules.model, work.runs)
+    correct_lanes(batch.lanes, lane, goal, setup.corrector, setup.model, batch.runs)
     for i in range(count):
-        run = work.runs[i]
+        run = batch.runs[i]
         if run.acting:
             reached.iterations[first + i, g] = run.iterations
             run.acting = run.converged
             if run.converged:
                 reached.corrections[first + i, g] = 1
                 fill_row(reached.corrected[first + i, g], run.target)
-    move_acting(first, count, g, goal, rules.model.corrective_arrival, arms, rules, work)
+    move_acting(first, count, g, goal, setup.model.corrective_arrival, arms, setup, batch)
     for i in range(count):
-        if work.runs[i].acting:
-            reached.ticks[first + i, g] += work.runs[i].ticks
+        if batch.runs[i].acting:
+            reached.ticks[first + i, g] += batch.runs[i].ticks
 
 
 @inlined
 def reach_lot(
-    first: int, count: int, group: int, arms: Any, rules: Any, reached: Any, work: Any
+    first: int, count: int, group: int, arms: Any, setup: Any, reached: Any, batch: Any
 ) -> None:
-    """Arms of one group, as many as there is room for."""
+    """Requests of one group, as many as there is room for."""
     for i in range(count):
-        fill_row(work.runs[i].q, arms.starts[first + i])
-        work.going[i] = True
+        fill_row(batch.runs[i].q, arms.starts[first + i])
+        batch.going[i] = True
     for g in range(arms.goals.shape[1]):
-        goal = Goal(arms.goals[group, g, 0], arms.goals[group, g, 1], rules.radius)
-        set_targets(first, count, g, arms, work)
-        attempt(first, count, g, goal, arms, rules, reached, work)
-        if rules.corrects:
-            correct_missed(first, count, g, goal, arms, rules, reached, work)
+        goal = Goal(arms.goals[group, g, 0], arms.goals[group, g, 1], setup.radius)
+        set_targets(first, count, g, arms, batch)
+        attempt(first, count, g, goal, arms, setup, reached, batch)
+        if setup.corrects:
+            correct_missed(first, count, g, goal, arms, setup, reached, batch)
         for i in range(count):
-            if work.going[i]:
-                fill_row(reached.q[first + i, g], work.runs[i].q)
-                reached.hit[first + i, g] = work.going[i] = work.runs[i].hit
-                reached.evaluations[first + i, g] = work.runs[i].evaluations
+            if batch.going[i]:
+                fill_row(reached.q[first + i, g], batch.runs[i].q)
+                reached.hit[first + i, g] = batch.going[i] = batch.runs[i].hit
+                reached.evaluations[first + i, g] = batch.runs[i].evaluations
 
 
 @entry
-def reach_kernel(arms: Any, rules: Any, reached: Any, work: Any) -> None:
+def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
     """Every arm to its goals, each group of arms in lots."""
-    room = len(work.runs)
+    room = len(batch.runs)
     for group in range(len(arms.goals)):
         end = arms.bounds[group + 1]
         for first in range(arms.bounds[group], end, room):
-            reach_lot(first, min(room, end - first), group, arms, rules, reached, work)
+            reach_lot(first, min(room, end - first), group, arms, setup, reached, batch)
 
 
 def reach_in_turn(
@@ -225,13 +225,13 @@ def reach_in_turn(
     lot = max(min(largest, LANES), 1)
     free = ("x" not in locked_base, "y" not in locked_base)
     flags = np.zeros((2, lot), dtype=np.bool_)
-    reach_kernel(
-        Arms(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
-        Rules(
+    reach_goals(
+        Requests(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
+        Setup(
             robot.arm("left"), robot.arm("right"), radius, Corrector(*free), model, corrects, looks
         ),
         reached,
-        Work(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
+        Batch(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
     )
     return reached
 

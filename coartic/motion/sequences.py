@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.movement import LARGEST, configuration
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.movement import LARGEST_ENTRY, configuration
 from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_of
@@ -37,15 +37,15 @@ def corrective_trials(
 
     ``goals`` has shape ``(N, G, 2)``, length unit; those of the task itself do not matter, all
     else of it does. Sequences (``"RRLR"``) and sets of goals that begin alike are cheap. Raises
-    ValueError for a wrong shape, for figures that are not finite or beyond ``LARGEST``, and for
-    hands the robot does not have.
+    ValueError for a wrong shape, for figures that are not finite or beyond ``LARGEST_ENTRY``, and
+    for hands the robot does not have.
     """
-    checked_model(model, radius=task.radius)
+    check_model(model, radius=task.radius)
     places = np.array(goals, dtype=np.float64)
     if places.ndim != 3 or places.shape[2] != 2:
         raise ValueError(f"goals have shape {places.shape}; needed are (N, G, 2)")
-    if not (np.abs(places) <= LARGEST).all():
-        raise ValueError(f"a goal is not finite or lies beyond {LARGEST:g}")
+    if not (np.abs(places) <= LARGEST_ENTRY).all():
+        raise ValueError(f"a goal is not finite or lies beyond {LARGEST_ENTRY:g}")
     for hands in sequences:
         if len(hands) != places.shape[1] or not set(hands_of(hands)) <= set(task.hands):
             raise ValueError(

@@ -16,8 +16,8 @@ from typing import Literal
 import numpy as np
 
 from coartic.errors import SolutionError
-from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.movement import checked_goal, configuration, follow
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.movement import check_goal, configuration, follow
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, reach_in_turn
 from coartic.robot import HANDS, Array, Hand
@@ -178,7 +178,7 @@ def execute_many(
     :func:`execute` raises for such a solution. Raises ValueError for a model that no movement
     can be made with.
     """
-    checked_model(model, radius=task.radius)
+    check_model(model, radius=task.radius)
     runs: list[SolutionRun | Refused] = []
     for solution in solutions:
         try:
@@ -340,7 +340,7 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
         task.robot,
         np.array([run.q for run, _ in due]),
         np.array([[HANDS.index(movement.hand)] for _, movement in due]),
-        np.array([[checked_goal(task.goals[number - 1], task.radius)[:2]]]),
+        np.array([[check_goal(task.goals[number - 1], task.radius)[:2]]]),
         float(task.radius),
         targets,
         np.array(ends)[:, None],
@@ -370,7 +370,7 @@ def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, l
             )
         if of_goal and movement.hand != of_goal[0].hand:
             raise SolutionError(f"{where}: two hands for one goal")
-        of_goal.append(checked_movement(task, movement, where))
+        of_goal.append(check_movement(task, movement, where))
     wanted = list(range(1, len(task.goals) + 1))
     if [goal for goal, _ in groups] != wanted:
         given = [goal for goal, _ in groups]
@@ -378,7 +378,7 @@ def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, l
     return groups
 
 
-def checked_movement(task: Task, movement: Movement, where: str) -> Movement:
+def check_movement(task: Task, movement: Movement, where: str) -> Movement:
     """A movement that has what its kind needs and leads to configurations that the task allows; a
     path with its target. Raises SolutionError, which begins with ``where``."""
     if movement.kind not in KINDS:

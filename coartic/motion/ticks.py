@@ -29,9 +29,7 @@ class Trajectory:
     configurations: Array
     """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
     each control tick, the first one the start. A movement of k steps gives k + 1 rows, the last
-    one the tick that detects its end, so the row after it (the next movement's first) repeats it.
-    Under a model without that tick k steps give k rows and the start one of its own:
-    ``(ticks + 1, dof)``."""
+    one the tick that detects its end, so the next movement's first row repeats it."""
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
@@ -130,9 +128,8 @@ def trajectory(
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
-    unpaid = 1 - model.arrival_tick  # the point that a movement begins with
     q = np.array(task.q0)
-    rows = [q[None, :][:unpaid]]
+    rows = [q[None, :][:0]]
     elapsed = np.zeros(len(task.goals), dtype=np.int64)
     for movement in execution.movements:
         assert movement.ticks is not None
@@ -140,14 +137,14 @@ def trajectory(
         if movement.kind == "path":
             assert movement.waypoints is not None
             points = path_points(task.robot, q, movement.waypoints, model)
-            points = points[unpaid : unpaid + movement.ticks]
+            points = points[: movement.ticks]
         else:
-            points = line_points(q, movement.target, unpaid + movement.ticks, model)[unpaid:]
+            points = line_points(q, movement.target, movement.ticks, model)
         if len(points):
             q = points[-1]
             rows.append(points)
         elapsed[movement.goal - 1 :] += movement.ticks
-    hits = np.maximum(elapsed - model.arrival_tick, 0)
+    hits = np.maximum(elapsed - 1, 0)
     return Trajectory(task, execution, np.concatenate(rows), hits)
 
 

@@ -13,15 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, checked_model
-from coartic.motion.movement import LARGEST, checked_goal, configuration
+from coartic.model import PAPER, MotionModel, check_model
+from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import reach_in_turn
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_misfit, hands_of, letters_of
 
-Hands = str | Sequence[str] | NDArray[np.integer[Any]]
+HandSequences = str | Sequence[str] | NDArray[np.integer[Any]]
 """Hand sequences of N trials: one for all (``"RRLR"``), one each, or an array of shape ``(N, G)``
 of indices into HANDS (0 left, 1 right)."""
 
@@ -53,20 +53,22 @@ class Trials(NamedTuple):
         return np.where(self.completed, -(self.ticks + self.penalties), -np.inf)
 
 
-def make_trials(task: Task, hands: Hands, targets: Array, *, model: MotionModel = PAPER) -> Trials:
+def make_trials(
+    task: Task, hands: HandSequences, targets: Array, *, model: MotionModel = PAPER
+) -> Trials:
     """Make N trials, each from the start.
 
     ``targets`` has shape ``(N, G, dof)``, length unit (base) and rad (joints). A joint
     whose target is NaN keeps its value; for a goal without any target **A** acts alone.
     Raises ValueError for a wrong shape, for targets that are infinite or beyond
-    ``LARGEST``, for ones that move a locked base, and for hands the robot does not have.
+    ``LARGEST_ENTRY``, for ones that move a locked base, and for hands the robot does not have.
     """
-    checked_model(model, radius=task.radius)
-    given = _checked_targets(task, targets)
+    check_model(model, radius=task.radius)
+    given = check_targets(task, targets)
     count = len(given)
     starts = np.empty((count, task.robot.dof))
     starts[:] = configuration(task.robot, task.q0)
-    goals = [checked_goal(goal, task.radius)[:2] for goal in task.goals]
+    goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
     codes = hand_codes(task, hands, count)
     reached = reach_in_turn(
         task.robot,
@@ -103,7 +105,7 @@ def movements_of(hands: str, targets: Array) -> tuple[Movement, ...]:
     )
 
 
-def hand_codes(task: Task, hands: Hands, count: int) -> NDArray[np.int64]:
+def hand_codes(task: Task, hands: HandSequences, count: int) -> NDArray[np.int64]:
     """The hand of every trial and goal, shape ``(count, G)``, as indices into HANDS.
 
     Raises ValueError where they do not fit the task.
@@ -133,15 +135,15 @@ def hand_codes(task: Task, hands: Hands, count: int) -> NDArray[np.int64]:
     return rows
 
 
-def _checked_targets(task: Task, targets: Array) -> Array:
+def check_targets(task: Task, targets: Array) -> Array:
     """A copy of the targets; ValueError where they do not fit the task."""
     copy = np.array(targets, dtype=np.float64)
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
             f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
         )
-    if np.any(np.abs(copy) > LARGEST):
-        raise ValueError(f"a target has a number beyond {LARGEST:g}")
+    if np.any(np.abs(copy) > LARGEST_ENTRY):
+        raise ValueError(f"a target has a number beyond {LARGEST_ENTRY:g}")
     for coordinate in task.locked_base:
         column = copy[..., "xy".index(coordinate)]
         if np.any(~np.isnan(column) & (column != task.q0["xy".index(coordinate)])):

@@ -1,67 +1,105 @@
-"""What a suite asks for: its tasks, methods and cells, and which runs that makes."""
+"""The runs that a suite asks for, with their ids and seeds."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from coartic.model import MotionModel
+from coartic.runs.card import MethodCard
 from coartic.tasks.readings import load_readings, model_under
+from coartic.tasks.task import Task
 
-BUILT_IN = "built in"
-"""Origin of this project's methods."""
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
 _KEY = 16  # digits of a hash
 
 
 @dataclass(frozen=True)
-class DeclaredMethod:
-    """What a method declares of itself, and where it comes from."""
-
-    title: str
-    citation: str
-    told: tuple[str, ...]
-    secondary: tuple[str, ...]
-    stochastic: bool
-    """Whether the seed matters; the others are run once."""
-    defaults: dict[str, Any]
-    """Its parameters; None for one that has no default."""
-    origin: str
-    """``built in``, the distribution of a plug-in, or the path of a method file."""
-    code: str
-    """Hash of the code that its results come from."""
-
-
-@dataclass(frozen=True)
-class PlannedCell:
+class Cell:
     """One method with parameters on one task."""
 
-    task: str
-    method: str
-    variant: str
-    """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-    parameters: dict[str, Any]
-    """What the suite says of its parameters."""
-    complete: dict[str, Any]
-    """All of them."""
-    runs: int
+    task: Task
+    method: MethodCard
+    parameters: dict[str, Any] = field(default_factory=dict)
+    """The parameters that the suite sets."""
+    complete: dict[str, Any] = field(default_factory=dict)
+    """All parameters, once the cell is part of a plan."""
+    runs: int = 1
+
+    @property
+    def variant(self) -> str:
+        """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
+        return variant_of(self.parameters, self.method.defaults)
 
     @property
     def label(self) -> str:
         """The method with its variant."""
-        return label_of(self.method, self.variant)
+        return label_of(self.method.name, self.variant)
+
+
+class RunKey(NamedTuple):
+    """Which run it is."""
+
+    id: str
+    suite_seed: int
+    number: int
+    """From 0, within its cell."""
+    seed: int
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Everything that the results of a run depend on, apart from its seed."""
+
+    task: Task
+    method: str
+    code: str
+    """Hash of the method's code."""
+    told: tuple[str, ...]
+    parameters: dict[str, Any]
+    """All parameters of the method."""
+    model: MotionModel
+    trial_budget: int | None
+    """Most physical trials of one run."""
+
+    @cached_property
+    def definition(self) -> dict[str, Any]:
+        """The task as plain data."""
+        return self.task.model_dump(mode="json")
+
+    @cached_property
+    def asked(self) -> str:
+        """Hash of all this but the code.
+
+        A time limit is not part of it: it decides whether there is a result, not which.
+        """
+        return hash_of(
+            {
+                "task": self.definition,
+                "method": self.method,
+                "parameters": self.parameters,
+                "model": self.model._asdict() | {"arrival_tick": 1},  # a field of version 1.0
+                "trial_budget": self.trial_budget,
+            }
+        )
+
+    def key(self, suite_seed: int, number: int) -> RunKey:
+        """The key of a run: its id is a hash of what was asked for, then that of the code."""
+        text = f"{self.asked} {suite_seed} {number}"
+        run_id = f"{hashlib.sha256(text.encode()).hexdigest()[:_KEY]}-{self.code}"
+        return RunKey(run_id, suite_seed, number, run_seed(suite_seed, self.task.name, number))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a suite asks for, all of it."""
+    """All runs that a suite asks for."""
 
     suite: str
     seed: int
@@ -75,10 +113,17 @@ class Plan:
     """CPU time of one run."""
     trial_budget: int | None
     """Physical trials of one run."""
-    tasks: dict[str, dict[str, Any]]
-    """Definitions by name."""
-    methods: dict[str, DeclaredMethod]
-    cells: tuple[PlannedCell, ...]
+    cells: tuple[Cell, ...]
+
+    @cached_property
+    def tasks(self) -> dict[str, Task]:
+        """Tasks by name."""
+        return {cell.task.name: cell.task for cell in self.cells}
+
+    @cached_property
+    def methods(self) -> dict[str, MethodCard]:
+        """Methods by id."""
+        return {cell.method.name: cell.method for cell in self.cells}
 
     @cached_property
     def model(self) -> MotionModel:
@@ -91,37 +136,24 @@ class Plan:
         return sum(cell.runs for cell in self.cells)
 
     @cached_property
-    def asked(self) -> tuple[str, ...]:
-        """Of each cell a hash of everything that its results depend on, but for seeds and code.
-
-        The time limit is not part of it: it decides whether there is a result, not which.
-        """
+    def settings(self) -> tuple[Setting, ...]:
+        """The setting of each cell."""
         return tuple(
-            hash_of(
-                {
-                    "task": self.tasks[cell.task],
-                    "method": cell.method,
-                    "parameters": cell.complete,
-                    "model": self.model._asdict(),
-                    "trial_budget": self.trial_budget,
-                }
+            Setting(
+                task=cell.task,
+                method=cell.method.name,
+                code=cell.method.code,
+                told=cell.method.told,
+                parameters=cell.complete,
+                model=self.model,
+                trial_budget=self.trial_budget,
             )
             for cell in self.cells
         )
 
-    def run_ids(self, position: int) -> list[str]:
-        """Ids of the runs of the cell at this position, in their order."""
-        cell = self.cells[position]
-        code = self.methods[cell.method].code
-        return [
-            run_id(self.asked[position], self.seed, number, code) for number in range(cell.runs)
-        ]
-
-
-def run_id(asked: str, suite_seed: int, number: int, code: str) -> str:
-    """The id of a run: a hash of what was asked for, then that of the code."""
-    text = f"{asked} {suite_seed} {number}"
-    return f"{hashlib.sha256(text.encode()).hexdigest()[:_KEY]}-{code}"
+    def key(self, position: int, number: int) -> RunKey:
+        """The key of a run of the cell at this position."""
+        return self.settings[position].key(self.seed, number)
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:

@@ -3,8 +3,8 @@
 ``results`` has a row a run, ``movements`` a row a movement of its solutions, ``waypoints`` a row a
 waypoint of those that follow a path, ``learning`` the rewards of its trials. The views ``runs``,
 ``solutions`` and ``paths`` show what the last ``coartic run`` asked for, with names in place of
-numbers. docs/results.md lists the columns. One process writes, a lot of finished runs at a time;
-whatever interrupts it, a lot is there whole or not at all.
+numbers. docs/results.md lists the columns. One process writes, a batch of finished runs at a time;
+whatever interrupts it, a batch is there whole or not at all.
 """
 
 from __future__ import annotations
@@ -14,68 +14,31 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
-from coartic.learner.rows import movements_from
-from coartic.method import Meter
-from coartic.model import MotionModel
-from coartic.motion.solution import Movement
+from coartic.model import stored_model
 from coartic.robot import Array
-from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell, hash_of
-from coartic.tasks.task import Task, parse_task
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import Cell, Plan, Setting, hash_of
+from coartic.runs.run import PARTS, RESULTS, Run, movements_from
+from coartic.tasks.task import parse_task
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FILE = "runs.sqlite"
+RUNS_FILE = "runs.sqlite"
 FORMAT = 1
 """Raised when a table changes its meaning."""
 _APPLICATION = 0x636F6172  # "coar"
-FAILED = -(2**31)
+FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
 
-RESULTS = {
-    "run_id": "TEXT NOT NULL UNIQUE",
-    "setting": "INTEGER NOT NULL REFERENCES settings",
-    "suite_seed": "INTEGER NOT NULL",
-    "run": "INTEGER NOT NULL",  # number of the run, from 0
-    "seed": "INTEGER NOT NULL",
-    "status": "TEXT NOT NULL",  # ok, infeasible, solver-failed, timeout, crashed
-    "reason": "TEXT NOT NULL",  # empty where status is ok
-    "hands": "TEXT",  # of the solution, such as LRLR
-    "reward": "INTEGER",  # of the solution, executed and scored by the harness
-    "replay_reward": "INTEGER",  # one noiseless greedy trial with what was learned
-    "replay_hands": "TEXT",
-    "initial_reward": "INTEGER",  # trial 0 of a learner
-    "initial_hands": "TEXT",
-    "best_trial": "INTEGER",  # first trial with the solution's reward, if any
-    **dict.fromkeys(Meter.COUNTS, "INTEGER"),
-    "solution_corrections": "INTEGER",  # corrective movements the solution needed
-    "early_corrections": "INTEGER",  # in a learner's first tenth of trials after trial 0
-    "late_corrections": "INTEGER",  # in the last tenth
-    "other_arm_travel": "REAL",  # of the arm that is not chosen, rad
-    "proven_bound": "INTEGER",  # reward that no solution exceeds, where proven
-    "build_s": "REAL",
-    "solve_s": "REAL",
-    "wall_s": "REAL",
-    "cpu_s": "REAL",
-    "warm": "INTEGER",  # the process had run this method before
-    "together": "INTEGER",  # runs performed side by side; times are equal shares
-    "process_peak_mb": "REAL",  # of the worker so far, all its runs included
-    "time_limit_s": "REAL",
-    "date": "TEXT NOT NULL",
-    "environment": "INTEGER NOT NULL REFERENCES environments",
-    "used": "TEXT NOT NULL",  # what the method used of what it was told, comma-separated
-    "details": "TEXT NOT NULL",  # whatever the method keeps beside its solution, JSON
-    "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
-}
-"""Columns of table ``results`` beside its ``id``."""
 _DTYPES: dict[str, Any] = {
     **{
         name: {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64"}[kind.split()[0]]
@@ -135,47 +98,10 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     ORDER BY cells.position, results.run, "order", waypoint;
 """
 
+_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
+_METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
 _WAYPOINT = ("result_id", "order", "waypoint")
-PARTS = ("solution", "initial", "replay")
-"""What is kept of a run: its solution, the first trial of a learner, and one noiseless greedy
-trial with what it has learned."""
-
-
-@dataclass
-class Run:
-    """One run as it is stored."""
-
-    row: dict[str, Any]
-    """Its columns of table ``results``, but for ``setting``."""
-    environment: dict[str, Any]
-    """With what it was made: versions, platform, processor, threads, commit."""
-    movements: dict[str, tuple[Movement, ...]] = field(default_factory=dict)
-    """By part (:data:`PARTS`); those of a part that there is not are missing."""
-    rewards: list[int | None] = field(default_factory=list)
-    """Of each trial; None where it failed."""
-
-    @property
-    def run_id(self) -> str:
-        """Id of the run."""
-        return str(self.row["run_id"])
-
-    @property
-    def status(self) -> str:
-        """How it ended."""
-        return str(self.row["status"])
-
-
-class StoredRun(NamedTuple):
-    """A run with what was asked for."""
-
-    run: Run
-    task: Task
-    method: str
-    parameters: dict[str, Any]
-    model: MotionModel
-    trial_budget: int | None
-    code: str
 
 
 class Store:
@@ -184,8 +110,6 @@ class Store:
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
         self._db = connection
-        # Setting, method, and joints in their order.
-        self._cells: list[tuple[int, str, tuple[str, ...]]] = []
 
     def __enter__(self) -> Store:
         return self
@@ -193,7 +117,7 @@ class Store:
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._db.close()
         if isinstance(error, sqlite3.DatabaseError | zlib.error):
-            with explained(self.folder):
+            with explain_errors(self.folder):
                 raise error
 
     # What was asked for.
@@ -212,55 +136,28 @@ class Store:
         with self._writing():
             for table in ("suite", "tasks", "methods", "cells"):
                 self._db.execute(f"DELETE FROM {table}")
-            self._insert(
-                "suite",
-                {
-                    "name": plan.suite,
-                    "seed": plan.seed,
-                    "runs": plan.runs,
-                    "trials": plan.trials,
-                    "readings": plan.readings,
-                    "time_limit_s": plan.time_limit_s,
-                    "trial_budget": plan.trial_budget,
-                    "command": command,
-                    "date": date,
-                    "environment": self._environment(environment),
-                },
-            )
-            for name, definition in plan.tasks.items():
+            self._insert("suite", {
+                "name": plan.suite,
+                **{key: getattr(plan, key) for key in (*_SUITE, "readings")},
+                "command": command,
+                "date": date,
+                "environment": self._environment(environment),
+            })  # fmt: skip
+            for method in plan.methods.values():
+                self._insert("methods", {name: getattr(method, name) for name in _METHOD})
+            for position, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
+                self._insert("cells", {
+                    "position": position,
+                    "setting": self._setting(setting),
+                    "variant": cell.variant,
+                    "parameters": cell.parameters,
+                    "runs": cell.runs,
+                })  # fmt: skip
+            definitions = {setting.task.name: setting.definition for setting in plan.settings}
+            for name, definition in definitions.items():
                 self._insert("tasks", {"name": name, "definition": definition})
-            for name, method in plan.methods.items():
-                self._insert("methods", {"name": name, **asdict(method)})
-            joints = {
-                name: parse_task(task, name).robot.joint_names for name, task in plan.tasks.items()
-            }
-            self._cells.clear()
-            for position, cell in enumerate(plan.cells):
-                method = plan.methods[cell.method]
-                setting = {
-                    "asked": plan.asked[position],
-                    "code": method.code,
-                    "task": cell.task,
-                    "definition": plan.tasks[cell.task],
-                    "method": cell.method,
-                    "parameters": to_json(cell.complete, sort_keys=True),
-                    "model": plan.model._asdict(),
-                    "trial_budget": plan.trial_budget,
-                    "told": ", ".join(method.told),
-                }
-                number = self._id_of("settings", setting, "asked", "code")
-                self._cells.append((number, cell.method, joints[cell.task]))
-                self._insert(
-                    "cells",
-                    {
-                        "position": position,
-                        "setting": number,
-                        "variant": cell.variant,
-                        "parameters": cell.parameters,
-                        "runs": cell.runs,
-                    },
-                )
-            self._add_joints(dict.fromkeys(name for names in joints.values() for name in names))
+            robots = [task.robot for task in plan.tasks.values()]
+            self._add_joints(dict.fromkeys(name for robot in robots for name in robot.joint_names))
 
     def plan(self) -> Plan:
         """What was asked for last. Raises CoarticError where nothing was yet."""
@@ -268,31 +165,32 @@ class Store:
         if row is None:
             raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
         methods = {}
-        for method in self._db.execute("SELECT * FROM methods ORDER BY rowid"):
-            facts = dict(method)
-            name, told, secondary = (facts.pop(key) for key in ("name", "told", "secondary"))
-            methods[name] = DeclaredMethod(
-                **facts
-                | {"stochastic": bool(facts["stochastic"])}
-                | {"defaults": json.loads(facts["defaults"])},
-                told=tuple(json.loads(told)),
-                secondary=tuple(json.loads(secondary)),
-            )
-        tasks = self._db.execute("SELECT name, definition FROM tasks ORDER BY rowid")
+        for method in self._db.execute("SELECT * FROM methods"):
+            parts = {name: json.loads(method[name]) for name in ("told", "secondary", "defaults")}
+            methods[method["name"]] = MethodCard(
+                **dict(method) | parts
+                | {"told": tuple(parts["told"]), "secondary": tuple(parts["secondary"])}
+                | {"stochastic": bool(method["stochastic"])}
+            )  # fmt: skip
+        tasks = {
+            name: parse_task(json.loads(definition), str(self.folder))
+            for name, definition in self._db.execute("SELECT name, definition FROM tasks")
+        }
         cells = self._db.execute(
-            "SELECT task, method, variant, cells.parameters, settings.parameters AS complete, runs "
+            "SELECT task, method, cells.parameters, settings.parameters AS complete, runs "
             "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
         )
         return Plan(
             suite=row["name"],
-            **{key: row[key] for key in ("seed", "runs", "trials", "time_limit_s", "trial_budget")},
+            **{key: row[key] for key in _SUITE},
             readings=tuple(json.loads(row["readings"])),
-            tasks={name: json.loads(definition) for name, definition in tasks},
-            methods=methods,
             cells=tuple(
-                PlannedCell(
-                    **dict(cell)
-                    | {key: json.loads(cell[key]) for key in ("parameters", "complete")}
+                Cell(
+                    tasks[cell["task"]],
+                    methods[cell["method"]],
+                    json.loads(cell["parameters"]),
+                    json.loads(cell["complete"]),
+                    cell["runs"],
                 )
                 for cell in cells
             ),
@@ -332,51 +230,50 @@ class Store:
 
     # Runs, in and out.
 
-    def write(self, position: int, runs: Iterable[Run]) -> None:
-        """Keep finished runs of a cell together, all of them or none; they replace earlier ones.
+    def write(self, runs: Iterable[Run]) -> None:
+        """Keep finished runs together, all of them or none; they replace earlier ones.
 
         Raises CoarticError where the disk does not take them, or the tables a run.
         """
-        setting, method, joints = self._cells[position]
         with self._writing():
             for run in runs:
                 try:
-                    self._write_run(run, setting, joints)
+                    self._write_run(run)
                 except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
                     raise CoarticError(
-                        f"run {run.run_id} of method {method} cannot be stored: {error}"
+                        f"run {run.key.id} of method {run.setting.method} cannot be stored: {error}"
                     ) from None
 
-    def run(self, prefix: str) -> StoredRun:
+    def run(self, prefix: str) -> Run:
         """The one run whose id begins so. Raises CoarticError where there is none, or several."""
         ids = self.ids(prefix)
         if len(ids) != 1:
             raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs in {self.folder}")
         row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
-        setting = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
+        asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
+        setting = Setting(
+            task=parse_task(json.loads(asked["definition"]), str(self.folder)),
+            method=asked["method"],
+            code=asked["code"],
+            told=tuple(filter(None, asked["told"].split(", "))),
+            parameters=json.loads(asked["parameters"]),
+            model=stored_model(json.loads(asked["model"])),
+            trial_budget=asked["trial_budget"],
+        )
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
-        task = parse_task(json.loads(setting["definition"]), str(self.folder))
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
         paths = self._table("SELECT * FROM waypoints WHERE result_id = ?", row["id"])
-        parts = {
-            part: movements_from(task, movements[movements.part == part], paths) for part in PARTS
-        }
-        rewards = [] if blob is None else unpacked(blob["rewards"]).tolist()
-        run = Run(
-            {name: row[name] for name in RESULTS if name not in ("setting", "environment")},
+        rewards = [] if blob is None else unpack(blob["rewards"]).tolist()
+        return Run.from_row(
+            row,
+            setting,
             json.loads(environment["content"]),
-            {part: solution for part, solution in parts.items() if solution},
-            [None if reward == FAILED else reward for reward in rewards],
-        )
-        return StoredRun(
-            run,
-            task,
-            setting["method"],
-            json.loads(setting["parameters"]),
-            MotionModel(**json.loads(setting["model"])),
-            setting["trial_budget"],
-            setting["code"],
+            {
+                part: movements_from(setting.task, movements[movements.part == part], paths)
+                for part in PARTS
+            },
+            [None if reward == FAILED_TRIAL else reward for reward in rewards],
         )
 
     def ids(self, prefix: str) -> list[str]:
@@ -406,21 +303,24 @@ class Store:
             "ORDER BY cells.position, results.run"
         )
         for run_id, blob in rows:
-            stored = unpacked(blob)
-            yield run_id, np.where(stored == FAILED, np.nan, stored)
+            stored = unpack(blob)
+            yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
     # Inside.
 
-    def _write_run(self, run: Run, setting: int, joints: tuple[str, ...]) -> None:
+    def _write_run(self, run: Run) -> None:
         """Put a run into the tables, in place of an earlier one of its id."""
-        self._forget(run.run_id)
-        environment = self._environment(run.environment)
-        row = run.row | {"setting": setting, "environment": environment}
-        result = self._insert("results", row)
+        self._forget(run.key.id)
+        numbers = {
+            "setting": self._setting(run.setting),
+            "environment": self._environment(run.environment),
+        }
+        result = self._insert("results", run.to_row() | numbers)
+        joints = run.setting.task.robot.joint_names
         movements: list[tuple[Any, ...]] = []
         waypoints: list[tuple[Any, ...]] = []
-        for part, solution in run.movements.items():
-            for order, m in enumerate(solution):
+        for part, score in run.scores.items():
+            for order, m in enumerate(score.movements):
                 assert m.target is not None
                 facts = (result, part, order, m.goal, m.hand, m.kind, m.ticks)
                 movements.append((*facts, *m.target.tolist()))
@@ -429,7 +329,7 @@ class Store:
         self._insert_many("movements", (*_MOVEMENT, *joints), movements)
         self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
         if run.rewards:
-            stored = [FAILED if reward is None else reward for reward in run.rewards]
+            stored = [FAILED_TRIAL if reward is None else reward for reward in run.rewards]
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
 
@@ -441,7 +341,7 @@ class Store:
                 self._db.execute("BEGIN")
                 yield
         except sqlite3.OperationalError as error:
-            raise CoarticError(f"cannot write {self.folder / FILE}: {error}") from None
+            raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
         names = ", ".join(f'"{name}"' for name in row)
@@ -465,6 +365,20 @@ class Store:
         query = f"SELECT id FROM {table} WHERE {condition}"
         stored = self._one(query, *(row[key] for key in keys))
         return self._insert(table, row) if stored is None else int(stored["id"])
+
+    def _setting(self, setting: Setting) -> int:
+        row = {
+            "asked": setting.asked,
+            "code": setting.code,
+            "task": setting.task.name,
+            "definition": setting.definition,
+            "method": setting.method,
+            "parameters": to_json(setting.parameters, sort_keys=True),
+            "model": setting.model._asdict(),
+            "trial_budget": setting.trial_budget,
+            "told": ", ".join(setting.told),
+        }
+        return self._id_of("settings", row, "asked", "code")
 
     def _environment(self, content: dict[str, Any]) -> int:
         commit = content.get("commit")
@@ -512,14 +426,14 @@ def open_store(folder: Path) -> Store:
     Raises CoarticError for what is no results folder of this version, and while a suite is at
     work in it.
     """
-    path = folder / FILE
+    path = folder / RUNS_FILE
     if not folder.exists():
         raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not path.is_file():
-        raise CoarticError(f"{folder} is not a results folder: it has no {FILE}")
-    with explained(folder), opened(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
+        raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}")
+    with explain_errors(folder), connect(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
-        if not has_our_tables(connection, folder):
+        if not has_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
     return Store(folder, connection)
 
@@ -536,14 +450,14 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with explained(folder), opened(str(folder / FILE), 0.0) as connection:
-        has_our_tables(connection, folder)  # or it is left as it is
+    with explain_errors(folder), connect(str(folder / RUNS_FILE), 0.0) as connection:
+        has_tables(connection, folder)  # or it is left as it is
         # No write-ahead log: it is unsafe on network disks.
         connection.execute("PRAGMA journal_mode = DELETE")
         connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         connection.execute("BEGIN EXCLUSIVE")
         connection.execute("COMMIT")
-        if not has_our_tables(connection, folder):
+        if not has_tables(connection, folder):
             connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
     with Store(folder, connection) as store:
         yield store
@@ -554,14 +468,14 @@ def check_place(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
     visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
-    if not (folder / FILE).exists() and any(visible):
+    if not (folder / RUNS_FILE).exists() and any(visible):
         raise CoarticError(
             f"{folder} is not empty and holds no results of coartic. Choose another folder."
         )
 
 
 @contextmanager
-def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+def connect(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
     """A connection to a path or a ``file:`` address, which waits so long for a lock; it stays
     open, unless something is wrong with it."""
     connection = sqlite3.connect(
@@ -575,26 +489,27 @@ def opened(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
         raise
 
 
-def has_our_tables(connection: sqlite3.Connection, folder: Path) -> bool:
+def has_tables(connection: sqlite3.Connection, folder: Path) -> bool:
     """Whether the file has our tables; False for an empty one."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application == _APPLICATION and version != FORMAT:
         do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(
-            f"{folder / FILE} has format {version}; this version of coartic reads {FORMAT}: {do}"
+            f"{folder / RUNS_FILE} has format {version}; "
+            f"this version of coartic reads {FORMAT}: {do}"
         )
     if application != _APPLICATION:
         tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         if tables:
-            raise CoarticError(f"{folder / FILE} is not a file of coartic; move it away")
+            raise CoarticError(f"{folder / RUNS_FILE} is not a file of coartic; move it away")
         return False
     return True
 
 
 @contextmanager
-def explained(folder: Path) -> Iterator[None]:
-    """What SQLite says of a file, in words."""
+def explain_errors(folder: Path) -> Iterator[None]:
+    """Raises CoarticError for an error of SQLite."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -603,10 +518,10 @@ def explained(folder: Path) -> Iterator[None]:
                 f"another `coartic run` is at work in {folder}; wait for it, or choose another "
                 "folder"
             ) from None
-        raise CoarticError(f"cannot use {folder / FILE}: {error}") from None
+        raise CoarticError(f"cannot use {folder / RUNS_FILE}: {error}") from None
     except (sqlite3.DatabaseError, zlib.error) as error:
         raise CoarticError(
-            f"{folder / FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
+            f"{folder / RUNS_FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
             "command, or restore a copy."
         ) from None
 
@@ -616,6 +531,6 @@ def to_json(content: Any, *, sort_keys: bool = False) -> str:
     return json.dumps(content, ensure_ascii=False, sort_keys=sort_keys)
 
 
-def unpacked(blob: bytes) -> NDArray[np.int32]:
-    """Rewards of all trials as they are stored: those that failed are :data:`FAILED`."""
+def unpack(blob: bytes) -> NDArray[np.int32]:
+    """Rewards of all trials as they are stored: those that failed are :data:`FAILED_TRIAL`."""
     return np.frombuffer(zlib.decompress(blob), dtype="<i4")

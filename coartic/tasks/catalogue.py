@@ -82,10 +82,9 @@ def members(task: str) -> dict[str, Task]:
     """The members of a task by their names as tasks, in order; none where it has none.
 
     ``members/TASK.csv`` has a row a member: its goals, and its figures beside the printed ones
-    (made by ``coartic paper goals``; docs/reconstruction.md). A member is a task by the name
-    ``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 has the goals of the task itself. Members
-    with other names come from earlier searches. v0.1 is what the task was in the first release, and
-    is not admitted.
+    (made by ``docs/scripts/reconstruct.py``; docs/reconstruction.md). A member is a task by the
+    name ``TASK-MEMBER``, such as ``two-armed-1-m017``; m001 has the goals of the task itself.
+    Members with other names come from earlier searches.
     """
     if task not in with_members():
         return {}
@@ -105,3 +104,11 @@ def members(task: str) -> dict[str, Task]:
 def task_of(name: str) -> str | None:
     """The task that a member is of, by the member's name; None for what is no member."""
     return next((task for task in with_members() if name in members(task)), None)
+
+
+def is_admitted(member: str) -> bool:
+    """Whether a member's goals give everything that is printed of the corrective process alone.
+
+    Only v0.1 is not admitted, which has the goals of the first release.
+    """
+    return not member.endswith("-v0.1")

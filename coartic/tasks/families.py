@@ -21,7 +21,6 @@ import json
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -29,10 +28,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, FileData, problems, read_toml, sentence
+from coartic.inputs import MOST_CELLS, FileData, error_saying, problems, read_toml
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
-from coartic.tasks.philox import Draws, key_of
+from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (
     INITIAL_POLICIES,
     Address,
@@ -46,8 +45,6 @@ from coartic.text import Line, counted, unknown
 FAMILY_FOLDER = Path(__file__).parent / "families"
 MOST_ATTEMPTS = 10_000
 """Draws of one instance; a family that needs more cannot be used."""
-CORRECTIVE = "corrective"
-"""The rule that needs a trial."""
 Base = Literal["free", "rail", "locked"]
 LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "free": (),
@@ -65,16 +62,16 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 def in_thousandths(value: float) -> int:
     """A number of up to three decimals as a whole number of thousandths."""
     if round(value * _PARTS) / _PARTS != value:
-        raise sentence(f"{value} should have at most three decimals")
+        raise error_saying(f"{value} should have at most three decimals")
     return round(value * _PARTS)
 
 
-Parts = Annotated[int, BeforeValidator(in_thousandths)]
+Thousandths = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
-Span = tuple[Parts, Parts]
+Span = tuple[Thousandths, Thousandths]
 """From, to; every thousandth between as likely."""
-_Goals = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=_MOST_GOALS)]
-_Links = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
+_Count = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=_MOST_GOALS)]
+_PerArm = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
 _Bases = tuple[Base, ...]
 
 
@@ -134,17 +131,17 @@ class Family(FileData):
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals; the robot has both arms anyway."""
-    goals: tuple[_Goals, _Goals]
+    goals: tuple[_Count, _Count]
     """How many there are, from, to; each number as likely."""
-    links: tuple[_Links, _Links]
+    links: tuple[_PerArm, _PerArm]
     """How many each of both arms has, from, to; they have one length (to a thousandth)."""
-    reach: Parts = 4 * _PARTS
+    reach: Thousandths = 4 * _PARTS
     """Sum of an arm's links, length unit; the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
     """One is drawn: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
     """Bases, beside its own, under which every instance can be done."""
-    radius: Parts = 100
+    radius: Thousandths = 100
     """Of every goal, length unit."""
     region: Region
     """Where goals are: table ``[region]``."""
@@ -154,137 +151,22 @@ class Family(FileData):
     """Postures of which one is drawn: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
     """How the hands of trial 0 are found; the instance names them."""
-    apart: Parts = 300
+    apart: Thousandths = 300
     """Least distance between the centres of two goals, length unit."""
-    clear: Parts = 200
+    clear: Thousandths = 200
     """Least distance of a hand at the start from a goal's rim, length unit."""
-    within: Parts = 950
+    within: Thousandths = 950
     """Share of the reach within which goals are, where the base cannot come nearer."""
-    bent: Parts = 200
+    bent: Thousandths = 200
     """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """What was drawn, before any rule has seen it; figures in thousandths."""
+def draft(family: Family, address: Address, attempt: int) -> Task:
+    """The task drawn for an instance at the given attempt, from 0, before any rule has seen it.
 
-    family: Family
-    links: int
-    base: Base
-    goals: tuple[tuple[int, int], ...]
-    angles: dict[Hand, tuple[int, ...]]
-
-    def content(self) -> dict[str, Any]:
-        """Of the task file, but for what only an accepted instance has."""
-        # Links of one length, where that can be, else the first ones a thousandth longer.
-        length, longer = divmod(self.family.reach, self.links)
-        links = [(length + (k < longer)) / _PARTS for k in range(self.links)]
-        return {
-            "name": "candidate",
-            "hands": list(self.family.hands),
-            "goals": [[x / _PARTS, y / _PARTS] for x, y in self.goals],
-            "radius": self.family.radius / _PARTS,
-            "locked_base": list(LOCKED[self.base]),
-            "initial_hands": self.family.initial_hands,
-            "start": {
-                "base": [0.0, 0.0],
-                **{hand: [angle / _PARTS for angle in self.angles[hand]] for hand in HANDS},
-            },
-            "robot": {"left_links": links, "right_links": links},
-        }
-
-    def task(self, base: Base | None = None) -> Task:
-        """The task that it would be, with its base or another one, whatever can be reached."""
-        content = self.content() | {"locked_base": list(LOCKED[base or self.base])}
-        return parse_task(content, f"family {self.family.name}", reach=False)
-
-
-def goal_outside(candidate: Candidate) -> bool:
-    """Whether a goal of the line, or off it, is outside the region."""
-    (left, right), (low, high) = candidate.family.region.x, candidate.family.region.y
-    return not all(left <= x <= right and low <= y <= high for x, y in candidate.goals)
-
-
-def goals_overlap(candidate: Candidate) -> bool:
-    """Whether two goals are nearer to each other than the family lets them be."""
-    return any(
-        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 < candidate.family.apart**2
-        for a, b in itertools.combinations(candidate.goals, 2)
-    )
-
-
-def goal_out_of_reach(candidate: Candidate) -> bool:
-    """Whether a hand cannot come near enough to a goal, with the base as it is locked."""
-    family, farthest = candidate.family, candidate.family.reach * candidate.family.within
-    for base in (candidate.base, *family.restrictions):
-        fixed = ["xy".index(axis) for axis in LOCKED[base]]
-        for hand in family.hands:
-            arm = Robot().arm(hand)
-            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
-            for goal in candidate.goals:
-                square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in fixed)
-                if square * _PARTS**2 > farthest**2:
-                    return True
-    return False
-
-
-def starts_in_goal(candidate: Candidate) -> bool:
-    """Whether a hand is in a goal at the start, or close by."""
-    from coartic.motion.movement import move
-
-    task, family = candidate.task(), candidate.family
-    near = (family.radius + family.clear) / _PARTS
-    return any(
-        move(task.robot, task.q0, task.q0, hand, goal, near).hit
-        for hand in task.hands
-        for goal in task.goals
-    )
-
-
-def starts_straight(candidate: Candidate) -> bool:
-    """Whether an arm is straight at the start, or nearly."""
-    return any(
-        max(map(abs, candidate.angles[hand][1:])) < candidate.family.bent
-        for hand in candidate.family.hands
-    )
-
-
-RULES: dict[str, Callable[[Candidate], bool]] = {
-    "outside": goal_outside,
-    "overlap": goals_overlap,
-    "reach": goal_out_of_reach,
-    "straight": starts_straight,
-    "start-hit": starts_in_goal,
-}
-"""What no instance may be, in the order in which it is asked; then comes :data:`CORRECTIVE`."""
-
-
-def judged(candidate: Candidate) -> tuple[str | None, str]:
-    """The first rule that a candidate breaks, and the initial hands of one that breaks none."""
-    for rule, breaks in RULES.items():
-        if breaks(candidate):
-            return rule, ""
-    hands = corrective_hands(candidate)
-    return (CORRECTIVE, "") if hands is None else (None, hands)
-
-
-def corrective_hands(candidate: Candidate) -> str | None:
-    """With which the corrective process does the task under every restriction, or None."""
-    from coartic.motion.initial import corrective_trial, initial_hands
-
-    try:
-        hands = initial_hands(candidate.task(), model=PAPER)
-    except NotApplicableError:
-        return None
-    others = (candidate.task(base) for base in candidate.family.restrictions)
-    done = all(corrective_trial(other, hands, model=PAPER).completed for other in others)
-    return hands if done else None
-
-
-def candidate_of(address: Address, attempt: int) -> Candidate:
-    """What is drawn for an instance at the given attempt, from 0. Raises TaskError."""
-    family = load_family(address.family)
-    key = key_of(f"coartic {family.name}/{address.stream}")
+    It may be out of reach. Its initial hands are the family's policy.
+    """
+    key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
     count, links = structure.integer(*family.goals), structure.integer(*family.links)
     base, postures = structure.one_of(family.base), structure.one_of(family.start)
@@ -293,12 +175,109 @@ def candidate_of(address: Address, attempt: int) -> Candidate:
     goals = scattered_goals(draws, family.region, count)
     if family.line is not None:
         goals = aligned_goals(draws, family.region, family.line, count, vertical)
-    angles: dict[Hand, tuple[int, ...]] = {}
-    for hand in HANDS:
-        posture = postures.left if hand == "left" else postures.right
+    # Links of one length, where that can be, else the first ones a thousandth longer.
+    length, longer = divmod(family.reach, links)
+    lengths = [(length + (k < longer)) / _PARTS for k in range(links)]
+    start: dict[str, Any] = {}
+    for hand, posture in (("left", postures.left), ("right", postures.right)):
         spans = [posture.first, *[posture.others] * (links - 1)]
-        angles[hand] = tuple(draws.integer(*span) for span in spans)
-    return Candidate(family, links, base, tuple(goals), angles)
+        start[hand] = [draws.integer(*span) / _PARTS for span in spans]
+    content = {
+        "name": str(address),
+        "hands": list(family.hands),
+        "goals": [[x / _PARTS, y / _PARTS] for x, y in goals],
+        "radius": family.radius / _PARTS,
+        "locked_base": list(LOCKED[base]),
+        "initial_hands": family.initial_hands,
+        "start": start,
+        "robot": {"left_links": lengths, "right_links": lengths},
+    }
+    return parse_task(content, f"family {family.name}", reach=False)
+
+
+def with_base(task: Task, base: Base) -> Task:
+    """The task with its base free, on a rail or locked, whatever can be reached."""
+    return task.model_copy(update={"locked_base": LOCKED[base]})
+
+
+def places(task: Task) -> list[tuple[int, int]]:
+    """Goals of a draft in thousandths."""
+    return [(in_thousandths(x), in_thousandths(y)) for x, y in task.goals]
+
+
+def goal_outside(family: Family, task: Task) -> bool:
+    """Whether a goal of the line, or off it, is outside the region."""
+    (left, right), (low, high) = family.region.x, family.region.y
+    return not all(left <= x <= right and low <= y <= high for x, y in places(task))
+
+
+def goals_overlap(family: Family, task: Task) -> bool:
+    """Whether two goals are nearer to each other than the family lets them be."""
+    return any(
+        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 < family.apart**2
+        for a, b in itertools.combinations(places(task), 2)
+    )
+
+
+def goal_out_of_reach(family: Family, task: Task) -> bool:
+    """Whether a hand cannot come near enough to a goal, with the base as it is locked."""
+    farthest = family.reach * family.within
+    for locked in (task.locked_base, *(LOCKED[base] for base in family.restrictions)):
+        fixed = ["xy".index(axis) for axis in locked]
+        for hand in family.hands:
+            arm = task.robot.arm(hand)
+            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
+            for goal in places(task):
+                square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in fixed)
+                if square * _PARTS**2 > farthest**2:
+                    return True
+    return False
+
+
+def starts_straight(family: Family, task: Task) -> bool:
+    """Whether an arm is straight at the start, or nearly."""
+    arms = [task.start.left if hand == "left" else task.start.right for hand in family.hands]
+    return any(max(abs(in_thousandths(angle)) for angle in arm[1:]) < family.bent for arm in arms)
+
+
+def starts_in_goal(family: Family, task: Task) -> bool:
+    """Whether a hand is in a goal at the start, or close by."""
+    from coartic.motion.movement import move
+
+    near = (family.radius + family.clear) / _PARTS
+    return any(
+        move(task.robot, task.q0, task.q0, hand, goal, near).hit
+        for hand in task.hands
+        for goal in task.goals
+    )
+
+
+def correction_fails(family: Family, task: Task) -> bool:
+    """Whether the corrective process cannot do the task, or not under some restriction."""
+    from coartic.motion.initial import corrective_trial, initial_hands
+
+    try:
+        hands = initial_hands(task, model=PAPER)
+    except NotApplicableError:
+        return True
+    others = (with_base(task, base) for base in family.restrictions)
+    return not all(corrective_trial(other, hands, model=PAPER).completed for other in others)
+
+
+RULES: dict[str, Callable[[Family, Task], bool]] = {
+    "outside": goal_outside,
+    "overlap": goals_overlap,
+    "reach": goal_out_of_reach,
+    "straight": starts_straight,
+    "start-hit": starts_in_goal,
+    "corrective": correction_fails,
+}
+"""What no instance may be, in the order in which it is asked."""
+
+
+def broken_rule(family: Family, task: Task) -> str | None:
+    """The first rule that a draft breaks; None for a good one."""
+    return next((rule for rule, breaks in RULES.items() if breaks(family, task)), None)
 
 
 def scattered_goals(draws: Draws, region: Region, count: int) -> list[tuple[int, int]]:
@@ -330,42 +309,47 @@ def aligned_goals(
     return list(pairs)
 
 
-@lru_cache(maxsize=4096)
-def drawn(address: Address) -> tuple[Task, tuple[str, ...]]:
-    """The instance at an address, and the rules that earlier attempts broke, in order.
+def first_good(
+    family: Family, address: Address, most: int = MOST_ATTEMPTS
+) -> tuple[Task, tuple[str, ...]]:
+    """The first draft that breaks no rule, and the rules that those before it broke, in order.
 
-    Raises TaskError where there is none.
+    Raises TaskError where there is none among the first ``most``.
     """
-    family = load_family(address.family)
     rejected: list[str] = []
-    while len(rejected) < MOST_ATTEMPTS:
-        candidate = candidate_of(address, len(rejected))
-        rule, hands = judged(candidate)
+    while len(rejected) < most:
+        task = draft(family, address, len(rejected))
+        rule = broken_rule(family, task)
         if rule is None:
-            return named_task(address, candidate, hands), tuple(rejected)
+            return task, tuple(rejected)
         rejected.append(rule)
-    most, times = Counter(rejected).most_common(1)[0]
+    rule, times = Counter(rejected).most_common(1)[0]
     raise TaskError(
-        f"{address}: {MOST_ATTEMPTS:_} draws of family {family.name!r} broke a rule, {times:_} of "
-        f"them {most!r}"
+        f"{address}: {most:_} draws of family {family.name!r} broke a rule, {times:_} of "
+        f"them {rule!r}"
     )
 
 
-def named_task(address: Address, candidate: Candidate, hands: str) -> Task:
-    """The task of an accepted candidate, with its name, initial hands and provenance."""
-    name, family = str(address), candidate.family
+@lru_cache(maxsize=4096)
+def instance_at(address: Address) -> Task:
+    """The instance at an address, with its initial hands. Raises TaskError where there is none."""
+    from coartic.motion.initial import initial_hands
+
+    family = load_family(address.family)
+    task, _ = first_good(family, address)
+    name = str(address)
     short = name.rpartition("/")[2]
     source = f"drawn: family {family.name}, instance {short}"
     chosen = ["goals", "start", "initial_hands"]
-    chosen += ["locked_base"] * bool(LOCKED[candidate.base])
-    chosen += ["robot"] * (candidate.task().robot != Robot())
-    base = {"free": "a free base", "rail": "the base on a rail", "locked": "the base locked"}
-    content = candidate.content() | {
-        "name": name,
+    chosen += ["locked_base"] * bool(task.locked_base)
+    chosen += ["robot"] * (task.robot != Robot())
+    base = {0: "a free base", 1: "the base on a rail", 2: "the base locked"}[len(task.locked_base)]
+    links = len(task.robot.left_links)
+    content = task.model_dump() | {
         "title": f"{family.title} {short}",
-        "description": f"{counted(len(candidate.goals), 'goal')}, {candidate.links} links an arm, "
-        f"{base[candidate.base]}: drawn from family {family.name}.",
-        "initial_hands": hands,
+        "description": f"{counted(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
+        f"from family {family.name}.",
+        "initial_hands": initial_hands(task, model=PAPER),
         "provenance": {key: {"status": "chosen", "source": source} for key in chosen},
     }
     return parse_task(content, name)
@@ -379,7 +363,7 @@ def instance(name: str) -> Task:
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return drawn(address)[0]
+    return instance_at(address)
 
 
 def check_instance(task: Task, source: str) -> None:
@@ -392,7 +376,7 @@ def check_instance(task: Task, source: str) -> None:
         )
 
 
-def names_in(text: str) -> list[str]:
+def instances_in(text: str) -> list[str]:
     """Names of the instances from one to another: ``two-armed/v1/i000..i039``.
 
     Raises TaskError for what is no such range, or one of more than :data:`MOST_CELLS`.
@@ -414,12 +398,12 @@ def names_in(text: str) -> list[str]:
 
 
 def named_by(text: str) -> list[str]:
-    """What a name stands for where several may: instances for a range of them, else itself."""
+    """Names of the instances of a range, or the name itself."""
     is_range = "/" in text and ".." in text and not text.endswith(".toml")
-    return names_in(text) if is_range else [text]
+    return instances_in(text) if is_range else [text]
 
 
-def families() -> dict[str, Family]:
+def shipped_families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
     return {
         family_name(path): read_family(path) for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))
@@ -427,13 +411,13 @@ def families() -> dict[str, Family]:
 
 
 def family_name(path: Path) -> str:
-    """Of a file, ``two-armed.v1.toml``, the name of its family, ``two-armed/v1``."""
+    """Name of the family in a file: ``two-armed/v1`` for ``two-armed.v1.toml``."""
     return "/".join(path.stem.rsplit(".", 1))
 
 
 def load_family(name: str) -> Family:
     """A family by name with version, as ``two-armed/v1``. Raises TaskError."""
-    shipped = families()
+    shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))
     return shipped[name]

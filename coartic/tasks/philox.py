@@ -35,7 +35,7 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
     return a, b, c, d
 
 
-def key_of(name: str) -> tuple[int, int]:
+def hash_key(name: str) -> tuple[int, int]:
     """The key that a name stands for: the first 64 bits of its SHA-256."""
     digest = hashlib.sha256(name.encode()).digest()
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")

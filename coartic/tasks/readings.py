@@ -1,8 +1,7 @@
 """What the paper leaves open, and what is chosen here (``readings.toml``).
 
 A reading is one open question with the choices that the text allows, the default among them.
-Each is applied to one field: of the motion model, of the exploration condition or of the task's
-robot.
+Each is applied to one field, of the motion model or of the exploration condition.
 """
 
 from __future__ import annotations
@@ -17,15 +16,26 @@ from pydantic import Field, TypeAdapter
 from coartic.errors import CoarticError
 from coartic.inputs import FileData, brief, brief_value, read_toml
 from coartic.model import PAPER, MotionModel
-from coartic.tasks.task import Task, parse_task
 from coartic.text import did_you_mean, unknown
+
+REFUTED = {
+    "arrival-tolerance=0.1",
+    "correction-tolerance=0.099",
+    "arrival-tick=0",
+    "shoulder-height=0.0",
+    "shoulder-height=-0.1",
+    "learned-reward=replay",
+    "update=not-less",
+}
+"""Readings of version 1.0.0 that left the code: the printed results refute them
+(``analysis/reconstruction/readings.csv``)."""
 
 
 class Choice(FileData):
     """One way to read the text."""
 
-    value: bool | int | float | str
-    """Of the parameter; lengths in the model's length unit."""
+    value: bool | str
+    """Value of the parameter."""
     says: str
     """What it means, in a line."""
     printed: bool = False
@@ -33,17 +43,8 @@ class Choice(FileData):
 
     @property
     def written(self) -> str:
-        """The value as it is written after a reading's id: ``0.1``, ``true``, ``left``."""
+        """The value as it is written after a reading's id: ``true``, ``left``."""
         return str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
-
-    def is_meant_by(self, text: str) -> bool:
-        """Whether a text is the value; a number may be written in any way."""
-        if isinstance(self.value, bool | str):
-            return text == self.written
-        try:
-            return float(text) == self.value
-        except ValueError:
-            return False
 
 
 class Reading(FileData):
@@ -55,7 +56,7 @@ class Reading(FileData):
     """What the text says nearest to it."""
     place: str
     """Section or figure of the quote."""
-    parameter: Annotated[str, Field(pattern=r"^(model|condition|robot)\.[a-z_]+$")]
+    parameter: Annotated[str, Field(pattern=r"^(model|condition)\.[a-z_]+$")]
     """Where it is applied: part and field."""
     default: Choice
     alternatives: tuple[Choice, ...]
@@ -64,7 +65,7 @@ class Reading(FileData):
 
     @property
     def part(self) -> str:
-        """What has the field: ``model``, ``condition`` or ``robot``."""
+        """``model`` or ``condition``."""
         return self.parameter.partition(".")[0]
 
     @property
@@ -109,11 +110,16 @@ def load_reading(text: str) -> ChosenReading:
         raise CoarticError(
             f"reading {brief_value(text)}: write it as NAME=VALUE, such as ties=right"
         )
+    if f"{name}={value}" in REFUTED:
+        raise CoarticError(
+            f"reading {name}={value} is refuted by the printed results and is no longer here. "
+            "Version 1.0.0 of coartic has it."
+        )
     if name not in by_id:
         raise CoarticError(unknown("reading", brief(name), by_id))
     reading = by_id[name]
     for choice in reading.choices:
-        if choice.is_meant_by(value):
+        if choice.written == value:
             return ChosenReading(reading, choice)
     values = [choice.written for choice in reading.choices]
     raise CoarticError(
@@ -141,7 +147,7 @@ def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
 
 
 def fields_under(chosen: Iterable[ChosenReading], part: str) -> dict[str, Any]:
-    """Fields of the model, a condition or a robot that these readings set."""
+    """Fields of the model or of a condition that these readings set."""
     return {reading.field: choice.value for reading, choice in chosen if reading.part == part}
 
 
@@ -153,14 +159,3 @@ def model_under(chosen: Iterable[ChosenReading]) -> MotionModel:
 def condition_under(chosen: Iterable[ChosenReading]) -> dict[str, Any]:
     """Fields of an exploration condition, and parameters of the learner, that they change."""
     return fields_under(chosen, "condition")
-
-
-def task_under(chosen: Iterable[ChosenReading], task: Task) -> Task:
-    """A task with the robot that these readings have; TaskError where it then is none."""
-    height = fields_under(chosen, "robot").get("shoulder_height")
-    if height is None:
-        return task
-    content = task.model_dump(mode="json")
-    for side in ("left_shoulder", "right_shoulder"):
-        content["robot"][side][1] = height
-    return parse_task(content, f"task {task.name!r} with shoulders at {height:g}")

@@ -26,8 +26,8 @@ from pydantic import (
 )
 
 from coartic.errors import TaskError
-from coartic.inputs import FileData, brief_value, problems, read_toml, sentence
-from coartic.model import PAPER, MotionModel, checked_model
+from coartic.inputs import FileData, brief_value, error_saying, problems, read_toml
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, counted, did_you_mean, short_repr
 
@@ -204,8 +204,8 @@ class Task(FileData):
         return copied
 
     @model_serializer(mode="wrap")
-    def _without_what_is_none(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # ``penalty`` only where there is one, so that hashes of other tasks stay.
+    def _serialise(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Omit a missing penalty, so that old hashes do not change.
         content: dict[str, Any] = write(self)
         if self.penalty is None:
             content.pop("penalty", None)
@@ -241,10 +241,10 @@ class Task(FileData):
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Task:
         if (problem := next(contradictions(self), None)) is not None:
-            raise sentence(problem)
-        # No model's corrective process ends farther from a goal than its rim (checked_task).
+            raise error_saying(problem)
+        # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
-            raise sentence(far)
+            raise error_saying(far)
         return self
 
     def __repr__(self) -> str:
@@ -290,7 +290,7 @@ def hands_misfit(task: Task, hands: object) -> str:
     )
 
 
-def checked_hands(task: Task, hands: str) -> str:
+def check_hands(task: Task, hands: str) -> str:
     """The hand sequence itself; ValueError where it does not fit the task."""
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
     if not fits or not set(hands) <= set(letters_of(task.hands)):
@@ -364,13 +364,13 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
     return max(distance - far, inside) - tolerance
 
 
-def checked_task(task: Task, model: MotionModel = PAPER) -> Task:
+def check_task(task: Task, model: MotionModel = PAPER) -> Task:
     """The task itself; TaskError where a model's corrective process cannot do it.
 
     Goals that are not larger than its accuracy, and goals farther out of reach than that.
     """
     try:
-        checked_model(model, radius=task.radius)
+        check_model(model, radius=task.radius)
     except ValueError as error:
         raise TaskError(f"task {task.name!r}: {error}") from None
     problem = out_of_reach(task, model.correction_tolerance)

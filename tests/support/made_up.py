@@ -9,7 +9,8 @@ import pandas as pd
 from coartic import load_task
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.study import Study
-from coartic.runs.plan import DeclaredMethod, Plan, PlannedCell
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import Cell, Plan
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},
@@ -59,20 +60,28 @@ def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", *
 def declared(method):
     """What a made-up method declares; planners are not stochastic."""
     stochastic = not method.startswith(("trajectory-optimisation", "corrective-alone"))
-    return DeclaredMethod(method, "", (), (), stochastic, {}, "built in", "")
+    return MethodCard(method, method, "", (), (), stochastic, {}, "built in", "")
 
 
 def plan_for(tasks, runs=None, *, trials=10_000, **more):
     """A plan with these tasks and the cells that the rows of runs are of."""
     keys = ["task", "method", "variant"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
+    by_name = {task.name: task for task in tasks}
+    cells = [
+        Cell(by_name[row["task"]], declared(row["method"]), parameters_of(row["variant"]), runs=3)
+        for row in rows
+    ]
     plan = Plan(
         suite="paper", runs=3, seed=0, trials=trials, readings=(), time_limit_s=None,
-        methods={row["method"]: declared(row["method"]) for row in rows},
-        trial_budget=None, tasks={task.name: task.model_dump(mode="json") for task in tasks},
-        cells=tuple(PlannedCell(parameters={}, complete={}, runs=3, **row) for row in rows),
+        trial_budget=None, cells=tuple(cells),
     )  # fmt: skip
     return replace(plan, **more)
+
+
+def parameters_of(variant):
+    """Parameters that make a variant."""
+    return dict(item.split("=") for item in variant.split(", ") if item)
 
 
 def study_of(runs, tasks, *, folder="made-up", trials=10_000, **more):

@@ -1,7 +1,7 @@
-"""The model written as the paper prints it: one step at a time, in plain NumPy.
+"""The model as the paper prints it, in plain NumPy: slow and obvious.
 
-Slow and obvious. Movement, corrective process and learner share the robot's formulas with the rest
-of the package and nothing of its kernels, which are tested against them, trial by trial; only a
+Movements are those of :mod:`analysis.verify`. Corrective process, execution and learner share the
+robot's formulas with the package and nothing of its kernels, which are tested against them; only a
 policy's initial hands are taken over. Draws from its generator in the same order as the learner.
 """
 
@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.analysis import verify
 from coartic.learner.conditions import ExplorationCondition
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction
@@ -49,24 +52,79 @@ def move(
     *,
     stop_on_arrival: bool = True,
     model: MotionModel = PAPER,
+    waypoints: Sequence[Array] = (),
 ) -> MoveResult:
-    """:func:`coartic.motion.movement.move`, visiting every step."""
-    start, end = np.array(q), np.array(target)
-    difference = end - start
-    distance = math.sqrt(_sum_of_squares(difference))
-    last = math.ceil(distance / model.step)
-    expected = robot.forward_kinematics(end, hand)
-    for k in range(last + 1):
-        at_end = k == last and not (model.whole_last_step and last > 0)
-        point = end if at_end else start + (k * model.step / distance) * difference
-        position = robot.forward_kinematics(point, hand)
-        hit = _distance(position, goal) <= radius
-        arrived = stop_on_arrival and _distance(position, expected) <= model.arrival_tolerance
-        if k == 0 < last and model.first_step:
-            continue
-        if hit or arrived or k == last:
-            return MoveResult(np.array(point), k + model.arrival_tick, hit, k + 2)
-    raise AssertionError("a movement ends at its target at the latest")
+    """:func:`coartic.move`, or a path along waypoints, by the engine of :mod:`analysis.verify`.
+
+    It visits every step, and is exact to the last bit.
+    """
+    arm = robot.arm(hand)
+    rules = SimpleNamespace(
+        model=model._replace(corrective_arrival=stop_on_arrival),
+        arms={hand: (robot.joints(hand), arm.links, (arm.shoulder_x, arm.shoulder_y))},
+        goals=[goal],
+        radius=radius,
+    )
+    kind = "path" if len(waypoints) else "corrective"
+    movement = verify.MoveRow(0, 1, hand, kind, 0, np.array(target), list(waypoints))
+    end, ticks, hit = verify.make(rules, np.array(q, dtype=np.float64), movement)
+    return MoveResult(end, ticks, hit, ticks + 1)
+
+
+class Outcome(NamedTuple):
+    """An execution; without a reward where it failed."""
+
+    reward: int | None
+    ticks: int
+    corrections: int
+    iterations: int
+    hits: list[Array]
+    movements: list[Movement]
+    rows: Array
+    """Configuration at each tick, shape ``(ticks, dof)``."""
+
+
+def execute(task: Task, solution: Sequence[Movement], model: MotionModel = PAPER) -> Outcome:
+    """:func:`coartic.execute`, movement after movement; joints whose target is NaN stay."""
+    q, hits, made = np.array(task.q0), [], []
+    rows, corrections, iterations = [np.empty((0, len(q)))], 0, 0
+    for number, goal in enumerate(task.goals, 1):
+        due = [movement for movement in solution if movement.goal == number]
+        hand = due[0].hand
+        where = hand, goal, task.radius
+        hit = move(task.robot, q, q, *where, model=model).hit
+        for index, movement in enumerate([*due, Movement(number, hand, "corrective")]):
+            if hit and (index > 0 or movement.kind == "corrective"):
+                continue
+            target, way = movement.target, ()
+            if movement.kind == "path":
+                way = movement.waypoints
+                target = way[-1]
+            elif target is None:
+                locked = task.locked_base
+                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
+                target, iterations = found.q, iterations + found.iterations
+                if not found.converged:
+                    break
+            target = np.where(np.isnan(target), q, target)
+            stops = movement.kind != "corrective" or model.corrective_arrival
+            points = verify.path(q, way, model) if len(way) else verify.line(q, target, model)
+            q, ticks, hit, _ = move(
+                task.robot, q, target, *where, stop_on_arrival=stops, model=model, waypoints=way
+            )
+            rows.append(points.T[:ticks])
+            corrections += movement.kind == "corrective"
+            made.append(replace(movement, target=target, ticks=ticks))
+        if not hit:
+            break
+        if not made or made[-1].goal != number:
+            made.append(Movement(number, hand, "corrective", q, 0))
+        hits.append(q)
+    ticks = sum(movement.ticks for movement in made)
+    hands = list({movement.goal: movement.hand for movement in made}.values())
+    lost = sum(penalty(task, hits, hands))
+    reward = -(ticks + lost) if len(hits) == len(task.goals) else None
+    return Outcome(reward, ticks, corrections, iterations, hits, made, np.concatenate(rows))
 
 
 def correct(
@@ -178,7 +236,7 @@ def learn(
                     for reward in reversed(subtasks[number:]):
                         credit = reward + condition.discount * credit
                 value = values.get((state, hand), -math.inf)
-                if credit > value or (credit == value and condition.update == "not-less"):
+                if credit > value:
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(

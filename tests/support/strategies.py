@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from coartic import Robot, load_task, parse_task
+from coartic import Robot, corrective_trial, hand_sequences, load_task, parse_task
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -54,3 +54,12 @@ def changed(like, **update):
 def as_released(task):
     """A task with its goals of the first release: cases that these goals have and others lack."""
     return changed(task, goals=load_task(f"{task}-v0.1").goals)
+
+
+def sample(task, count, noise=0.3, seed=0):
+    """Hand sequences, and targets around what the corrective process does with them."""
+    rng = np.random.default_rng(seed)
+    hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), count)]
+    targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
+    free = [axis not in task.locked_base for axis in "xy"] + [True] * (task.robot.dof - 2)
+    return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)

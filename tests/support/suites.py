@@ -6,10 +6,11 @@ import pandas as pd
 
 from coartic import load_task
 from coartic.analysis.study import load
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import plan_suite
+from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell, load_suite, select_cells
-from coartic.benchmarks.worker import failed, perform
+from coartic.benchmarks.worker import fail, perform_job
 
 ROOT = Path(__file__).parents[2]
 BROKEN = ROOT / "tests" / "plugins" / "broken.py"
@@ -25,7 +26,7 @@ class InProcess:
         pass
 
     def perform(self, jobs):
-        yield from enumerate(map(perform, jobs))
+        yield from enumerate(map(perform_job, jobs))
 
 
 class Failing(InProcess):
@@ -37,7 +38,7 @@ class Failing(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):
             lost = number in self.numbers
-            yield number, failed(job, "crashed", "exit code 9") if lost else perform(job)
+            yield number, fail(job, "crashed", "exit code 9") if lost else perform_job(job)
 
 
 def paper_cells(**selection):
@@ -68,7 +69,7 @@ def run_and_write(folder, cells=None, *, executor=None, retry_failed=False, redo
     """Perform such a plan into a folder; what the folder then says."""
     plan = planned(cells, **options)
     executor = executor or InProcess()
-    plan.perform(folder, executor=executor, retry_failed=retry_failed, redo=redo)
+    perform(plan, folder, executor=executor, retry_failed=retry_failed, redo=redo)
     return load(folder)
 
 
@@ -95,4 +96,4 @@ def traced_cells():
         )
         for method in methods
     ]  # fmt: skip
-    return [*cells, Cell(cells[-1].task, KNOWN["dual-process/EC4"], (("noise_sd", 0.1),))]
+    return [*cells, Cell(cells[-1].task, KNOWN["dual-process/EC4"], {"noise_sd": 0.1})]

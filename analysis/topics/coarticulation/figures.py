@@ -13,11 +13,11 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.figures.robot import MARKERS
 from coartic.analysis.methods import name_of
 from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.register import shared_goal
 from coartic.analysis.study import Study
+from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.drawing import MARKERS
 
 _LETTERS = 9  # points: the page shows it small
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
@@ -29,7 +29,7 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
     "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
     "thin: every run. Dashed arrows lead to the next goal.",
 )
-def postures(study: Study) -> Parts:
+def one_goal_two_postures(study: Study) -> Parts:
     """The postures at one goal before two others, overlaid: all runs faint, their means strong."""
     shared = shared_goal(study)
     if shared is None:

@@ -2,13 +2,201 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import numpy as np
+
+from coartic.analysis.methods import CONDITIONS, is_variant, main_methods, name_of
 from coartic.analysis.section import Section
+from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.statistics.estimates import LEVEL, Estimate
+from coartic.analysis.study import Study, cached
+from coartic.analysis.topics.coarticulation import tables
+from coartic.analysis.topics.coarticulation.placebo import difference, selects
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.words import estimate, number, p_value, plural
+
+
+def answer(study: Study) -> str:
+    """Whether the posture at the goal that two tasks share depends on the next goal, in short."""
+    found = difference(study)
+    if found is None:
+        return ""
+    shared, placebo = found.contexts, found.placebo
+    goal, apart, p = shared.goal, number(shared.apart, 2), p_value(shared.p)
+    lie = f"at goal {goal} base and joints lie {apart} apart"
+    if found.too_few:
+        text = (
+            f"Too few runs to tell whether postures at goal {goal} differ by the next goal "
+            f"({plural(shared.n, 'run')})."
+        )
+    elif found.seen:
+        of_runs = f"; {number(shared.spreads, 1)} SD of the runs{', ' + p if p else ''}"
+        guesses = "" if placebo is None else f"; random guesses {number(placebo.apart, 2)}"
+        of_runs = "" if math.isnan(shared.spreads) else of_runs
+        text = f"Yes: {lie} (length units and rad{of_runs}{guesses})."
+    elif found.differ and placebo is None:
+        text = (
+            f"Undecided: {lie}, but there is no placebo to compare with. Add the method "
+            "placebo/guesses."
+        )
+    elif found.differ and placebo is not None:
+        text = (
+            f"Not shown: {lie}, not significantly more than those of random guesses "
+            f"({number(placebo.apart, 2)}; {p_value(found.beyond_p)})."
+        )
+    else:
+        text = (
+            f"No significant difference: postures of the {name_of(shared.method)} at goal {goal} "
+            f"lie {apart} apart{f' ({p})' if p else ''}."
+        )
+    cells = [(task.name, shared.method) for task in shared.tasks]
+    return text + failed_runs(study, cells, " and are not counted")
+
+
+def finding_of_contexts(study: Study) -> str:
+    """How the posture at the goal that two tasks share depends on the next goal."""
+    found = difference(study)
+    if found is None:
+        return ""
+    shared, placebo = found.contexts, found.placebo
+    goal, method, runs = shared.goal, name_of(shared.method), plural(shared.n, "run")
+    p = "" if math.isnan(shared.p) else f", {p_value(shared.p)}"
+    if found.too_few:
+        return (
+            f"There are too few runs to tell whether the postures at goal {goal} differ by which "
+            f"goal comes next ({method}, {runs})."
+        )
+    if not found.differ:
+        return (
+            f"The postures in which the {method} hits goal {goal} show no significant difference "
+            f"by which goal comes next ({runs}{p})."
+        )
+    spreads = f", {number(shared.spreads, 1)} times the spread between runs"
+    replays = [study.replays(task.name, shared.method) for task in shared.tasks]
+    replayed = TwoContexts(replays[0], replays[1], goal, shared.hand)
+    text = (
+        f"Depending on which goal comes next, the hand hits goal {goal} in almost the same place "
+        f"({number(shared.hands_apart, 2)} apart) but in another posture: base and joints lie "
+        f"{number(shared.apart, 2)} apart (in length units and rad)"
+        f"{'' if math.isnan(shared.spreads) else spreads} ({method}, {runs}{p})"
+    )
+    if all(replayed.runs):
+        text += f"; {number(replayed.apart, 2)} in noiseless replays"
+    if placebo is not None:
+        text += (
+            f". The best of as many random guesses lie {number(placebo.apart, 2)} apart, "
+            f"{'significantly' if found.seen else 'not significantly'} less "
+            f"({p_value(found.beyond_p)})"
+        )
+    elif found.selects:
+        text += (
+            ". Whether this is more than selecting one of many noisy trials shows cannot be said: "
+            "this folder has no placebo with as many trials"
+        )
+    return f"{text}."
+
+
+@cached
+def steepest_slope(study: Study) -> Any:
+    """The row of table *slopes* with the posture that follows a moved goal most, at a goal before
+    it: of the learner if it ran. None without one.
+
+    ``seen``: whether the whole posture surely follows; places where it does come first. ``size``:
+    the slope without its sign.
+    """
+    rows = tables.slopes(study)
+    rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
+    # A method that selects its solution from trials has to exceed the placebo as well.
+    chosen = [selects(study, str(label)) for label in rows.method]
+    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
+    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
+    for label in (*CONDITIONS, *main_methods(rows.method)):
+        of_method = rows[rows.method == label].sort_values(["seen", "size"])
+        if len(of_method):
+            return of_method.iloc[-1]
+    return None
+
+
+def tests_of(slope: Any) -> str:
+    """P-values of the slope of a whole posture: corrected, and beyond the placebo's."""
+    p = p_value(slope.p_placebo)
+    return p_value(slope.p_holm) + (f"; beyond random guesses {p}" if p else "")
+
+
+def answer_by_slopes(study: Study) -> str:
+    """Whether postures follow the next goal when that moves, in short."""
+    slope = steepest_slope(study)
+    if slope is None:
+        return ""
+    goal, moving = slope.goal, slope.moving
+    if slope.seen:
+        joint = slope.joint.replace("_", " ")
+        text = (
+            f"Yes: for each unit that goal {moving} moves, {joint} at goal {goal} moves by "
+            f"{number(slope.slope, 2)}."
+        )
+    elif slope["size"]:
+        text = (
+            f"Undecided: postures at goal {goal} do not surely follow goal {moving} "
+            f"({tests_of(slope)}); more positions could tell."
+        )
+    else:
+        text = f"Not seen: postures at goal {goal} do not follow goal {moving}."
+    cells = (cell for cell in study.cells if cell[1] == slope.method)
+    return text + failed_runs(study, cells, " and are not counted")
+
+
+def finding_of_slopes(study: Study) -> str:
+    """The joint that follows a moved goal most, at the goal before it."""
+    slope = steepest_slope(study)
+    if slope is None:
+        return ""
+    goal, moving, method = slope.goal, slope.moving, name_of(slope.method)
+    by = estimate(Estimate(slope.slope, slope.slope_low, slope.slope_high), 2)
+    follows = f"{slope.joint.replace('_', ' ')} at goal {goal} moves by {by}"
+    each = f"for each length unit that goal {moving} moves"
+    if slope.seen:
+        return (
+            f"The {method} prepares for the next goal: {each}, {follows} "
+            f"({p_value(slope.p_holm)} for the whole posture)."
+        )
+    if slope["size"]:
+        return (
+            f"Whether the {method} prepares for the next goal is undecided: {follows} {each}, but "
+            f"the test of the whole posture is not significant ({tests_of(slope)}). More positions "
+            "could tell."
+        )
+    return (
+        f"The postures in which the {method} hits goal {goal} do not follow goal {moving} when "
+        "that moves."
+    )
+
+
+def finding_of_signatures(study: Study) -> str:
+    """In how many methods the next goal changes more of what leaves the hand in place."""
+    rows = tables.contexts(study)
+    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
+    if not len(rows):
+        return (
+            "How the movements of each method compare with those of the corrective process, goal "
+            "by goal."
+        )
+    larger = int((rows.equivalent > rows.other).sum())
+    return (
+        f"The next goal changes the joints much more than the hand: in {larger} of {len(rows)} "
+        "methods (variants left out) the part of the difference that leaves the hand in place is "
+        "the larger one."
+    )
+
 
 COARTICULATION = Section(
     "coarticulation",
     short="Coarticulation",
     title="Does the next goal change the movement?",
     caption="Postures at a goal that two tasks share before they differ",
+    finding=finding_of_contexts,
     figure="postures",
     table="contexts",
     note=(
@@ -24,6 +212,7 @@ SIGNATURES = Section(
     short="Signatures",
     title="Which signatures of coarticulation does each method show?",
     caption="Signatures of coarticulation, means over goals and runs",
+    finding=finding_of_signatures,
     table="signatures",
     note=(
         "Ticks are compared with those of the corrective process with the same hands. A first "
@@ -39,6 +228,7 @@ SLOPES = Section(
     short="Moved goals",
     title="How does the posture follow a goal that moves?",
     caption="Slopes of postures at the goal beside the one that moves",
+    finding=finding_of_slopes,
     table="slopes",
     note=("Slopes are in length units and rad of the posture per length unit that the goal moves."),
     single=True,

@@ -46,7 +46,9 @@ def finding_of_ranking(study: Study) -> str:
     sentences = nearest_by_trial(by_trial) if by_trial else []
     without = "best method that does not use the reward"
     if by_formula:
-        planner = f"The best planner that knows the reward as a formula ends {gap_of(by_formula[0])}"
+        planner = (
+            f"The best planner that knows the reward as a formula ends {gap_of(by_formula[0])}"
+        )
         beside = f", the {without} {number(others[0].gap, 1)} %" if others else ""
         sentences.append(f"{planner} away{beside}.")
     elif others:
@@ -74,9 +76,7 @@ def nearest_by_trial(rows: list[Any]) -> list[str]:
             f"with its best setting), {best.name} comes nearest"
         )
     else:
-        beginning = (
-            f"The only algorithm here that learns from the rewards of trials is {best.name}"
-        )
+        beginning = f"The only algorithm here that learns from the rewards of trials is {best.name}"
     beside = ""
     if second and second.least_p > LEVEL:
         beside = f"; too few runs to tell it from {second.name}"
@@ -106,7 +106,11 @@ def answer_nearest(study: Study) -> str:
     if not any((by_trial, *others)):
         return ""
     best = next(row for rows in (by_trial, *others) for row in rows)
-    who = f"Among methods that see only rewards: {best.name}" if by_trial else words.capital(best.name)
+    who = (
+        f"Among methods that see only rewards: {best.name}"
+        if by_trial
+        else words.capital(best.name)
+    )
     text = f"{who}, {number(best.gap, 1)} % away."
     rank, learner = learner_among(by_trial)
     if rank > 1:
@@ -137,7 +141,9 @@ def foreign_in_words(row: Any) -> str:
         return f"{text}; too few runs to tell it from the learner."
     if row.better or row.worse:
         better = plural(row.better, "task")
-        return f"{text}; it is better than the learner on {better} and worse on {number(row.worse)}."
+        return (
+            f"{text}; it is better than the learner on {better} and worse on {number(row.worse)}."
+        )
     return f"{text}; no significant difference from the learner."
 
 
@@ -188,7 +194,9 @@ def ratios(study: Study) -> dict[str, float]:
     if learner is None or rival is None:
         return {}
     both = {column: (learner[column], rival[column]) for column in LEVELS}
-    return {column: a / b for column, (a, b) in both.items() if math.isfinite(a) and math.isfinite(b)}
+    return {
+        column: a / b for column, (a, b) in both.items() if math.isfinite(a) and math.isfinite(b)
+    }
 
 
 def finding_of_costs(study: Study) -> str:
@@ -285,7 +293,11 @@ def finding_of_learning(study: Study) -> str:
     """When half of the gain of the learner that explores most is there, by task."""
     half = tables.learning(study).half_gain
     keys = {name: f"{name} {methods.most_exploring(task)}" for name, task in study.tasks.items()}
-    trials = {study.tasks[name]: half[key] for name, key in keys.items() if half.get(key, math.inf) < math.inf}
+    trials = {
+        study.tasks[name]: half[key]
+        for name, key in keys.items()
+        if half.get(key, math.inf) < math.inf
+    }
     return ""
 
 

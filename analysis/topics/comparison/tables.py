@@ -13,7 +13,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, other_tasks
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.coarticulation.tables import corrected
+from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.comparison import runtimes, scores
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.words import marked
@@ -59,7 +59,7 @@ def against_learner(study: Study) -> Rows:
             "least_p": test.least_p,
         }
         rows.append((f"{task} {label}", row | runs_of(cell, learner)))
-    yield from corrected(rows)
+    yield from adjust_p(rows)
 
 
 @table("method, knows, gap[], better, worse, on *, runs")

@@ -1,12 +1,12 @@
 """What the findings of ``human.toml`` are put to: one function for each measure.
 
-A measure takes a study of suite ``human`` and a model, and returns its values by task with the
-statistic that is made of them. There are none where nothing follows for the model.
+A measure takes a study of suite ``human`` and a model, and returns its values by task: a number, a
+row ``(k,)`` or rows ``(n, k)``. There are none where nothing follows for the model. A statistic is
+made of the rows of all tasks.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -14,11 +14,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from coartic import Trajectory
 from coartic.analysis.methods import most_exploring
 from coartic.analysis.signatures.subtasks import isolated_reach, postures_before
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import CellRuns, Study
+from coartic.analysis.topics.random_tasks import RECEDING_HORIZON, solved_cells
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.analysis.words import read_beside
 from coartic.robot import Array
@@ -28,9 +30,9 @@ STATIONS = 100
 NEAR_TIE = 0.05
 """Both hands need the same ticks within this share of the fewer."""
 FEWEST_TIES = 30
-LONG = 6
+GOALS_OF_LONG = 6
 """Goals of a task on which it is asked how far ahead is enough."""
-ENOUGH = 1.01
+ENOUGH_TICKS = 1.01
 """Ticks of a horizon that is enough, as a multiple of those with all goals in view."""
 TICKS_OF_A_TURN = 5
 """Ticks before a hit, and after it, over which the direction of a hand is measured."""
@@ -48,56 +50,26 @@ class Model(NamedTuple):
     """What was learned is replayed without noise, in the place of the best trial."""
 
 
-PLANNER = "receding-horizon"
-_FILE = read_beside(__file__, "human")
-MODELS = {name: Model(**row) for name, row in _FILE["models"].items()}
+MODELS = {name: Model(**row) for name, row in read_beside(__file__, "human")["models"].items()}
 """What is compared with people, by name."""
-GROUPS: dict[str, list[str]] = _FILE["groups"]
-"""Names of models that have something in common."""
-
-
-class Values(NamedTuple):
-    """What is measured, ``(n, k)`` with any n, by task, and the statistic of all rows."""
-
-    by_task: Mapping[str, Array]
-    statistic: Callable[[Array], float]
-
-
-Measure = Callable[[Study, Model], Values]
-
-
-def mean_of(by_task: Mapping[str, float]) -> Values:
-    """The mean over tasks of one value each, of those that there are."""
-    there = {task: np.array([[value]]) for task, value in by_task.items() if np.isfinite(value)}
-    return Values(there, lambda rows: float(rows.mean()))
-
-
-@cached
-def cells_by_method(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, Any]]]]:
-    """Cells with a solution and their parameters, by method."""
-    by_method: dict[str, list[tuple[CellRuns, dict[str, Any]]]] = {}
-    for cell in study.cells.values():
-        if len(cell.good):
-            parameters = json.loads(str(cell.good.parameters.iloc[0]))
-            by_method.setdefault(cell.method, []).append((cell, parameters))
-    return by_method
+ByTask = Mapping[str, ArrayLike]
+Measure = Callable[[Study, Model], ByTask]
+Statistic = Callable[[Array], float]
 
 
 def cells_of(study: Study, model: Model, **others: Any) -> list[CellRuns]:
     """A model's cells; ``others`` are parameters in the place of its own."""
     asked = {**model.parameters, **others}
-    ours = dict.fromkeys(map(most_exploring, study.tasks.values()))
-    methods = [model.method] if model.method else [*ours]
     return [
         cell
-        for method in methods
-        for cell, parameters in cells_by_method(study).get(method, [])
-        if (model.method or most_exploring(study.tasks[cell.task]) == method)
-        and all(parameters.get(name) == value for name, value in asked.items())
+        for method, cells in solved_cells(study).items()
+        for cell, parameters in cells
+        if method == (model.method or most_exploring(study.tasks[cell.task]))
+        and asked.items() <= parameters.items()
     ]
 
 
-def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
+def runs_by_task(study: Study, model: Model, **others: Any) -> dict[str, Trajectories]:
     """A model's runs by task."""
     executed = study.replays if model.replayed else study.trajectories
     by_task = {
@@ -106,19 +78,23 @@ def runs_of(study: Study, model: Model, **others: Any) -> dict[str, Trajectories
     return {task: runs for task, runs in by_task.items() if runs.runs}
 
 
-def unmoved_tasks(study: Study, model: Model, arms: int, **others: Any) -> dict[str, Trajectories]:
+def unmoved_tasks(study: Study, model: Model, arms: int) -> dict[str, Trajectories]:
     """Runs on tasks with so many arms and fewer than six goals, of which none was moved."""
     return {
         name: runs
-        for name, runs in runs_of(study, model, **others).items()
-        if not _MOVED.match(name) and len(runs.task.hands) == arms and len(runs.task.goals) < LONG
+        for name, runs in runs_by_task(study, model).items()
+        if not _MOVED.match(name)
+        and len(runs.task.hands) == arms
+        and len(runs.task.goals) < GOALS_OF_LONG
     }
 
 
-def moved(study: Study, model: Model, goal: int, **others: Any) -> dict[str, list[Trajectories]]:
+def moved_tasks(
+    study: Study, model: Model, goal: int, **others: Any
+) -> dict[str, list[Trajectories]]:
     """Runs on the tasks in which one goal moves, by the task that they come from, in its order."""
     groups: dict[str, list[Trajectories]] = {}
-    for name, runs in runs_of(study, model, **others).items():
+    for name, runs in runs_by_task(study, model, **others).items():
         parts = _MOVED.match(name)
         if parts and int(parts["goal"]) == goal:
             groups.setdefault(parts["task"], []).append(runs)
@@ -131,14 +107,19 @@ def run_ids(study: Study, name: str, where: str) -> str:
     """The ids of a model's runs in a block of the suite: moved goals, tasks or long tasks."""
     model = MODELS[name]
     if where == "long tasks":  # all horizons together make one value
-        model = Model(model.method, {})
+        model = Model(model.method)
     return " ".join(
         str(run)
         for cell in cells_of(study, model)
         if bool(_MOVED.match(cell.task)) == (where == "moved goals")
-        and (len(study.tasks[cell.task].goals) >= LONG) == (where == "long tasks")
+        and (len(study.tasks[cell.task].goals) >= GOALS_OF_LONG) == (where == "long tasks")
         for run in cell.good.run_id
     )
+
+
+def mean_of_rows(rows: Array) -> float:
+    """The mean of all values."""
+    return float(rows.mean())
 
 
 # Postures that follow a goal that moves
@@ -168,29 +149,23 @@ def slope_norms(study: Study, model: Model, distance: int, **others: Any) -> dic
     """
     at = 1 if distance > 0 else 2
     norms = {}
-    for task, group in moved(study, model, at + distance, **others).items():
+    for task, group in moved_tasks(study, model, at + distance, **others).items():
         square = float(squared_slopes(group, at + distance, at).sum())
         norms[task] = round(float(np.sign(square) * np.sqrt(abs(square))), 6)  # else 0 is 1e-12
     return norms
 
 
-def slope_norm(study: Study, model: Model, distance: int) -> Values:
-    """Mean slope norm over tasks."""
-    return mean_of(slope_norms(study, model, distance))
-
-
-def practice(study: Study, model: Model, statistic: Callable[[Array], float]) -> Values:
-    """Slope norms at distances 1 and 2 after all trials and after a hundredth, by task, (1, 4)."""
+def norms_by_practice(study: Study, model: Model) -> ByTask:
+    """Slope norms at distances 1 and 2 after all trials and after a hundredth, shape ``(4,)``."""
     if model.method:
-        return Values({}, statistic)
+        return {}
     norms = [
         slope_norms(study, model, distance, trials=trials)
         for trials in (PRACTISED, BEGUN)
         for distance in (1, 2)
     ]
     tasks = [task for task in norms[0] if all(task in by_task for by_task in norms)]
-    rows = {task: np.array([[by_task[task] for by_task in norms]]) for task in tasks}
-    return Values(rows, statistic)
+    return {task: [by_task[task] for by_task in norms] for task in tasks}
 
 
 def horizon_rise(rows: Array) -> float:
@@ -204,20 +179,18 @@ def ratio_rise(rows: Array) -> float:
     return float(far / near - far_before / near_before)
 
 
-def benefit_correlation(study: Study, model: Model) -> Values:
-    """Kendall's τ of what preparing can save and of the slope norm at distance 1, over tasks.
+def norms_and_benefits(study: Study, model: Model) -> ByTask:
+    """Slope norm at distance 1, and what preparing can save, shape ``(2,)``.
 
     What can be saved: ticks with no goal ahead less the fewest of any run, where no goal moved.
     """
-    norms = slope_norms(study, model, 1)
     alone = unmoved_tasks(study, MODELS["no goal ahead"], 1)
     highest = study.runs[study.runs.status == "ok"].groupby("task").reward.max()
-    rows = {
-        task: np.array([[norm, alone[task].runs[0].ticks + float(highest[task])]])
-        for task, norm in norms.items()
+    return {
+        task: [norm, alone[task].runs[0].ticks + float(highest[task])]
+        for task, norm in slope_norms(study, model, 1).items()
         if task in alone
     }
-    return Values(rows, rank_correlation)
 
 
 def rank_correlation(pairs: Array) -> float:
@@ -263,19 +236,19 @@ def bows(run: Trajectory) -> Iterator[tuple[float, float, float]]:
         yield float(bow.mean()), turn(chords[k], chords[k + 1]), turn(chords[k - 1], chords[k])
 
 
-def bow_slope(study: Study, model: Model) -> Values:
-    """Slope of the bow on the next turn, given the last one, over the reaches of all tasks."""
-    by_task = {
-        task: np.array([row for run in runs.runs for row in bows(run)])
+def bows_by_task(study: Study, model: Model) -> ByTask:
+    """The rows of :func:`bows` of all runs, shape ``(n, 3)``."""
+    return {
+        task: [row for run in runs.runs for row in bows(run)]
         for task, runs in unmoved_tasks(study, model, 1).items()
     }
 
-    def statistic(rows: Array) -> float:
-        bow, to_next, from_last = rows.T
-        columns = np.column_stack([to_next, from_last, np.ones(len(bow))])
-        return float(np.linalg.lstsq(columns, bow)[0][0])
 
-    return Values(by_task, statistic)
+def slope_of_bows(rows: Array) -> float:
+    """Slope of the bow on the next turn, given the last one."""
+    bow, to_next, from_last = rows.T
+    columns = np.column_stack([to_next, from_last, np.ones(len(bow))])
+    return float(np.linalg.lstsq(columns, bow)[0][0])
 
 
 def turn_at_goals(run: Trajectory) -> float:
@@ -289,36 +262,45 @@ def turn_at_goals(run: Trajectory) -> float:
     return float(np.mean(angles))
 
 
-def turn_saved(study: Study, model: Model) -> Values:
+def turn_saved(study: Study, model: Model) -> ByTask:
     """Turn at goals under the corrective process alone less that of the model, on one arm."""
     alone = unmoved_tasks(study, MODELS["corrective process"], 1)
-    return mean_of({
-        task: float(turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)]))
+    return {
+        task: turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)])
         for task, runs in unmoved_tasks(study, model, 1).items()
         if task in alone
-    })  # fmt: skip
+    }
 
 
-def stop_ratio(study: Study, model: Model) -> Values:
-    """How far apart hand paths to goal 1 lie before two places of goal 2: stopping by passing."""
+def apart_by_stop(study: Study, model: Model) -> ByTask:
+    """How far apart hand paths to goal 1 lie before two places of goal 2: stopping, passing."""
     if "stop" not in model.parameters:
-        return mean_of({})
-    apart = []
-    for stop in (1, 0):
-        apart.append({
-            task: float(np.linalg.norm(ends[0] - ends[1], axis=1).mean())
-            for task, group in moved(study, model, 2, stop=stop).items()
-            if (ends := [stations(hand_path(group[k].runs[0], 1)) for k in (0, -1)])
-        })  # fmt: skip
-    both = [task for task in apart[0] if task in apart[1]]
-    rows = {task: np.array([[apart[0][task], apart[1][task]]]) for task in both}
-    return Values(rows, lambda pairs: float(pairs[:, 0].mean() / pairs[:, 1].mean()))
+        return {}
+    stopping, passing = (
+        {
+            task: path_distance(group[0].runs[0], group[-1].runs[0])
+            for task, group in moved_tasks(study, model, 2, stop=stop).items()
+        }
+        for stop in (1, 0)
+    )
+    return {task: [stopping[task], passing[task]] for task in stopping if task in passing}
+
+
+def path_distance(first: Trajectory, second: Trajectory) -> float:
+    """Mean distance of the hand's paths to goal 1, station by station."""
+    apart = stations(hand_path(first, 1)) - stations(hand_path(second, 1))
+    return float(np.linalg.norm(apart, axis=1).mean())
+
+
+def ratio_of_means(pairs: Array) -> float:
+    """Mean of the first column by that of the second."""
+    return float(pairs[:, 0].mean() / pairs[:, 1].mean())
 
 
 # Two hands, and long tasks
 
 
-def first_movement(study: Study, model: Model) -> Values:
+def excess_of_first(study: Study, model: Model) -> ByTask:
     """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
     values = {}
     for task, runs in unmoved_tasks(study, model, 2).items():
@@ -329,22 +311,19 @@ def first_movement(study: Study, model: Model) -> Values:
                 excess.append(int(run.execution.ticks_by_goal()[0]) - alone[0])
         if excess:
             values[task] = float(np.mean(excess))
-    return mean_of(values)
+    return values
 
 
-def near_tie_repeats(study: Study, model: Model) -> Values:
-    """Share of near ties in which the hand stays the same."""
+def near_tie_repeats(study: Study, model: Model) -> ByTask:
+    """Whether the hand stays the same in each near tie, ``(n, 1)``; NaN if all tasks have few."""
     by_task = {}
     for task, runs in unmoved_tasks(study, model, 2).items():
-        repeats = [
-            run.hands[goal - 1] == run.hands[goal - 2]
-            for run in runs.runs
-            for goal in near_ties(run)
-        ]
+        ties = ((run.hands, goal) for run in runs.runs for goal in near_ties(run))
+        repeats = [[float(hands[goal - 1] == hands[goal - 2])] for hands, goal in ties]
         if repeats:
-            by_task[task] = np.array(repeats, dtype=np.float64)[:, None]
+            by_task[task] = np.array(repeats)
     enough = sum(map(len, by_task.values())) >= FEWEST_TIES
-    return Values(by_task, lambda rows: float(rows.mean()) if enough else math.nan)
+    return {task: repeats if enough else math.nan * repeats for task, repeats in by_task.items()}
 
 
 def near_ties(run: Trajectory) -> Iterator[int]:
@@ -358,35 +337,34 @@ def near_ties(run: Trajectory) -> Iterator[int]:
             yield goal
 
 
-def sufficient_horizon(study: Study, model: Model) -> Values:
+def sufficient_horizon(study: Study, model: Model) -> ByTask:
     """The fewest goals ahead with which the planner is within 1 % of all goals in view."""
     if model != MODELS["all goals ahead"]:
-        return mean_of({})
+        return {}
     ticks: dict[str, dict[int, int]] = {}
-    for cell, parameters in cells_by_method(study).get(PLANNER, []):
-        if len(study.tasks[cell.task].goals) >= LONG:
-            horizon = min(parameters["horizon"], len(study.tasks[cell.task].goals) - 1)
+    for cell, parameters in solved_cells(study).get(RECEDING_HORIZON, ()):
+        last = len(study.tasks[cell.task].goals) - 1
+        if last + 1 >= GOALS_OF_LONG:
+            horizon = min(parameters["horizon"], last)
             ticks.setdefault(cell.task, {})[horizon] = -int(cell.rewards[0])
-    return mean_of({
-        task: float(
-            min(h for h, of_h in by_h.items() if of_h <= ENOUGH * by_h[max(by_h)])
-        )
+    return {
+        task: min(h for h, of_h in by_h.items() if of_h <= ENOUGH_TICKS * by_h[max(by_h)])
         for task, by_h in ticks.items()
-    })  # fmt: skip
+    }
 
 
-MEASURES: dict[str, Measure] = {
-    "slope norm at distance 1": partial(slope_norm, distance=1),
-    "slope norm at distance 2": partial(slope_norm, distance=2),
-    "slope norm at distance -1": partial(slope_norm, distance=-1),
-    "rise of the slope norm at distance 2": partial(practice, statistic=horizon_rise),
-    "rise of the ratio of slope norms": partial(practice, statistic=ratio_rise),
-    "benefit correlation": benefit_correlation,
-    "sufficient horizon": sufficient_horizon,
-    "bow slope": bow_slope,
-    "turn saved at goals": turn_saved,
-    "stop ratio": stop_ratio,
-    "first movement against isolated reach": first_movement,
-    "near-tie repeats": near_tie_repeats,
+MEASURES: dict[str, tuple[Measure, Statistic]] = {
+    "slope norm at distance 1": (partial(slope_norms, distance=1), mean_of_rows),
+    "slope norm at distance 2": (partial(slope_norms, distance=2), mean_of_rows),
+    "slope norm at distance -1": (partial(slope_norms, distance=-1), mean_of_rows),
+    "rise of the slope norm at distance 2": (norms_by_practice, horizon_rise),
+    "rise of the ratio of slope norms": (norms_by_practice, ratio_rise),
+    "benefit correlation": (norms_and_benefits, rank_correlation),
+    "sufficient horizon": (sufficient_horizon, mean_of_rows),
+    "bow slope": (bows_by_task, slope_of_bows),
+    "turn saved at goals": (turn_saved, mean_of_rows),
+    "stop ratio": (apart_by_stop, ratio_of_means),
+    "first movement against isolated reach": (excess_of_first, mean_of_rows),
+    "near-tie repeats": (near_tie_repeats, mean_of_rows),
 }
-"""Every measure by the name that ``human.toml`` calls it by."""
+"""Every measure with the statistic of all tasks, by the name that ``human.toml`` calls it by."""

@@ -17,9 +17,9 @@ from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.statistics.equivalence import MARGIN
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.topics.paper.published import TRIALS
 from coartic.analysis.topics.paper.tables import hand_shares, published_differences
 from coartic.analysis.words import marked
+from coartic.learner.learning import TRIALS
 
 _MARKS = {
     "equivalent": (style.BLUE, "o", style.BLUE),
@@ -39,7 +39,7 @@ _MARKS = {
     "brackets, how many of our runs have it, then how many of the published ones. * pooled from "
     "several printed sequences.",
 )
-def published(study: Study) -> Parts:
+def draw_published(study: Study) -> Parts:
     """Difference of every mean reward to the printed one, with interval and margin."""
     data = published_differences(study)
     if not len(data):
@@ -93,7 +93,7 @@ def draw_row(axes: Axes, y: float, row: Any) -> None:
     axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
 
 
-MOST = len(style.PALETTE)
+COLOURED = len(style.PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""
 _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
 
@@ -104,7 +104,7 @@ _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
     "Share of runs by hand sequence (L left, R right, goal by goal); numbers are runs. Hatched: "
     "published. Rare sequences are grey.",
 )
-def recruitment(study: Study) -> Parts:
+def draw_recruitment(study: Study) -> Parts:
     """Shares of hand sequences of each main method, one panel for each task with two hands."""
     data = hand_shares(study)
     data = data[data.task.isin(one_by_one(study)) & data.method.isin(main_methods(data.method))]
@@ -120,7 +120,7 @@ def recruitment(study: Study) -> Parts:
     common = shares.sort_values(ascending=False, kind="stable").index
     # Sequences to be compared with published ones have a colour.
     order = list(dict.fromkeys([*data[data.source == "published"].hands, *common]))
-    colors = dict(zip(order[:MOST], style.PALETTE, strict=False))
+    colors = dict(zip(order[:COLOURED], style.PALETTE, strict=False))
     shape = style.grid(len(tasks), 2)
     bars = data.drop_duplicates(["task", "method", "source"]).task.value_counts().max()
     size = style.TWO, (0.75 + 0.155 * bars) * shape[0]
@@ -128,7 +128,7 @@ def recruitment(study: Study) -> Parts:
     for axes, task in zip(panels, tasks, strict=True):
         draw_bars(axes, task, data[data.task == task.name], order, colors)
     style.letters(panels)
-    colors |= {"others": style.GREY} if len(order) > MOST else {}
+    colors |= {"others": style.GREY} if len(order) > COLOURED else {}
     handles = [Patch(facecolor=color, label=hands, **_EDGE) for hands, color in colors.items()]
     style.legend(drawing, handles, len(handles), handlelength=1.0, columnspacing=1.2)
     alt = "; ".join(

@@ -15,9 +15,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, TypeAdapter
 
+from coartic.analysis.words import number
 from coartic.inputs import FileData
 
-Hands = Annotated[str, Field(pattern="^[LR]+$")]
+HandSequence = Annotated[str, Field(pattern="^[LR]+$")]
 Role = Literal["setting", "constraint", "test"]
 
 
@@ -28,10 +29,10 @@ class Solved(FileData):
     """
 
     condition: Literal["EC1", "EC2", "EC3", "EC4"] | None = None
-    hands: Hands | None = None
+    hands: HandSequence | None = None
 
 
-class Entry(Solved):
+class PrintedEntry(Solved):
     """What every entry says."""
 
     id: str
@@ -49,7 +50,7 @@ class Entry(Solved):
     """Said of a sample run, not of all."""
 
 
-class Number(Entry):
+class PrintedNumber(PrintedEntry):
     """A constant (length unit, rad), or a reward, SD or number of runs.
 
     A ``gain`` is a mean reward less that of ``than``. A reward of the corrective process is one
@@ -75,8 +76,13 @@ class Number(Entry):
         """The value; an integer where no decimals are printed."""
         return float(self.value) if self.digits else int(self.value)
 
+    @property
+    def in_words(self) -> str:
+        """The value, which says whether it was derived."""
+        return printed_words(self.number, bool(self.difference_of))
 
-class Order(Entry):
+
+class PrintedOrder(PrintedEntry):
     """The mean reward is above (less negative than) that of ``than``."""
 
     kind: Literal["order"]
@@ -87,14 +93,14 @@ class Order(Entry):
     """Compared is the movement to this goal alone."""
 
 
-class Fact(Entry):
+class PrintedFact(PrintedEntry):
     """Anything else; which fields an entry has depends on its kind."""
 
     kind: Literal[
         "best of all sequences", "initial hands", "hand sequences", "base", "layout", "goals",
         "posture", "lock", "context", "statement",
     ]  # fmt: skip
-    sequences: tuple[Hands, ...] = ()
+    sequences: tuple[HandSequence, ...] = ()
     """Hand sequences: every one that is named; the paper names no other."""
     mixed: bool = False
     """Hand sequences: there are several, and they are not named."""
@@ -129,7 +135,12 @@ class Fact(Entry):
     """Statement: what is said in words only."""
 
 
-def parse_entries(text: str) -> dict[str, Number | Order | Fact]:
+def printed_words(value: float, derived: bool) -> str:
+    """A printed number, which says whether it was derived from others."""
+    return f"{number(value)}{' (derived)' * derived}"
+
+
+def parse_entries(text: str) -> dict[str, PrintedNumber | PrintedOrder | PrintedFact]:
     """Entries by id from the text of a table such as ``published.toml``, in its order."""
     rows: dict[str, dict[str, Any]] = {}
     for task, entries in tomllib.loads(text, parse_float=Decimal).items():
@@ -150,17 +161,17 @@ def parse_entries(text: str) -> dict[str, Number | Order | Fact]:
             row["rounding"] = (
                 0.0 if row["kind"] == "count" else first["rounding"] + second["rounding"]
             )
-    kinds = Annotated[Number | Order | Fact, Field(discriminator="kind")]
+    kinds = Annotated[PrintedNumber | PrintedOrder | PrintedFact, Field(discriminator="kind")]
     return TypeAdapter(dict[str, kinds]).validate_python(rows)
 
 
-ENTRIES: Mapping[str, Number | Order | Fact] = parse_entries(
+ENTRIES: Mapping[str, PrintedNumber | PrintedOrder | PrintedFact] = parse_entries(
     Path(__file__).with_name("published.toml").read_text("utf-8")
 )
 """Every entry by id, in the paper's order of tasks."""
 
 
-def entries_of(task: str, role: Role) -> list[Number | Order | Fact]:
+def entries_of(task: str, role: Role) -> list[PrintedNumber | PrintedOrder | PrintedFact]:
     """What is printed of a task and has a role; none for a task that the paper lacks."""
     return [e for e in ENTRIES.values() if e.task == task and e.role == role]
 
@@ -168,12 +179,12 @@ def entries_of(task: str, role: Role) -> list[Number | Order | Fact]:
 def constant(name: str) -> float:
     """A general constant that the paper prints; KeyError for another."""
     entry = ENTRIES[f"general.{name}"]
-    assert isinstance(entry, Number)
+    assert isinstance(entry, PrintedNumber)
     return entry.number
 
 
-RUNS = int(constant("runs"))  # of every experiment
-TRIALS = int(constant("trials"))  # of every run
+RUNS = int(constant("runs"))
+"""Runs of every experiment."""
 
 
 class Summary(NamedTuple):
@@ -189,6 +200,13 @@ class Summary(NamedTuple):
     """Computed from other printed numbers rather than printed itself."""
     digits: int = 0
     """Decimals of the mean as it is printed."""
+    derived_runs: bool = False
+    """Whether the number of runs is computed from another."""
+
+    @property
+    def in_words(self) -> str:
+        """The mean, which says whether it was derived."""
+        return printed_words(self.mean, self.derived)
 
 
 class PublishedCell(NamedTuple):
@@ -200,17 +218,17 @@ class PublishedCell(NamedTuple):
     """Runs by hand sequence, where the paper tells them apart."""
 
 
-def published_initial(task: str) -> Number | None:
+def published_initial(task: str) -> PrintedNumber | None:
     """Reward of the initial solution of a task; None where the paper prints nothing of it."""
     return _corrective(task, "initial hands")
 
 
-def published_exhaustive(task: str) -> Number | None:
+def published_exhaustive(task: str) -> PrintedNumber | None:
     """The best over all hand sequences."""
     return _corrective(task, "best of all sequences")
 
 
-def _corrective(task: str, kind: str) -> Number | None:
+def _corrective(task: str, kind: str) -> PrintedNumber | None:
     for entry in ENTRIES.values():
         if (entry.kind, entry.task) == (kind, task):
             return _number("reward", task, None, entry.hands)
@@ -234,6 +252,7 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
                 RUNS if runs is None else runs,
                 RUNS if entry.hands is None else runs,
                 digits=entry.digits,
+                derived_runs=count is not None and bool(count.difference_of),
             )
     sequences = {hands: summary for hands, summary in summaries.items() if hands}
     return PublishedCell(summaries.get(None) or pooled([*sequences.values()]), sequences)
@@ -254,9 +273,9 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-def _number(kind: str, task: str, condition: str | None, hands: str | None) -> Number | None:
+def _number(kind: str, task: str, condition: str | None, hands: str | None) -> PrintedNumber | None:
     for entry in ENTRIES.values():
         about = entry.kind, entry.task, entry.condition, entry.hands
-        if isinstance(entry, Number) and about == (kind, task, condition, hands):
+        if isinstance(entry, PrintedNumber) and about == (kind, task, condition, hands):
             return entry
     return None

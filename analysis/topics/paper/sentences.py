@@ -2,13 +2,194 @@
 
 from __future__ import annotations
 
-from coartic.analysis.section import Section
+from collections import Counter
+from collections.abc import Iterable, Mapping
 
-PAPER = Section(
+from coartic.analysis.claims.judge import Judgement, counts, judgements
+from coartic.analysis.claims.register import Verdict
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.section import Section
+from coartic.analysis.statistics.estimates import Estimate
+from coartic.analysis.study import Study
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.topics.paper.tables import beside_paper, best_condition
+from coartic.analysis.words import capital, estimate, listed
+
+MOST_CHANGES = 4
+"""Tasks with changed hands that a sentence names."""
+
+
+def papers_claims(study: Study) -> list[Judgement]:
+    """Claims of the paper; none where the folder has no runs for any of them or its rewards."""
+    entries = [entry for entry in judgements(study) if entry.claim.place]
+    return entries if beside_paper(study) or any(entry.run_ids for entry in entries) else []
+
+
+def claims_shown(study: Study) -> list[Judgement]:
+    """The paper's claims, or ours where the folder is one of our studies."""
+    entries = judgements(study)
+    return entries if entries and entries[0].claim.suite else papers_claims(study)
+
+
+def mostly_undecided(entries: Iterable[Judgement]) -> bool:
+    """Whether half of the claims that count are undecided: they lack runs or trials."""
+    by_verdict = counts(entries)
+    return 2 * by_verdict["undecided"] >= sum(by_verdict.values())
+
+
+def rewards_by_verdict(study: Study) -> Counter[str]:
+    """How many printed rewards of whole cells are equivalent to ours, undecided and different."""
+    verdicts = [row["verdict"] for row in beside_paper(study) if not row["hands"]]
+    return Counter(
+        {name: verdicts.count(name) for name in ("equivalent", "undecided", "different")}
+    )
+
+
+def finding_of_rewards(study: Study) -> str:
+    """How many printed rewards agree with ours, and which of the undecided are off."""
+    if not papers_claims(study):
+        return ""
+    n = rewards_by_verdict(study)
+    if not n.total():
+        return (
+            "Rewards are not judged: only runs with as many trials as the paper's, 10 000, compare "
+            "with those that it prints."
+        )
+    words = (
+        f"Of the {n.total()} learned rewards that the paper prints, {n['equivalent'] or 'none'} "
+        f"{'agrees' if n['equivalent'] == 1 else 'agree'} with ours within 1 %, "
+        f"{n['undecided'] or 'none'} {is_or_are(n['undecided'])} undecided and "
+        f"{n['different'] or 'none'} {'differs' if n['different'] == 1 else 'differ'}."
+    )
+    for row in beside_paper(study):
+        if row["verdict"] == "undecided" and not row["hands"]:
+            off = Estimate(row["difference"], row["difference_low"], row["difference_high"])
+            if off.low > 0 or off.high < 0:
+                condition = row["cell"].label.removeprefix(LEARNER)
+                words += (
+                    f" {condition} on {study.tasks[row['cell'].task].label} is {estimate(off, 1)} "
+                    "ticks from the printed mean: its interval leaves out 0, not corrected for the "
+                    "number of rewards."
+                )
+    return words
+
+
+def finding_of_claims(study: Study) -> str:
+    """Which verdicts there are: on the claims that carry the paper's point, and on the others."""
+    entries = claims_shown(study)
+    if not entries:
+        return ""
+    by_verdict = counts(entries)
+    judged = sum(by_verdict.values())
+    if mostly_undecided(entries):
+        return (
+            f"These runs do not decide {by_verdict['undecided']} of {judged} claims: tasks, "
+            "methods, runs or trials are missing. Only claims with runs are shown here; "
+            "tables/claims.csv lists all."
+        )
+    if central := central_claims(entries):
+        each = [
+            f"{len(claims)} {is_or_are(len(claims))} {verdict}: {listed(claims)}"
+            for verdict, claims in central.items()
+        ]
+        others = counts_of_others(entries)
+        words = f"Of the claims that carry the paper's point {'; '.join(each)}."
+        words += f" Of {sum(others.values())} others {in_numbers(others)}."
+    else:
+        words = f"Of {judged} claims {in_numbers(by_verdict)}."
+    uncounted = len(entries) - judged
+    if uncounted:
+        words += f" Another {uncounted} do not count; tables/claims.csv says why."
+    return words
+
+
+def answer(study: Study) -> str:
+    """Whether the paper is reproduced, by its claims."""
+    entries = papers_claims(study)
+    if not entries:
+        return ""
+    by_verdict = counts(entries)
+    judged = sum(by_verdict.values())
+    if mostly_undecided(entries):
+        words = (
+            f"These runs do not decide {by_verdict['undecided']} of {judged} claims; "
+            f"{supported(by_verdict)}."
+        )
+    elif central := central_claims(entries):
+        if list(central) == ["supported"]:
+            words = f"In its main point, yes: {listed(central['supported'])}."
+        else:
+            words = " ".join(f"{capital(v)}: {listed(claims)}." for v, claims in central.items())
+        others = counts_of_others(entries)
+        words += f" Of {sum(others.values())} other claims {supported(others)}."
+    else:
+        words = f"Of {judged} claims {in_numbers(by_verdict)}."
+    failed = (cell for entry in entries for cell in entry.failed)
+    return words + failed_runs(study, failed, ", which leaves claims undecided")
+
+
+def central_claims(entries: Iterable[Judgement]) -> dict[Verdict, list[str]]:
+    """The claims that carry the paper's point and count, in a few words, by verdict."""
+    central: dict[Verdict, list[str]] = {}
+    for entry in entries:
+        if entry.claim.short and not entry.claim.uncounted:
+            central.setdefault(entry.verdict, []).append(entry.claim.short)
+    return central
+
+
+def counts_of_others(entries: Iterable[Judgement]) -> Mapping[Verdict, int]:
+    """Verdicts on the claims that do not carry the paper's point."""
+    return counts(entry for entry in entries if not entry.claim.short)
+
+
+def in_numbers(n: Mapping[Verdict, int]) -> str:
+    """How many claims have each verdict, in words."""
+    depend = n["depends on the goals"]
+    words = f"{supported(n)}, {n['not supported']} {is_or_are(n['not supported'])} not, "
+    if depend:
+        words += f"{depend} {'depends' if depend == 1 else 'depend'} on which goals one takes, "
+    return f"{words}{n['undecided']} {is_or_are(n['undecided'])} undecided"
+
+
+def supported(n: Mapping[Verdict, int]) -> str:
+    """How many claims are supported, in words."""
+    return f"{n['supported']} {is_or_are(n['supported'])} supported"
+
+
+def is_or_are(count: int) -> str:
+    """The verb for a number of things."""
+    return "is" if count == 1 else "are"
+
+
+def finding_of_hands(study: Study) -> str:
+    """On which tasks the learner's best condition ends with other hands than it began with."""
+    changes: dict[str, list[str]] = {}
+    tasks = 0
+    for name, task in study.tasks.items():
+        label = best_condition(study, name)
+        good = study.cells[name, label].good if label else None
+        if good is not None and good.initial_hands.notna().any():
+            tasks += 1
+            before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
+            if before not in most_frequent:
+                change = f"{before} to {' or '.join(most_frequent)}"
+                changes.setdefault(change, []).append(task.label)
+    changed = sum(map(len, changes.values()))
+    words = "Learning ends with other hands than the initial solution"
+    if changed > MOST_CHANGES:
+        return f"{words} on {changed} of {tasks} tasks."
+    if changed:
+        each = (f"{change} on {listed(where)}" for change, where in sorted(changes.items()))
+        return f"{words}: {'; '.join(each)}."
+    return "Learning keeps the hands of the initial solution."
+
+
+PUBLISHED = Section(
     "paper",
     short="Paper",
     title="Are the paper's rewards reproduced?",
     caption="Learned rewards, published and ours (ticks)",
+    finding=finding_of_rewards,
     figure="published",
     table="published",
     note=(
@@ -26,6 +207,7 @@ CLAIMS = Section(
     short="Claims",
     title="Do the claims hold?",
     caption="Claims; open one to see its evidence",
+    finding=finding_of_claims,
     table="claims",
     note=(
         "p is corrected for the number of claims (Holm). Some claims of the paper rest on goals "
@@ -41,6 +223,7 @@ HANDS = Section(
     short="Hands",
     title="Which hands are chosen?",
     caption="Learned rewards by hand sequence, published and ours (ticks)",
+    finding=finding_of_hands,
     figure="recruitment",
     table="hands",
     single=True,

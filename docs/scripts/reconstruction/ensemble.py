@@ -19,25 +19,23 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from coartic import CoarticError, hand_sequences
-from coartic.analysis.reconstruction.scoring import (
-    Test,
-    compared,
-    conditions_of,
-    distance,
-    distance_error,
-    learned,
-    printed_tests,
-)
-from coartic.analysis.reconstruction.search import Search
-from coartic.learner.learning import TRIALS, threads_for
+from coartic.learner.learning import TRIALS
 from coartic.motion.sequences import CorrectiveTrials
 from coartic.robot import Array
 from coartic.tasks.readings import condition_under
+from coartic.threads import threads_for
+from reconstruction.scoring import (
+    Test,
+    compare,
+    conditions_of,
+    distance,
+    distance_error,
+    learn_cell,
+    printed_tests,
+)
+from reconstruction.search import Search
 
 DECIMALS = 3  # of coordinates
-MOST_NEAR = 20_000
-"""Points of the grid, drawn at random, that are moved to where the printed rewards come out."""
-RANDOM_STEPS = 4_000
 STEP = 0.15  # SD of the random steps, length unit
 POOL = 8_000  # points among which members are spread
 WAVE_SEEDS = 1_000_000  # seeds of a wave begin at a multiple of this
@@ -46,15 +44,37 @@ ENSEMBLE, LAST = 0, 99
 CLEARLY = 2.0  # standard errors by which another point has to be nearer
 
 
-PLAN = ((60, 20, 0, 0.0), (12, 20, 60, 0.1), (12, 20, 60, 0.03), (16, 60, 0, 0.0), (5, 200, 0, 0.0))
-"""The waves of the search for the nearest point. Of each: of how many points, the best of the wave
-before; further runs a condition; further points, in random steps from those; SD of these steps,
-length unit."""
-LAST_RUNS = 300
-"""Runs a condition of the nearest point and of one that stands, to choose between them."""
+class Effort(NamedTuple):
+    """How thoroughly is searched; the defaults gave the shipped ensembles."""
+
+    members: int = 240
+    """Sets of goals that are kept."""
+    runs: int = 20
+    """Runs of each set and condition."""
+    trials: int = TRIALS
+    """Trials of each run."""
+    most_near: int = 20_000
+    """Points of the grid, drawn at random, that are moved to where the printed rewards come out."""
+    random_steps: int = 4_000
+    waves: tuple[tuple[int, int, int, float], ...] = (
+        (60, 20, 0, 0.0),
+        (12, 20, 60, 0.1),
+        (12, 20, 60, 0.03),
+        (16, 60, 0, 0.0),
+        (5, 200, 0, 0.0),
+    )
+    """The waves of the search for the nearest point. Of each: number of points, the best of the
+    wave before; further runs a condition; further points, in random steps from those; SD of these
+    steps, length unit."""
+    last_runs: int = 300
+    """Runs a condition of the nearest point and of one that stands, to choose between them."""
 
 
-class Scored(NamedTuple):
+QUICK = Effort(4, 2, 30, 30, 100, ((3, 2, 0, 0.0), (2, 2, 2, 0.01)), 2)
+"""To try the search out."""
+
+
+class Score(NamedTuple):
     """A point ``(P,)``, what was learned there, and how far that is from what is printed."""
 
     point: Array
@@ -67,53 +87,48 @@ class Scored(NamedTuple):
 
 def reconstruct(
     search: Search,
-    *,
-    members: int = 240,
-    runs: int = 20,
+    effort: Effort,
     report: Callable[[str], None] = lambda text: None,
 ) -> pd.DataFrame:
     """Search, spread, score and choose.
 
-    A row a member: coordinates, distance, and every figure of ``runs`` runs a condition with its
-    distance. The first is the nearest set that was found; each of the others is as far as
-    possible from those before it. The layout's earlier sets of goals compete where they meet every
-    constraint, and come last; the first of them stands unless another one is nearer beyond
-    chance, by :data:`LAST_RUNS` further runs a condition. The result depends on the arguments
-    and on nothing else.
+    A row a member: coordinates, distance, and every figure of its runs with its distance. The
+    first is the nearest set that was found; each of the others is as far as possible from those
+    before it. The layout's earlier sets of goals compete where they meet every constraint, and
+    come last; the first of them stands unless another one is nearer beyond chance, by further
+    runs. The result depends on the arguments and on nothing else.
     """
     layout = search.layout
     goals = np.array(list(layout.earlier.values())).reshape(-1, len(layout.goals), 2)
     earlier = layout.points(goals)
     compete = search.admitted(earlier[layout.allowed(earlier)], "known")
-    pool = admissible_points(search, report)
-    pool = np.concatenate([compete[:1], without(pool, compete[:1])])
+    pool = admissible_points(search, effort, report)
+    pool = np.concatenate([compete[:1], exclude(pool, compete[:1])])
     sequences = hand_sequences(search.task)
     printed = [sequences.index(hands) for hands in search.rewards]
     apart = features(search.attempt(pool, sequences), printed)
-    spread = pool[spread_out(apart, members, 0 if len(compete) else None)]
+    spread = pool[farthest_first(apart, effort.members, 0 if len(compete) else None)]
 
-    begin = np.concatenate([spread, without(compete, spread)])
-    results = scored(search, begin, wave=ENSEMBLE, runs=runs)
-    report(described(results, runs))
-    nearest = best_of_waves(search, results, report).point[None]
+    begin = np.concatenate([spread, exclude(compete, spread)])
+    results = score(search, begin, effort.trials, wave=ENSEMBLE, runs=effort.runs)
+    report(summary(results, effort.runs))
+    nearest = best_of_waves(search, effort, results, report).point[None]
     if len(compete) and not (nearest == compete[:1]).all():
         both = np.concatenate([nearest, compete[:1]])
-        challenger, standing = scored(search, both, wave=LAST, runs=LAST_RUNS)
+        challenger, standing = score(search, both, effort.trials, wave=LAST, runs=effort.last_runs)
         better = clearly_nearer(challenger, standing, printed_tests(search.task.name))
         report(
             f"the nearest {challenger.distance:.2f}, the one that stands {standing.distance:.2f}, "
-            f"{LAST_RUNS} runs a condition: {'it is replaced' if better else 'it stands'}"
+            f"{effort.last_runs} runs a condition: {'it is replaced' if better else 'it stands'}"
         )
         nearest = nearest if better else compete[:1]
 
-    chosen = np.concatenate([nearest, without(spread, nearest)])
+    chosen = np.concatenate([nearest, exclude(spread, nearest)])
     names = [*(f"m{k:03d}" for k in range(1, len(chosen) + 1)), *layout.earlier]
     points = np.concatenate([chosen, earlier])
-    fresh = np.unique(without(points, begin), axis=0)
-    by_point = {
-        result.point.tobytes(): result
-        for result in (*results, *scored(search, fresh, wave=ENSEMBLE, runs=runs))
-    }
+    fresh = np.unique(exclude(points, begin), axis=0)
+    others = score(search, fresh, effort.trials, wave=ENSEMBLE, runs=effort.runs)
+    by_point = {result.point.tobytes(): result for result in (*results, *others)}
     rows = [
         member_row(name, places, by_point[point.tobytes()])
         for name, places, point in zip(names, layout.places(points), points, strict=True)
@@ -123,15 +138,15 @@ def reconstruct(
     return pd.DataFrame(rows)
 
 
-def admissible_points(search: Search, report: Callable[[str], None]) -> Array:
+def admissible_points(search: Search, effort: Effort, report: Callable[[str], None]) -> Array:
     """Admissible points with rounded coordinates, without repetitions, in random order."""
     rng = np.random.default_rng(0)
     exact, near = search.grid(report)
     report(f"{len(exact)} round sets of goals meet every constraint, {len(near)} come near")
-    near = near[rng.permutation(len(near))[:MOST_NEAR]]
+    near = near[rng.permutation(len(near))[: effort.most_near]]
     points = np.concatenate([exact, search.admitted(search.solve(near), "moved")])
     if len(points):
-        points = np.concatenate([points, search.spread(points, RANDOM_STEPS, rng, STEP)])
+        points = np.concatenate([points, search.spread(points, effort.random_steps, rng, STEP)])
     points = np.unique(np.round(points, DECIMALS), axis=0)
     points = search.admitted(points[search.layout.allowed(points)], "rounded")
     report(f"{len(points)} sets of goals with {DECIMALS} decimals meet every constraint")
@@ -156,7 +171,7 @@ def features(trials: CorrectiveTrials, printed: Sequence[int]) -> Array:
     return np.hstack(groups)
 
 
-def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[np.int64]:
+def farthest_first(points: Array, count: int, first: int | None = None) -> NDArray[np.int64]:
     """Indices of ``count`` points, each as far as possible from those before it.
 
     They begin with ``first``, or with the one nearest to the mean; then greedily the farthest
@@ -171,14 +186,15 @@ def spread_out(points: Array, count: int, first: int | None = None) -> NDArray[n
     return np.array(chosen, dtype=np.int64)
 
 
-def scored(
+def score(
     search: Search,
     points: Array,
+    trials: int,
     *,
     wave: int,
     runs: int,
-    before: Mapping[bytes, Scored] = MappingProxyType({}),
-) -> list[Scored]:
+    before: Mapping[bytes, Score] = MappingProxyType({}),
+) -> list[Score]:
     """Learning runs at points ``(N, P)``, with the seeds of a wave, beside what is printed.
 
     Under the conditions of which something is printed. Runs ``before``, by the bytes of the
@@ -188,26 +204,27 @@ def scored(
     conditions = conditions_of(search.task.name, condition_under(search.readings))
     tests = printed_tests(search.task.name)
 
-    def score(point: Array, goals: Array) -> Scored:
+    def score_point(point: Array, goals: Array) -> Score:
         task, earlier, cells = search.task_with(goals), before.get(point.tobytes()), {}
         for name, condition in conditions.items():
-            cell = learned(task, condition, seeds, model=search.model, trials=TRIALS)
+            cell = learn_cell(task, condition, seeds, model=search.model, trials=trials)
             cells[name] = cell if earlier is None else pd.concat([earlier.cells[name], cell])
-        comparisons = compared(tests, cells)
-        return Scored(point, cells, comparisons, distance(comparisons))
+        comparisons = compare(tests, cells)
+        return Score(point, cells, comparisons, distance(comparisons))
 
     with ThreadPoolExecutor(threads_for(search.jobs)) as pool:
-        return list(pool.map(score, points, search.layout.places(points)))
+        return list(pool.map(score_point, points, search.layout.places(points)))
 
 
 def best_of_waves(
     search: Search,
-    results: Sequence[Scored],
+    effort: Effort,
+    results: Sequence[Score],
     report: Callable[[str], None],
-) -> Scored:
+) -> Score:
     """The point that is nearest to what is printed after some waves, which begin with these."""
     before = {result.point.tobytes(): result for result in results}
-    for number, (best_points, runs, around_them, step) in enumerate(PLAN, ENSEMBLE + 1):
+    for number, (best_points, runs, around_them, step) in enumerate(effort.waves, ENSEMBLE + 1):
         best = sorted(results, key=lambda result: result.distance)[:best_points]
         points = np.array([result.point for result in best])
         if around_them:
@@ -215,19 +232,19 @@ def best_of_waves(
             around = np.round(search.spread(points, around_them, rng, step), DECIMALS)
             around = search.admitted(around[search.layout.allowed(around)], "around the best")
             points = np.unique(np.concatenate([points, around]), axis=0)
-        results = scored(search, points, wave=number, runs=runs, before=before)
+        results = score(search, points, effort.trials, wave=number, runs=runs, before=before)
         before |= {result.point.tobytes(): result for result in results}
-        report(f"wave {number}: {described(results, runs)}")
+        report(f"wave {number}: {summary(results, runs)}")
     return min(results, key=lambda result: result.distance)
 
 
-def clearly_nearer(challenger: Scored, standing: Scored, tests: Sequence[Test]) -> bool:
+def clearly_nearer(challenger: Score, standing: Score, tests: Sequence[Test]) -> bool:
     """Whether a point is nearer to what is printed than one that stands, beyond chance."""
     errors = [distance_error(tests, each.cells) for each in (challenger, standing)]
     return standing.distance - challenger.distance > CLEARLY * math.hypot(*errors)
 
 
-def described(results: Sequence[Scored], runs: int) -> str:
+def summary(results: Sequence[Score], runs: int) -> str:
     """How many sets of goals were scored, by how many further runs, and how far they are."""
     distances = [result.distance for result in results]
     return (
@@ -236,12 +253,12 @@ def described(results: Sequence[Scored], runs: int) -> str:
     )
 
 
-def without(points: Array, others: Array) -> Array:
+def exclude(points: Array, others: Array) -> Array:
     """The points that are none of the others."""
     return np.asarray(points[~(points[:, None] == others).all(axis=2).any(axis=1)])
 
 
-def member_row(name: str, goals: Array, result: Scored) -> dict[str, Any]:
+def member_row(name: str, goals: Array, result: Score) -> dict[str, Any]:
     """A member's row of the table of an ensemble."""
     row: dict[str, Any] = {"member": name}
     for number, (x, y) in enumerate(goals.tolist(), 1):

@@ -16,9 +16,9 @@ from pydantic import TypeAdapter
 from coartic import MotionModel, Task, hand_sequences
 from coartic.analysis.topics.paper.published import entries_of
 from coartic.analysis.words import read_beside
-from coartic.learner.learning import threads_for
 from coartic.motion.sequences import CorrectiveTrials, corrective_trials
 from coartic.robot import Array
+from coartic.threads import threads_for
 
 Flags = NDArray[np.bool_]
 GOALS_A_THREAD = 500  # sets of goals that a thread is given at once

@@ -17,21 +17,17 @@ from dataclasses import replace
 from itertools import repeat
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from coartic.analysis.claims.judge import by_tests, judge, opposite_p, p_of
+from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS, Claim
-from coartic.analysis.reconstruction.search import search_for
 from coartic.analysis.study import Study
-from coartic.learner.learning import threads_for
-from coartic.runs.plan import variant_of
-from coartic.tasks.catalogue import task_of, with_members
+from coartic.tasks.catalogue import is_admitted, task_of, with_members
 from coartic.tasks.readings import condition_under, load_readings
-from coartic.threads import begin_worker, one_thread_each
+from coartic.threads import begin_worker, one_thread_each, threads_for
 
-COLUMNS = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
-PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.families)
+ROW = ("readings", "task", "member", "claim", "verdict", "effect", "low", "high", "p")
+PAPERS = tuple(claim for claim in CLAIMS.values() if not claim.on_random_tasks)
 VERDICTS = ("supported", "not supported", "undecided")
 
 
@@ -41,7 +37,7 @@ spaces between them; the task whose goals are of a member, and the member, both 
 goals are the default ones."""
 
 
-def judged_specifications(
+def judge_specifications(
     studies: Iterable[Study],
     *,
     claims: Iterable[Claim] = PAPERS,
@@ -69,7 +65,7 @@ def judged_specifications(
             judgeable |= {(task, name) for name in claims_judged}
             progress(", ".join(filter(None, (member, *readings.split()))) or "default")
     kept = [row for row in rows if (row["task"], row["claim"]) in judgeable]
-    return pd.DataFrame(kept, columns=list(COLUMNS))
+    return pd.DataFrame(kept, columns=list(ROW))
 
 
 def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
@@ -91,15 +87,12 @@ def specifications(study: Study) -> Iterator[tuple[Specification, Study]]:
 
 
 def admitted_members(study: Study, task: str) -> list[str]:
-    """Members in a folder that meet every constraint, the first of those with the same goals."""
+    """Members in a folder that are admitted, the first of those with the same goals."""
     goals: dict[Any, str] = {}
     for name in study.plan.tasks:
-        if task_of(name) == task:
+        if task_of(name) == task and is_admitted(name):
             goals.setdefault(study.tasks[name].goals, name)
-    if not goals:
-        return []
-    fits = search_for(task, jobs=1).meets_all(np.array(list(goals)))
-    return [name for name, fit in zip(goals.values(), fits, strict=True) if fit]
+    return list(goals.values())
 
 
 def study_as(study: Study, names: Mapping[str, str]) -> Study:
@@ -111,21 +104,20 @@ def study_as(study: Study, names: Mapping[str, str]) -> Study:
     fields = condition_under(load_readings(plan.readings))
     cells, variants = [], {}
     for cell in plan.cells:
-        if cell.task not in names:
+        if cell.task.name not in names:
             continue
         parameters = {
             key: value for key, value in cell.parameters.items() if fields.get(key) != value
         }
-        variant = variant_of(parameters, plan.methods[cell.method].defaults)
-        variants[cell.task, cell.method, cell.variant] = variant
-        task = names[cell.task]
-        cells.append(replace(cell, task=task, variant=variant, parameters=parameters))
+        task = cell.task.model_copy(update={"name": names[cell.task.name]})
+        view_cell = replace(cell, task=task, parameters=parameters)
+        variants[cell.task.name, cell.method.name, cell.variant] = view_cell.variant
+        cells.append(view_cell)
     runs = study.runs[study.runs.task.isin(list(names))].copy()
     keys = zip(runs.task, runs.method, runs.variant, strict=True)
     runs["variant"] = pd.Series([variants[key] for key in keys], runs.index, "string")
     runs["task"] = runs.task.map(names).astype(runs.task.dtype)
-    tasks = {new: {**plan.tasks[name], "name": new} for name, new in names.items()}
-    view = replace(plan, tasks=tasks, cells=tuple(cells))
+    view = replace(plan, cells=tuple(cells))
     return Study(study.folder, view, study.made_with, runs)
 
 
@@ -134,24 +126,15 @@ def judge_view(
 ) -> tuple[Specification, list[dict[str, Any]], list[str]]:
     """Rows of a specification, and the claims that its own runs can judge."""
     task, rows, claims_judged = specification[1], [], []
-    wanted = [CLAIMS[name] for name in names]
-    if task:  # what the default goals of the other task do is no matter of a member's
-        for number, claim in enumerate(wanted):
-            if task in claim.pairs:
-                fields = {"pairs": claim.pairs, "shown": claim.shown}
-                alone = {
-                    name: {other: texts for other, texts in by_task.items() if other == task}
-                    for name, by_task in fields.items()
-                }
-                wanted[number] = claim.model_copy(update=alone)
     its_runs = set(view.runs.run_id[view.runs.task == task] if task else view.runs.run_id)
-    for judged in judge(view, wanted):
+    # What the default goals of the other task do is no matter of a member's.
+    for judged in judge_claims(view, [CLAIMS[name] for name in names], only=task):
         claim, finding = judged.claim, judged.finding
         if its_runs.intersection(judged.run_ids):
             claims_judged.append(claim.id)
-        row: dict[str, Any] = dict(zip(COLUMNS, (*specification, claim.id), strict=False))
-        row["verdict"] = by_tests(finding, p_of(claim, finding), opposite_p(claim, finding))
-        row |= dict.fromkeys(("effect", "low", "high", "p"), math.nan)
+        row: dict[str, Any] = dict.fromkeys(ROW, math.nan)
+        row |= zip(ROW, (*specification, claim.id), strict=False)
+        row["verdict"] = finding.verdict(finding.p, finding.opposite_p)
         if finding.tests:
             first = finding.tests[0]
             row |= {"effect": first.value, "low": first.low, "high": first.high, "p": first.p}

@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from coartic import CoarticError, MotionModel, Task, load_task
-from coartic.analysis.reconstruction.layouts import (
+from coartic.motion.sequences import CorrectiveTrials
+from coartic.robot import Array
+from coartic.tasks.readings import ChosenReading, load_readings, model_under
+from coartic.text import did_you_mean
+from reconstruction.layouts import (
     Constraint,
     Flags,
     Layout,
@@ -23,16 +27,13 @@ from coartic.analysis.reconstruction.layouts import (
     layouts,
     try_sequences,
 )
-from coartic.motion.sequences import CorrectiveTrials
-from coartic.robot import Array
-from coartic.tasks.readings import ChosenReading, load_readings, model_under, task_under
-from coartic.text import did_you_mean
 
 GRID_BLOCK = 100_000  # points of the grid that are tried at once
 DIFFERENCE = 0.1
 """Step of the finite differences, length unit: rewards are whole ticks, some 100 a length unit."""
 SOLVER_STEPS = 12
 LONGEST_STEP = 0.5  # of the solver, length unit
+QUICK_STEP = 0.2  # of the grid of a quick search, length unit
 
 
 @dataclass
@@ -137,10 +138,13 @@ class Search:
         return self.admitted(self.solve(points), "after steps")
 
 
-def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Search:
+def search_for(
+    task: str, *, readings: Sequence[str] = (), jobs: int = 2, quick: bool = False
+) -> Search:
     """A search for the goals of a task under readings, as ``ties=right``.
 
-    Raises CoarticError for a task whose goals are printed, and for readings that are none.
+    A ``quick`` one has a grid of three values a parameter, around the goals that stand. Raises
+    CoarticError for a task whose goals are printed, and for readings that are none.
     """
     searched = layouts()
     if task not in searched:
@@ -149,5 +153,13 @@ def search_for(task: str, *, readings: Sequence[str] = (), jobs: int = 2) -> Sea
             f"printed: {', '.join(searched)}{did_you_mean(task, searched)}"
         )
     chosen = load_readings(readings)
-    plain = task_under(chosen, load_task(task))
-    return Search(plain, searched[task], constraints_of(plain), chosen, jobs)
+    plain, layout = load_task(task), searched[task]
+    search = Search(plain, layout, constraints_of(plain), chosen, jobs)
+    if quick:
+        standing = layout.points(plain.goal_array[None])[0]
+        grid = {
+            name: (value - QUICK_STEP, value + QUICK_STEP, QUICK_STEP)
+            for name, value in zip(layout.names, standing.tolist(), strict=True)
+        }
+        search.layout, search.near = replace(layout, grid=grid), 45.0
+    return search

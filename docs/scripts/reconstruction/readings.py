@@ -23,22 +23,16 @@ import pandas as pd
 from scipy import stats
 
 from coartic import Task, builtin_tasks, corrective_trial, load_task
-from coartic.analysis.reconstruction.scoring import (
+from coartic.analysis.topics.paper.published import entries_of
+from coartic.robot import Array
+from coartic.tasks.readings import condition_under, load_readings, model_under, readings
+from coartic.threads import threads_for
+from reconstruction.scoring import (
     Figure,
     conditions_of,
-    learned,
+    learn_cell,
     learned_rewards,
     printed_tests,
-)
-from coartic.analysis.topics.paper.published import entries_of
-from coartic.learner.learning import threads_for
-from coartic.robot import Array
-from coartic.tasks.readings import (
-    condition_under,
-    load_readings,
-    model_under,
-    readings,
-    task_under,
 )
 
 REFUTED = 0.01  # chance below which a reading is refuted
@@ -90,7 +84,7 @@ def judge_readings(
     """
 
     def perform(texts: Sequence[str]) -> tuple[dict[str, Any], list[Any]]:
-        row, rewards = judge(texts, runs=runs, trials=trials)
+        row, rewards = judge_reading(texts, runs=runs, trials=trials)
         progress(row["readings"], row["p"])
         return row, rewards
 
@@ -103,7 +97,9 @@ def judge_readings(
     return pd.DataFrame([row for row, _ in judged])
 
 
-def judge(texts: Sequence[str], *, runs: int, trials: int) -> tuple[dict[str, Any], list[Any]]:
+def judge_reading(
+    texts: Sequence[str], *, runs: int, trials: int
+) -> tuple[dict[str, Any], list[Any]]:
     """A combination's row, and every reward behind it."""
     chosen = load_readings(texts)
     model, fields = model_under(chosen), condition_under(chosen)
@@ -111,13 +107,12 @@ def judge(texts: Sequence[str], *, runs: int, trials: int) -> tuple[dict[str, An
     initial: dict[str, int | None] = {}
     cells: dict[str, pd.DataFrame] = {}
     parts: list[Likelihood] = []
-    for plain in one_armed():
-        task = task_under(chosen, plain)
+    for task in one_armed():
         reward = corrective_trial(task, task.initial_hands, model=model).reward
         initial[f"{task.name} initial"] = reward
         for name, condition in conditions_of(task.name, fields).items():
             seeds = range(JUDGING_SEEDS, JUDGING_SEEDS + runs)
-            cell = learned(task, condition, seeds, model=model, trials=trials)
+            cell = learn_cell(task, condition, seeds, model=model, trials=trials)
             cells[f"{task.name}/{name}"] = cell
             figures = [test for test in printed_tests(task.name) if isinstance(test, Figure)]
             of_cell = likelihoods(figures, cell)

@@ -1,4 +1,4 @@
-"""Make the shipped optima anew from the results of suite ``optimum``."""
+"""Make the shipped optima anew: ``python docs/scripts/renew_optima.py FOLDER`` (suite optimum)."""
 
 from __future__ import annotations
 
@@ -54,31 +54,26 @@ def collect(study: Study) -> list[ShippedOptimum]:
     return collected
 
 
-def renew(new: Iterable[ShippedOptimum]) -> int:
-    """Put entries into ``optima.json`` in the place of those about the same; how many stay."""
-    kept = {entry.key: entry for entry in entries()}
-    renewed = {entry.key: entry for entry in new}
-    content = [
-        entry.model_dump(exclude_unset=True) for _, entry in sorted((kept | renewed).items())
-    ]
-    text = json.dumps({"optima": content}, indent=1, ensure_ascii=False)
-    write_atomically(DATA, f"{text}\n".encode())
-    return len(kept.keys() - renewed.keys())
+def content_with(new: Iterable[ShippedOptimum], old: Iterable[ShippedOptimum]) -> bytes:
+    """Content of ``optima.json``: new entries replace old ones about the same search."""
+    by_key = {entry.key: entry for entry in (*old, *new)}
+    content = [by_key[key].model_dump(exclude_unset=True) for key in sorted(by_key)]
+    return f"{json.dumps({'optima': content}, indent=1, ensure_ascii=False)}\n".encode()
 
 
 def main() -> None:
-    """``python -m coartic.analysis.renew_optima FOLDER``: renew entries of ``optima.json``."""
+    """Renew the entries of ``optima.json`` that a results folder of suite ``optimum`` covers."""
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(
-            "usage: python -m coartic.analysis.renew_optima RESULTS_FOLDER\n"
+            "usage: python docs/scripts/renew_optima.py RESULTS_FOLDER\n"
             f"Renews in {DATA} what the folder's optimum runs cover; the rest stays."
         )
     try:
         new = collect(load(sys.argv[1]))
     except CoarticError as error:
         sys.exit(one_line(str(error)))
-    kept = renew(new)
-    print(f"{DATA}: {len(new)} optima renewed, {kept} kept")
+    write_atomically(DATA, content_with(new, entries()))
+    print(f"{DATA}: {len(new)} optima renewed")
 
 
 if __name__ == "__main__":

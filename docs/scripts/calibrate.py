@@ -1,8 +1,8 @@
-"""How intervals and tests do where the truth is known: ``python -m coartic.analysis.calibrate``.
+"""How intervals and tests do where the truth is known: ``python docs/scripts/calibrate.py``.
 
 With a folder of many runs of the placebo on ascending and descending, how often it passes as a sign
 of coarticulation: ``coartic run comparison --tasks ascending,descending --methods placebo/guesses
---runs 400 --out results/placebo``, then ``python -m coartic.analysis.calibrate results/placebo``.
+--runs 400 --out results/placebo``, then ``python docs/scripts/calibrate.py results/placebo``.
 
 Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
 hold the truth in 95 % of them; tests at 5 % should reject a true hypothesis in 5 % at most. The

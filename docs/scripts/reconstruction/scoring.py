@@ -23,7 +23,6 @@ from coartic.analysis.topics.paper.published import RUNS, entries_of
 from coartic.learner.conditions import ExplorationCondition
 from coartic.robot import Array
 
-RESAMPLES = 200  # of the runs, for the standard error of a distance
 FARTHEST = 5.0
 """Standard errors that a figure counts at most, and where too few runs learned its hands: a
 sequence that is not learned is as bad as one with a figure far off, never better."""
@@ -166,7 +165,7 @@ def conditions_of(
     return {name: replace(CONDITIONS[name], **(fields or {})) for name in names}
 
 
-def learned(
+def learn_cell(
     task: Task,
     condition: str | ExplorationCondition,
     seeds: Iterable[int],
@@ -191,7 +190,7 @@ def learned_rewards(runs: pd.DataFrame, hands: str | None = None) -> Array:
     return np.asarray(rewards[chosen])
 
 
-def compared(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def compare(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """A row for each printed figure, by its label: ``ours``, ``distance`` and ``counted``.
 
     Distances are in standard errors, positive where ours is the larger.
@@ -211,12 +210,14 @@ def distance(comparisons: pd.DataFrame) -> float:
     return math.sqrt(sum(squares) / len(squares))
 
 
-def distance_error(tests: Sequence[Test], cells: Mapping[str, pd.DataFrame]) -> float:
+def distance_error(
+    tests: Sequence[Test], cells: Mapping[str, pd.DataFrame], resamples: int = 200
+) -> float:
     """Standard error of :func:`distance` by the bootstrap over the runs of each cell."""
     rng = np.random.default_rng(0)
     distances = []
-    for _ in range(RESAMPLES):
+    for _ in range(resamples):
         numbers = {name: rng.integers(len(runs), size=len(runs)) for name, runs in cells.items()}
-        drawn = {name: runs.iloc[numbers[name]] for name, runs in cells.items()}
-        distances.append(distance(compared(tests, drawn)))
+        sample = {name: runs.iloc[numbers[name]] for name, runs in cells.items()}
+        distances.append(distance(compare(tests, sample)))
     return float(np.std(distances, ddof=1))

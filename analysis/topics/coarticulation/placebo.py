@@ -1,0 +1,129 @@
+"""Tests against the placebo: random guesses, of which the best of many is selected.
+
+A method that selects its solution from trials by their rewards shows signs that selection alone
+shows, and has to exceed the placebo's.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coartic.analysis.methods import PLACEBO
+from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts
+from coartic.analysis.signatures.context import beyond_p, smallest_p
+from coartic.analysis.signatures.locus import moved_goals
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.estimates import LEVEL, SEED
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.study import Study, cached
+from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
+from coartic.robot import Hand
+
+
+def selects(study: Study, label: str) -> bool:
+    """Whether a method's solution may be one of many trials, selected by its reward."""
+    method = label.partition(" ")[0]
+    return method != PLACEBO and group_of(study, label) == BY_TRIAL
+
+
+def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
+    """The placebo in the same two contexts; None without one that made as many trials."""
+    keys = [(task.name, PLACEBO) for task in contexts.tasks]
+    if not all(key in study.cells and len(study.cells[key].good) for key in keys):
+        return None
+    for name, label in keys:
+        method = study.cells[name, contexts.method].runs.trials.max()
+        if study.cells[name, label].runs.trials.max() < method:
+            return None
+    first, second = (study.trajectories(*key) for key in keys)
+    placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
+    return placebo if all(placebo.runs) else None
+
+
+def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
+    """P of the test that a method's postures lie further apart than the placebo's.
+
+    NaN for a method that selects nothing, and without a placebo that made as many trials.
+    """
+    if not selects(study, contexts.method):
+        return math.nan
+    placebo = placebo_of(study, contexts)
+    return math.nan if placebo is None else contexts.p_beyond(placebo)
+
+
+def slope_beyond_p(
+    study: Study, label: str, task: str, goal: int, moving: int, hand: Hand
+) -> float:
+    """P of the test that postures at a goal follow a moving one more than the placebo's do.
+
+    ``task``: one of those that differ in goal ``moving``. NaN for a method that selects nothing,
+    and without runs of the placebo at all places.
+    """
+    if not selects(study, label):
+        return math.nan
+    (moved,) = (
+        each for each in moved_goals(study.tasks) if each.goal == moving and task in each.positions
+    )
+    places, groups = np.unique(list(moved.positions.values())), []
+    for method in (label, PLACEBO):
+        names = [name for name in moved.positions if (name, method) in study.cells]
+        cells = {name: study.trajectories(name, method) for name in names}
+        beside = BesideMovedGoal.of(moved, cells, goal, hand)
+        if beside is None:
+            return math.nan
+        at = np.array(beside.positions)
+        groups.append([beside.configurations[at == place] for place in places])
+    x = places - places.mean()
+    rng = np.random.default_rng([SEED, goal, moving])
+    return beyond_p(groups[0], groups[1], rng, contrast=x / (x**2).sum())
+
+
+def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
+    """Two-tailed p of the bootstrap test of a sign of coarticulation against the placebo's.
+
+    NaN for a method that selects nothing, and where one of both has fewer than two values.
+    """
+    if not selects(study, label) or (task, PLACEBO) not in study.cells:
+        return math.nan
+    ours, guesses = (SIGNS[sign].of(study.trajectories(task, who)) for who in (label, PLACEBO))
+    several = min(len(ours), len(guesses)) > 1
+    return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan
+
+
+class Difference(NamedTuple):
+    """Postures at the shared goal before two successors, beside those of the placebo."""
+
+    contexts: TwoContexts
+    placebo: TwoContexts | None
+    selects: bool
+    """Whether the placebo is needed."""
+    beyond_p: float
+    """P of the test that they lie further apart than the placebo's; NaN without it."""
+    differ: bool
+    """Whether the postures differ, more than by chance."""
+    seen: bool
+    """Whether they also differ by more than the placebo's, where that is needed."""
+    too_few: bool
+    """Whether so few runs could not show a difference."""
+
+
+@cached
+def difference(study: Study) -> Difference | None:
+    """How postures at the first shared goal depend on the next goal; None without two tasks."""
+    contexts = shared_goal(study)
+    if contexts is None:
+        return None
+    cell = study.cells[contexts.tasks[0].name, contexts.method]
+    # A method whose runs differ by chance takes a test.
+    tested = study.plan.methods[cell.method].stochastic
+    differ = contexts.p < LEVEL if tested else contexts.apart > 0
+    needed = selects(study, contexts.method)
+    placebo = placebo_of(study, contexts) if needed else None
+    beyond = math.nan if placebo is None else contexts.p_beyond(placebo)
+    seen = differ and (not needed or beyond < LEVEL)
+    too_few = tested and not smallest_p(*map(len, contexts.runs)) < LEVEL
+    return Difference(contexts, placebo, needed, beyond, differ, seen, too_few)

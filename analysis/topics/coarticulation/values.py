@@ -1,0 +1,186 @@
+"""All signatures of a study, a value a row, and the contexts that they compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import chain, product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.methods import CONDITIONS, main_methods
+from coartic.analysis.signatures.between import (
+    NOWHERE,
+    BesideMovedGoal,
+    Place,
+    TwoContexts,
+    Value,
+)
+from coartic.analysis.signatures.context import context_pairs
+from coartic.analysis.signatures.locus import LEAST, MovedGoal, joined_tasks, moved_goals
+from coartic.analysis.signatures.register import Signature, of_kind
+from coartic.analysis.statistics.estimates import Estimate, student_mean, wilson
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.trajectories import Trajectories
+from coartic.robot import HANDS, Array
+
+SignatureValues = Iterator[tuple[Signature, Value]]
+NO_CONTEXT = "the method did no other task that shares the start and the first goals"
+IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
+NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
+
+
+@cached
+def signature_values(study: Study) -> pd.DataFrame:
+    """Every signature of every method and task of a study, a value a row.
+
+    Columns ``task``, ``method``, ``variant``; ``signature``, ``where`` (the place in words);
+    ``value`` with ``low`` and ``high`` of its interval at 95 %, ``p`` without correction, ``n``
+    runs behind it, ``unit``, ``why_not`` there is no value, interval or test; those of
+    :class:`~coartic.analysis.signatures.between.Place`; ``label``. Signatures of runs are means
+    with Student's interval, shares of runs have Wilson's. Differences between contexts stand with
+    the first task of the pair and name the other; tasks that moved goals join are no pairs, their
+    slopes say how each depends on the others.
+    """
+    identity = ["task", "method", "variant"]
+    columns = ["signature", "where", "value", "low", "high", "p", "n", "unit", "why_not"]
+    frame = pd.DataFrame(rows(study), columns=[*identity, *columns, *Place._fields, "label"])
+    return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))
+
+
+def rows(study: Study) -> Iterator[dict[str, Any]]:
+    """Rows of :func:`signature_values`, cell by cell."""
+    alone = one_by_one(study)
+    trajectories = {key: study.trajectories(*key) for key in study.cells if key[0] in alone}
+    moved, pairs = moved_goals(study.tasks), pairs_of_contexts(study)
+    for (task, label), cell in trajectories.items():
+        of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
+        here = [each for each in moved if task in each.positions]
+        partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
+        values = [of_runs(cell)]
+        values += [
+            of_contexts(cell, of_method[second], shared)
+            for first, second, shared in partners
+            if first == task
+        ]
+        if not partners:
+            values.append(no_values(of_kind("contexts"), IN_FAMILY if here else NO_CONTEXT))
+        for each in here:
+            cells = {name: of_method[name] for name in each.positions if name in of_method}
+            if task == next(iter(cells)):
+                values.append(of_moved_goal(each, cells))
+        if not here:
+            values.append(no_values(of_kind("moved goals"), NO_FAMILY))
+        for signature, value in chain(*values):
+            estimate = value.estimate
+            yield {
+                **{"task": task, "method": cell.method, "variant": cell.variant, "label": label},
+                **{"signature": signature.name, "where": str(value.place), "n": value.n},
+                **{"value": estimate.value, "low": estimate.low, "high": estimate.high},
+                **{"p": estimate.p, "why_not": value.why_not},
+                "unit": signature.unit if value.unit is None else value.unit,
+                **value.place._asdict(),
+            }
+
+
+def no_values(
+    signatures: Iterable[Signature], why: str, place: Place = NOWHERE, n: int = 0
+) -> SignatureValues:
+    """Signatures none of which applies, and why."""
+    for signature in signatures:
+        yield signature, Value(place, n=n, why_not=why, unit="")
+
+
+def of_runs(cell: Trajectories) -> SignatureValues:
+    """Means and shares over the runs of a cell."""
+    for signature in of_kind("runs"):
+        why = "the task has one hand" * (signature.two_hands and len(cell.task.hands) < 2)
+        why = why if cell.runs else "no run has a solution"
+        values = np.empty(0) if why else np.asarray(signature.measure(cell))
+        if not len(values):
+            why = why or "the corrective process alone does not complete the task"
+            yield from no_values([signature], why)
+        elif values.ndim == 1:
+            yield signature, over_runs(signature, values, NOWHERE)
+        else:
+            for goal, of_goal in enumerate(values.T, 1):
+                yield signature, over_runs(signature, of_goal, Place(goal))
+
+
+def over_runs(signature: Signature, values: Array, place: Place) -> Value:
+    """The mean over the runs that have a value (n,), or the share of runs, with its interval."""
+    values = values[np.isfinite(values)]
+    n = len(values)
+    if not n:
+        return Value(place, why_not=signature.missing)
+    if values.dtype == bool:
+        count = int(values.sum())
+        estimate = wilson(count, n) if n > 1 else Estimate(count / n)
+    else:
+        estimate = student_mean(values.astype(np.float64))
+    return Value(place, estimate, n, "one run: no interval" if n == 1 else "")
+
+
+def of_contexts(first: Trajectories, second: Trajectories, shared: int) -> SignatureValues:
+    """Values at every shared goal for every hand that hit it in both contexts."""
+    for goal in range(1, shared + 1):
+        in_both = contexts_at(first, second, goal)
+        for contexts in in_both:
+            for signature in of_kind("contexts"):
+                yield signature, signature.measure(contexts)
+        if not in_both:
+            place = Place(goal, against=second.task.name)
+            why = "no hand hit the goal in both contexts"
+            yield from no_values(of_kind("contexts"), why, place)
+
+
+def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[TwoContexts]:
+    """A goal in two contexts, for every hand that hit it in both."""
+    by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
+    return [contexts for contexts in by_hand if all(contexts.runs)]
+
+
+def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> SignatureValues:
+    """Values at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
+
+    ``cells``: what one method did on the tasks. A goal needs runs at enough positions.
+    """
+    task = next(iter(cells.values())).task
+    numbers = (n for n in (moved.goal - 1, moved.goal + 1) if 1 <= n <= len(task.goals))
+    for goal, hand in product(numbers, HANDS):
+        beside = BesideMovedGoal.of(moved, cells, goal, hand)
+        if beside is not None and len(set(beside.positions)) < LEAST:
+            why = f"runs with that hand in fewer than {LEAST} tasks of the family"
+            yield from no_values(of_kind("moved goals"), why, beside.place, len(beside.positions))
+        elif beside is not None:
+            for signature in of_kind("moved goals"):
+                for value in signature.measure(beside):
+                    yield signature, value
+
+
+def pairs_of_contexts(study: Study) -> list[tuple[str, str, int]]:
+    """Pairs of tasks that differ only after their first goals, and how many they share.
+
+    Tasks that differ in one moved goal only are left out: slopes say how postures follow it.
+    """
+    joined = joined_tasks(moved_goals(study.tasks))
+    pairs = context_pairs(study.tasks)
+    return [pair for pair in pairs if not any({*pair[:2]} <= names for names in joined)]
+
+
+@cached
+def shared_goal(study: Study) -> TwoContexts | None:
+    """The first goal that two tasks share before they differ, by the paper's learner if it ran.
+
+    None where no method has solved runs on two such tasks.
+    """
+    labels = [label for _, label in study.cells]
+    for label in dict.fromkeys([*CONDITIONS, *main_methods(labels), *labels]):
+        for *names, _ in pairs_of_contexts(study):
+            keys = [(name, label) for name in names]
+            if all(key in study.cells and len(study.cells[key].good) for key in keys):
+                first, second = (study.trajectories(*key) for key in keys)
+                for contexts in contexts_at(first, second, 1):
+                    return contexts
+    return None

@@ -1,0 +1,114 @@
+"""From what a worker states of runs to runs: executed and scored here, where the method has never
+been."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from coartic.benchmarks.provenance import current_environment, now
+from coartic.benchmarks.worker import Job, Outcome
+from coartic.errors import SolutionError
+from coartic.model import MotionModel
+from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
+from coartic.runs.plan import RunKey
+from coartic.runs.run import Run, Score
+from coartic.tasks.task import Task, hands_of
+from coartic.text import LONGEST_REASON, plain
+
+MOST_MOVEMENTS = 10_000
+"""Movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Movement steps along one solution, its targets visited in order: thousands do."""
+Executions = Mapping[str, Execution | Exception]
+"""The executions of a run by part; in place of one, why there is none."""
+
+
+def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
+    """The runs of a job, also of one that failed. All their parts are executed side by side."""
+    parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
+    solutions = [outcomes[n].parts[part] for n, part in parts]
+    executions = execute_all(job.setting.task, solutions, job.setting.model)
+    by_run: list[dict[str, Execution | Exception]] = [{} for _ in outcomes]
+    for (n, part), execution in zip(parts, executions, strict=True):
+        by_run[n][part] = execution
+    return [score_run(job, *each) for each in zip(job.keys, outcomes, by_run, strict=True)]
+
+
+def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run:
+    """A run with the scores of its parts, of which it has none unless it is ok."""
+    status, reason = final_status(outcome, parts)
+    is_ok = status == "ok"
+    done = {part: e for part, e in parts.items() if is_ok and isinstance(e, Execution)}
+    solution, task = done.get("solution"), job.setting.task
+    corrections = travel = None
+    if solution is not None:
+        corrections = solution.corrections
+        travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
+    return Run(
+        key=key,
+        setting=job.setting,
+        status=status,
+        reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
+        environment=outcome.environment or current_environment(),
+        date=now(),
+        time_limit_s=job.time_limit_s,
+        scores={part: score_part(execution) for part, execution in done.items()},
+        rewards=outcome.rewards,
+        meter=outcome.meter,
+        times=outcome.times,
+        solution_corrections=corrections,
+        other_arm_travel=travel,
+        bound=outcome.bound if status == outcome.status else None,
+        used=outcome.used,
+        details=outcome.details,
+    )
+
+
+def score_part(execution: Execution) -> Score:
+    """The score of a part that hit every goal."""
+    assert execution.reward is not None
+    return Score(execution.reward, execution.hands, execution.movements)
+
+
+def final_status(outcome: Outcome, parts: Executions) -> tuple[str, str]:
+    """Status of a run and its reason: the method's own word, unless a part says otherwise."""
+    for execution in parts.values():
+        if isinstance(execution, Exception):
+            return "solver-failed", f"the solution cannot be executed: {execution}"
+        if not execution.completed:
+            return "infeasible", execution.reason
+    if outcome.status == "ok" and "solution" not in parts:
+        return "solver-failed", "it reported ok, but returned no solution"
+    return outcome.status, outcome.reason
+
+
+def execute_all(
+    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
+) -> list[Execution | Exception]:
+    """Execute solutions side by side: the only scores that count.
+
+    In place of an execution, the error of a solution that breaks the task's rules.
+    """
+    errors = [too_long(task, solution, model) for solution in solutions]
+    short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
+    executions = iter(execute_many(task, short, model=model))
+    return [next(executions) if error is None else error for error in errors]
+
+
+def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+    """The error of a solution that would take very long to execute."""
+    if len(solution) > MOST_MOVEMENTS:
+        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+    corners = [task.q0]
+    for movement in solution:
+        corners += [] if movement.waypoints is None else list(movement.waypoints)
+        corners += [] if movement.target is None else [movement.target]
+    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
+        if steps > MOST_STEPS:
+            return SolutionError(
+                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+            )
+    return None

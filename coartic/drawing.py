@@ -1,0 +1,102 @@
+"""The robot and its goals, by the conventions of the paper's figures.
+
+Open squares mark the left arm, closed circles the right one, open circles the goals
+with their number above (paper, Figures 1, 4 and 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+from numpy.typing import ArrayLike
+
+from coartic.robot import Array, Hand
+from coartic.tasks.task import Task
+
+BLACK, BASE, WHITE = "#000000", "#7a7a7a", "#ffffff"
+HIT = "0.55"  # of a goal; not black, which is the right hand
+MARKERS: dict[Hand, dict[str, Any]] = {
+    # Squares are larger than circles, so that hands at one place show both.
+    "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": WHITE},
+    "right": {"marker": "o", "markersize": 2.6},
+}
+_CROWDED = 0.6  # length unit: a goal that near above another has its number
+
+
+def draw_robot(axes: Axes, task: Task, q: Array, *, weight: float = 1.0) -> Callable[[Array], None]:
+    """Draw base and arms in configuration ``q`` (dof,), their joints marked.
+
+    Returns a function that moves what is drawn to another configuration. ``weight`` is the width
+    of lines. Set the limits of ``axes``: patches do not widen them, which takes long.
+    """
+    outline = task.robot.base_outline(q)
+    base = [
+        Polygon(outline, facecolor=BASE, alpha=0.25, edgecolor="none", zorder=1.5),
+        Polygon(outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, zorder=1.6),
+    ]
+    for patch in base:
+        axes.add_artist(patch)
+    style: Any = {"color": BLACK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
+    arms = {
+        hand: axes.plot(*task.robot.joint_positions(q, hand).T, **style, **MARKERS[hand])[0]
+        for hand in task.hands
+    }
+
+    def move(q: Array) -> None:
+        for patch in base:
+            patch.set_xy(task.robot.base_outline(q))
+        for hand, arm in arms.items():
+            arm.set_data(*task.robot.joint_positions(q, hand).T)
+
+    return move
+
+
+def draw_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
+    """Draw every goal as an open circle of its radius; returns the circles."""
+    options: Any = {"fill": False, "edgecolor": BLACK, "linewidth": 0.7 * weight, "zorder": 3}
+    circles = [Circle(goal, task.radius, **options) for goal in task.goals]
+    for circle in circles:
+        axes.add_artist(circle)
+    return circles
+
+
+def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
+    """Fill the goals that are hit."""
+    for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
+        circle.set(fill=bool(is_hit), facecolor=HIT)
+
+
+def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
+    """Write the number of every goal above it, or below."""
+    for index, ((x, y), below) in enumerate(zip(task.goals, numbered_below(task), strict=True), 1):
+        side = -1 if below else 1
+        axes.annotate(
+            str(index), (x, y + side * task.radius), (0, 1.5 * weight * side),
+            textcoords="offset points", ha="center", va="top" if below else "bottom",
+            color=BLACK, zorder=4,
+            bbox={"boxstyle": "square,pad=0", "facecolor": WHITE, "alpha": 0.8, "linewidth": 0},
+            **text,
+        )  # fmt: skip
+
+
+def numbered_below(task: Task) -> list[bool]:
+    """Whether a goal's number goes below it, since another goal is close above."""
+    goals = task.goal_array
+    right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
+    close = (np.abs(right) < _CROWDED / 2) & (up > 0) & (up < _CROWDED)
+    return [bool(near) for near in close.any(axis=1)]
+
+
+def box(task: Task, postures: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
+    """Lower left and upper right corner of a box with the goals and the robot, length unit.
+
+    ``postures`` are its configurations, shape ``(n, dof)``.
+    """
+    points = [task.goal_array + np.array([0, 2 * task.radius]), task.robot.base_outline(postures)]
+    points += [task.robot.joint_positions(postures, hand) for hand in task.hands]
+    cloud = np.concatenate([part.reshape(-1, 2) for part in points])
+    return cloud.min(axis=0) - margin, cloud.max(axis=0) + margin

@@ -1,0 +1,156 @@
+"""What one run of the learner found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import CoarticError
+from coartic.learner.conditions import ExplorationCondition
+from coartic.method import Meter
+from coartic.model import MotionModel
+from coartic.motion.solution import Execution, Movement, execute, hands_in
+from coartic.robot import Array
+from coartic.tasks.task import Task
+from coartic.text import short_repr
+
+CORRECTIONS = "corrections"
+"""Detail of a stored run: corrective movements in trial 0 and in each tenth of the others."""
+
+
+@dataclass(frozen=True)
+class LearningRun:
+    """One run of the learner and everything it found (:func:`learn`)."""
+
+    task: Task
+    """The task."""
+    condition: ExplorationCondition
+    """What the learner explored."""
+    model: MotionModel
+    """The constants of movement and of the corrective process."""
+    seed: int
+    """Seed of the run's random numbers."""
+    first_hands: str
+    """Hands of trial 0, such as ``"RRRR"``."""
+    rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
+    """Total reward of each trial, shape ``(trials,)``: minus its control ticks, and minus its
+    penalty where the task has one; masked where the trial failed."""
+    best_trial: int | None
+    """First trial with the highest total reward; None where none was completed."""
+    initial: tuple[Movement, ...]
+    """Movements of trial 0; none where it failed."""
+    solution: tuple[Movement, ...]
+    """Movements of the best trial."""
+    replay: tuple[Movement, ...]
+    """Movements of one noiseless greedy trial with the final tables."""
+    replay_reward: int | None
+    """Its reward; None where it did not hit every goal."""
+    values: Array
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
+    0: total rewards, or returns from that goal on where the condition credits subtasks; -inf
+    where nothing was learned."""
+    targets: Array
+    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
+    -inf."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
+    counters: Meter
+    """What it spent; the replay is not part of it."""
+    wall_s: float
+    """Its share of the time that it and the runs beside it took, seconds."""
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            task=self.task.name,
+            condition=self.condition.id,
+            seed=self.seed,
+            trials=len(self.rewards),
+            hands=self.hands,
+            reward=self.reward,
+            initial_reward=self.initial_reward,
+            replay_reward=self.replay_reward,
+        )
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Whether each trial hit every goal, shape ``(trials,)``.
+
+        The others failed: they changed neither ``values`` nor ``targets``.
+        """
+        return ~np.ma.getmaskarray(self.rewards)
+
+    @property
+    def learned(self) -> tuple[Movement, ...]:
+        """Movements of what was learned: the best trial, or the replay where the condition
+        says so; none where there is no such trial."""
+        if self.condition.learned == "best":
+            return self.solution
+        return self.replay if self.replay_completed else ()
+
+    @property
+    def status(self) -> str:
+        """``"ok"``, or ``"infeasible"`` where nothing was learned."""
+        return "ok" if self.learned else "infeasible"
+
+    @property
+    def reason(self) -> str:
+        """Why the run has no solution; empty where it has one."""
+        if self.status == "ok":
+            return ""
+        if self.best_trial is not None:
+            return "the replay of what was learned did not hit every goal"
+        return (
+            f"the corrective process failed in all {self.counters.trials} trials; "
+            "no trial hit every goal"
+        )
+
+    @property
+    def reward(self) -> int | None:
+        """Learned reward: the highest total reward of any trial, which is max Q of state 1 if
+        trial 0 learns and the overall reward is credited; that of the replay where the condition
+        says so. Where subtasks are credited, what the tables lead to is the replay
+        (:attr:`replay_reward`): the best trial is one that noise made good."""
+        if self.condition.learned == "replay":
+            return self.replay_reward
+        return None if self.best_trial is None else int(self.rewards[self.best_trial])
+
+    @property
+    def hands(self) -> str | None:
+        """Hand sequence of what was learned."""
+        return hands_in(self.learned) if self.learned else None
+
+    @property
+    def initial_reward(self) -> int | None:
+        """Reward of trial 0."""
+        return int(self.rewards[0]) if self.completed[0] else None
+
+    @property
+    def replay_completed(self) -> bool:
+        """Whether the replay hit every goal."""
+        return self.replay_reward is not None
+
+    @property
+    def replay_hands(self) -> str | None:
+        """Hand sequence of the replay."""
+        return hands_in(self.replay) if self.replay_completed else None
+
+    def execute(self) -> Execution:
+        """Execute what was learned again, apart from the learner.
+
+        Returns
+        -------
+        Execution
+            What happened; its reward is that of the run.
+
+        Raises
+        ------
+        CoarticError
+            Nothing was learned.
+        """
+        if not self.learned:
+            raise CoarticError(f"nothing to execute: {self.reason}")
+        return execute(self.task, self.learned, model=self.model)

@@ -1,0 +1,151 @@
+"""What is known of a method without its code: what it declares, and where its code is."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from pydantic import ValidationError
+
+from coartic.errors import CoarticError
+from coartic.inputs import problems_inline
+from coartic.method import Method
+from coartic.tasks.task import Task
+from coartic.text import error_line, plain
+
+BUILT_IN = "built in"
+"""Origin of this project's methods."""
+_LOADED: dict[tuple[str, str, str], type[Method]] = {}
+"""Methods that this process has imported, by :attr:`MethodCard.where`, name and code."""
+
+
+@dataclass(frozen=True)
+class MethodCard:
+    """What a method declares, where it comes from, and where its code is."""
+
+    name: str
+    title: str
+    citation: str
+    told: tuple[str, ...]
+    secondary: tuple[str, ...]
+    stochastic: bool
+    """Whether the seed matters; the others are run once."""
+    defaults: dict[str, Any]
+    """Its parameters; None for one that has no default."""
+    origin: str
+    """``built in``, the distribution of a plug-in, or the path of a method file."""
+    code: str
+    """Hash of the code that its results come from."""
+    where: str = field(default="", compare=False)
+    """What a worker imports: the name of a module, or the path of a method file. Not stored."""
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether it is one of this project's methods."""
+        return self.origin == BUILT_IN
+
+    def load(self) -> type[Method]:
+        """The method itself, imported once a process, unless its code has changed since."""
+        key = self.where, self.name, self.code
+        if key not in _LOADED:
+            _LOADED[key] = load_method(self.where, self.name)
+        return _LOADED[key]
+
+    def configure(self, parameters: Mapping[str, Any]) -> Method:
+        """The method with these parameters."""
+        method = self.load()
+        return method(method.Parameters(**parameters))
+
+    def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """All parameters, defaults included, as plain data; CoarticError names those that are
+        wrong."""
+        try:
+            typed = self.configure(parameters).parameters
+        except ValidationError as error:
+            names = list(self.defaults)
+            wrong, listed = problems_inline(error, names), ", ".join(names) or "none"
+            raise CoarticError(
+                f"method {self.name!r}: {wrong} (its parameters: {listed})"
+            ) from None
+        complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
+        return complete
+
+    def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
+        """Why the method with parameters does not apply to a task; None where it does.
+
+        Raises CoarticError for wrong parameters.
+        """
+        self.complete(parameters or {})
+        try:
+            reason = self.configure(parameters or {}).why_not(task)
+        except Exception as error:
+            raise CoarticError(
+                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
+                f"{error_line(error)}"
+            ) from None
+        return None if reason is None else plain(str(reason))
+
+
+def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodCard:
+    """The card of a method that is imported from ``where``."""
+    _LOADED[where, method.name, code] = method
+    fields = method.Parameters.model_fields.items()
+    defaults = {
+        name: None if field.is_required() else field.get_default(call_default_factory=True)
+        for name, field in fields
+    }
+    return MethodCard(
+        name=method.name,
+        title=method.title,
+        citation=method.citation,
+        told=tuple(sorted(item.value for item in method.told)),
+        secondary=tuple(method.secondary),
+        stochastic=method.stochastic,
+        defaults=json.loads(json.dumps(defaults, default=str)),
+        origin=origin,
+        code=code,
+        where=where,
+    )
+
+
+def load_method(where: str, name: str) -> type[Method]:
+    """A method from its module or file. Raises CoarticError where it is not there."""
+    module = load_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
+    for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
+        if method.name == name:
+            return method  # type: ignore[no-any-return]
+    raise CoarticError(f"{where} defines no method {name!r}")
+
+
+def methods_in(module: ModuleType) -> list[type[Method]]:
+    """The methods that a module itself defines, complete ones."""
+    return [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, Method)
+        and not inspect.isabstract(value)
+        and value.__module__ == module.__name__
+    ]
+
+
+def load_file(path: Path) -> ModuleType:
+    """The module of a method file; what lies beside it can be imported by it."""
+    name = f"coartic_method_{path.stem}"
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,253 @@
+"""One run: who it is, what it was asked, what came out, and what that took."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from coartic.learner.kernel import TENTHS
+from coartic.learner.run import CORRECTIONS
+from coartic.method import Meter
+from coartic.motion.solution import Movement
+from coartic.runs.plan import RunKey, Setting
+from coartic.tasks.task import Task
+
+if TYPE_CHECKING:  # workers do without pandas
+    import pandas as pd
+
+RESULTS = {
+    "run_id": "TEXT NOT NULL UNIQUE",
+    "setting": "INTEGER NOT NULL REFERENCES settings",
+    "suite_seed": "INTEGER NOT NULL",
+    "run": "INTEGER NOT NULL",  # number of the run, from 0
+    "seed": "INTEGER NOT NULL",
+    "status": "TEXT NOT NULL",  # ok, infeasible, solver-failed, timeout, crashed
+    "reason": "TEXT NOT NULL",  # empty where status is ok
+    "hands": "TEXT",  # of the solution, such as LRLR
+    "reward": "INTEGER",  # of the solution, executed and scored by the harness
+    "replay_reward": "INTEGER",  # one noiseless greedy trial with what was learned
+    "replay_hands": "TEXT",
+    "initial_reward": "INTEGER",  # trial 0 of a learner
+    "initial_hands": "TEXT",
+    "best_trial": "INTEGER",  # first trial with the solution's reward, if any
+    **dict.fromkeys(Meter.COUNTS, "INTEGER"),
+    "solution_corrections": "INTEGER",  # corrective movements the solution needed
+    "early_corrections": "INTEGER",  # in a learner's first tenth of trials after trial 0
+    "late_corrections": "INTEGER",  # in the last tenth
+    "other_arm_travel": "REAL",  # of the arm that is not chosen, rad
+    "proven_bound": "INTEGER",  # reward that no solution exceeds, where proven
+    "build_s": "REAL",
+    "solve_s": "REAL",
+    "wall_s": "REAL",
+    "cpu_s": "REAL",
+    "warm": "INTEGER",  # the process had run this method before
+    "together": "INTEGER",  # runs of its batch; times are equal shares
+    "process_peak_mb": "REAL",  # of the worker so far, all its runs included
+    "time_limit_s": "REAL",
+    "date": "TEXT NOT NULL",
+    "environment": "INTEGER NOT NULL REFERENCES environments",
+    "used": "TEXT NOT NULL",  # what the method used of what it was told, comma-separated
+    "details": "TEXT NOT NULL",  # whatever the method keeps beside its solution, JSON
+    "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
+}
+"""Columns of table ``results`` beside its ``id``."""
+PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
+"""How columns of each part begin."""
+PARTS = tuple(PREFIXES)
+"""Parts of a run that are scored: its solution, the first trial of a learner, and one noiseless
+greedy trial with what it has learned."""
+
+
+class Score(NamedTuple):
+    """One part of a run as the harness executed it."""
+
+    reward: int
+    hands: str
+    movements: tuple[Movement, ...]
+
+
+@dataclass(frozen=True)
+class Times:
+    """Time and memory that a run took: an equal share of its batch's time."""
+
+    wall_s: float | None = None
+    """None where the worker died and nobody knows when it began."""
+    cpu_s: float | None = None
+    warm: bool | None = None
+    """Whether the process had run the method before."""
+    together: int = 1
+    """Runs of the batch."""
+    process_peak_mb: float | None = None
+    """Of the worker so far, all its runs included."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run."""
+
+    key: RunKey
+    setting: Setting
+    status: str
+    """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
+    reason: str
+    """Why it is not ok; empty where it is."""
+    environment: dict[str, Any]
+    """Versions, platform, processor, threads and commit that it was made with."""
+    date: str
+    time_limit_s: float | None = None
+    scores: dict[str, Score] = field(default_factory=dict)
+    """By part (:data:`PARTS`), of those that there are."""
+    rewards: list[int | None] = field(default_factory=list)
+    """Reward of each trial; None where it failed."""
+    meter: Meter | None = None
+    """None where the worker died."""
+    times: Times = Times()
+    solution_corrections: int | None = None
+    """Corrective movements that the solution needed."""
+    other_arm_travel: float | None = None
+    """Travel of the arm that is not chosen, rad."""
+    bound: int | None = None
+    """Reward that no solution exceeds, where proven."""
+    used: tuple[str, ...] = ()
+    """What the method used of what it was told."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Whatever the method keeps beside its solution."""
+
+    @property
+    def reward(self) -> int | None:
+        """Reward of the solution, if there is one."""
+        return self.scores["solution"].reward if "solution" in self.scores else None
+
+    @property
+    def hands(self) -> str | None:
+        """Hands of the solution, such as ``LRLR``, if there is one."""
+        return self.scores["solution"].hands if "solution" in self.scores else None
+
+    @property
+    def best_trial(self) -> int | None:
+        """The first trial with the solution's reward, if any."""
+        if self.reward is None or self.reward not in self.rewards:
+            return None
+        return self.rewards.index(self.reward)
+
+    @property
+    def corrections(self) -> list[int] | None:
+        """Of a learner: corrective movements in trial 0 and in each tenth of the others."""
+        corrections = self.details.get(CORRECTIONS)
+        counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
+        return corrections if counted else None
+
+    @property
+    def result(self) -> str:
+        """Hash of status, solutions to the last joint, rewards of all trials, bound.
+
+        Equal for runs that came out the same, whatever was spent on the way.
+        """
+        parts: list[Any] = [self.status, self.bound, self.rewards]
+        for part in PARTS:
+            parts += [[part, *movement] for movement in self.movement_data(part)]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+    def movement_data(self, part: str) -> list[list[Any]]:
+        """The movements of a part as plain data; none where there is no such part.
+
+        SQLite keeps no sign of zero; adding 0.0 loses it here as well.
+        """
+        data = []
+        for m in self.scores[part].movements if part in self.scores else ():
+            arrays = (m.target, m.waypoints)
+            places = [None if array is None else (array + 0.0).tolist() for array in arrays]
+            data.append([m.goal, m.hand, m.kind, m.ticks, *places])
+        return data
+
+    def to_row(self) -> dict[str, Any]:
+        """Its columns of table ``results``, apart from the numbers of other tables' rows."""
+        row: dict[str, Any] = dict.fromkeys(RESULTS)
+        del row["setting"], row["environment"]
+        for part, score in self.scores.items():
+            prefix = PREFIXES[part]
+            row |= {f"{prefix}reward": score.reward, f"{prefix}hands": score.hands}
+        return row | {
+            "run_id": self.key.id,
+            "suite_seed": self.key.suite_seed,
+            "run": self.key.number,
+            "seed": self.key.seed,
+            "status": self.status,
+            "reason": self.reason,
+            "best_trial": self.best_trial,
+            **(vars(self.meter) if self.meter else {}),
+            "solution_corrections": self.solution_corrections,
+            "early_corrections": self.corrections[1] if self.corrections else None,
+            "late_corrections": self.corrections[-1] if self.corrections else None,
+            "other_arm_travel": self.other_arm_travel,
+            "proven_bound": self.bound,
+            **asdict(self.times),
+            "time_limit_s": self.time_limit_s,
+            "date": self.date,
+            "used": ", ".join(self.used),
+            "details": json.dumps(self.details),
+            "result": self.result,
+        }
+
+    @classmethod
+    def from_row(
+        cls,
+        row: Mapping[str, Any],
+        setting: Setting,
+        environment: dict[str, Any],
+        movements: Mapping[str, tuple[Movement, ...]],
+        rewards: list[int | None],
+    ) -> Run:
+        """A run from its columns, its movements by part, and the rewards of its trials."""
+        made_trials = row["trials"] is not None
+        times = {each.name: row[each.name] for each in fields(Times)}
+        warm = None if row["warm"] is None else bool(row["warm"])
+        return cls(
+            key=RunKey(row["run_id"], row["suite_seed"], row["run"], row["seed"]),
+            setting=setting,
+            status=row["status"],
+            reason=row["reason"],
+            environment=environment,
+            date=row["date"],
+            time_limit_s=row["time_limit_s"],
+            scores={
+                part: Score(row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"], solution)
+                for part, solution in movements.items()
+                if solution
+            },
+            rewards=rewards,
+            meter=Meter(**{name: row[name] for name in vars(Meter())}) if made_trials else None,
+            times=Times(**times | {"warm": warm}),
+            solution_corrections=row["solution_corrections"],
+            other_arm_travel=row["other_arm_travel"],
+            bound=row["proven_bound"],
+            used=tuple(filter(None, row["used"].split(", "))),
+            details=json.loads(row["details"]),
+        )
+
+
+def movements_from(
+    task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
+) -> tuple[Movement, ...]:
+    """The movements of one run from its rows of ``solutions``.
+
+    ``paths`` holds the run's rows of ``paths``, for movements of kind ``path``.
+    """
+    joints, rows = list(task.robot.joint_names), rows.sort_values("order")
+    targets = rows[joints].to_numpy(dtype=np.float64, copy=True)
+    columns = (rows[name].tolist() for name in ("order", "goal", "hand", "kind", "ticks"))
+    movements = []
+    for target, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):
+        waypoints = None
+        if kind == "path":
+            if paths is None:
+                raise ValueError("a movement of kind 'path' needs its waypoints")
+            path = paths[paths["order"] == order].sort_values("waypoint")
+            waypoints = path[joints].to_numpy(dtype=np.float64)
+        movements.append(Movement(int(goal), hand, kind, target, int(ticks), waypoints))
+    return tuple(movements)
