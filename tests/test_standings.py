@@ -9,23 +9,11 @@ import pytest
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis.optima import KnownOptimum
-from coartic.analysis.report import facts
+from coartic.analysis.optima import KnownOptimum, initial_reward
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.topics.comparison.runtimes import WAY, Targets, halfway, price, targets
-from coartic.analysis.topics.comparison.scores import (
-    ALL_TASKS,
-    BY_TRIAL,
-    UNTOLD,
-    apart,
-    gaps,
-    group_of,
-    initial_and_optimum,
-    leaders,
-    standings,
-)
-from coartic.analysis.trajectories import initial_reward
+from coartic.analysis.topics.comparison import runtimes, scores, sentences
+from coartic.analysis.topics.comparison.scores import BY_TRIAL, leaders
 from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
@@ -53,13 +41,13 @@ def test_gaps_of_a_results_folder():
     optima = made_up_optima("two-armed-1")
     seen = MadeUp(results, optima=optima)
     optimum = optima["two-armed-1"].reward
-    assert initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
-    first, second = gaps(seen).gap
+    assert scores.initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
+    first, second = scores.run_gaps(seen, "two-armed-1", "dual-process/EC2")
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
     missed = {"two-armed-1": replace(optima["two-armed-1"], reward=-680)}
     below = MadeUp(results, optima=missed)  # below the initial solution
-    assert gaps(below).empty
+    assert not scores.initial_and_optimum(below)
 
 
 LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],
@@ -69,8 +57,8 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
 
 
 def test_the_learners_conditions_stand_together():
-    table = standings(study(LEARNER | CMA))
-    over = table[table.task == ALL_TASKS]
+    over = scores.main_gaps(study(LEARNER | CMA))
+    assert set(over.task) == {scores.ALL_TASKS}
     assert over.method.tolist() == ["cma-es/bandit", "dual-process (EC1, EC4)"]
     by_task = [(301.5 - 292) / 292, (481.5 - 465) / 465]
     assert over.gap.iloc[1] == pytest.approx(np.mean(by_task))
@@ -84,15 +72,15 @@ def test_intervals_on_single_tasks_are_of_the_gaps_themselves():
     rewards = [-310, -300, -301, -302, -300, -300]
     seen = study({("ascending", "dual-process/EC1"): rewards,
                   ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
-    table = standings(seen)
+    table = scores.gaps(seen)
     by_task = table.set_index("task").loc[["ascending", "two-armed-1"]]
     gap = (np.array(rewards) + 292) / -292
     ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
     low, high = ends.confidence_interval
     assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
     expected = pd.DataFrame(
-        [("dual-process/EC1", BY_TRIAL, "learner", gap.mean(), low, high, 6),
-         ("dual-process/EC4", BY_TRIAL, "learner", 15 / 465, 15 / 465, 15 / 465, 3)],
+        [("dual-process/EC1", BY_TRIAL, gap.mean(), low, high, 6, "learner"),
+         ("dual-process/EC4", BY_TRIAL, 15 / 465, 15 / 465, 15 / 465, 3, "learner")],
         index=by_task.index, columns=by_task.columns,
     )  # fmt: skip
     pd.testing.assert_frame_equal(by_task, expected, rtol=0.01)
@@ -106,17 +94,17 @@ def test_a_rank_counts_algorithms():
     assert math.isnan(rows.p[0])
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
     assert rows.p[1] == pytest.approx(2 / 2**8, abs=0.003)
-    assert apart(seen, "cma-es/bandit", "cma-es/every").p == 1.0
+    assert scores.paired_difference(seen, "cma-es/bandit", "cma-es/every").p == 1.0
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     """The corrective process alone is told of its only trial, and of every hand sequence."""
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
-    assert group_of(alone, "corrective-alone/given") == BY_TRIAL  # ten trials in made-up rows
+    assert scores.group_of(alone, "corrective-alone/given") == BY_TRIAL  # of ten trials
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
     again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
-    assert group_of(again, "corrective-alone/given") == UNTOLD
-    assert group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
+    assert scores.group_of(again, "corrective-alone/given") == scores.WITHOUT_REWARD
+    assert scores.group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
 
 
 def test_crossings_by_brute_force():
@@ -124,7 +112,6 @@ def test_crossings_by_brute_force():
     rng = np.random.default_rng(5)
     spends = [rng.lognormal(3, 1, (runs, 20)).round() for runs in (6, 9)]
     spends[1][rng.random(spends[1].shape) < 0.3] = math.inf
-    reached = Targets(spends)
 
     def share(budget):
         return np.mean([(part <= budget).mean() for part in spends])
@@ -132,15 +119,15 @@ def test_crossings_by_brute_force():
     budgets = np.unique(np.concatenate([part.ravel() for part in spends]))
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
-        crossing = reached.crossing(level)
+        crossing = runtimes.budget_for(spends, level)
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
-    steps, shares = reached.curve()
+    steps, shares = runtimes.ecdf(spends)
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
-    assert reached.share() == pytest.approx(share(1e300))
-    assert math.isnan(Targets([spends[0][:2]]).crossing(0.5).low)  # too few runs
+    assert runtimes.share_reached(spends) == pytest.approx(share(1e300))
+    assert math.isnan(runtimes.budget_for([spends[0][:2]], 0.5).low)  # too few runs
 
 
 def resampled_ends(spends, level):
@@ -163,12 +150,9 @@ def test_targets_are_evenly_spaced_rewards():
     half = -319 + (319 - 292) / 2
     seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
     vars(seen)["rewards"] = lambda: iter(())
-    reached = targets(seen)["ascending", "posture-based/two-goals", "trials"]
-    assert reached.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
-    assert reached.crossing(0.25).value == 10  # trials of the made-up row
-    paid = price(seen).loc["posture-based/two-goals"]
-    assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
-    assert paid.reached == reached.share()
+    paid = TABLES["price"](seen).loc["posture-based/two-goals"]
+    assert paid.reached == 10 / 20
+    assert (paid.trials_to_quarter, paid.trials_to_half) == (10, 10)  # trials of the made-up row
 
 
 def test_the_initial_reward_loses_the_penalty():
@@ -180,7 +164,7 @@ def test_the_initial_reward_loses_the_penalty():
     seen = MadeUp(study_of(pd.DataFrame([rows]), [dear]), optima=best)
     without, initial = (initial_reward(task, seen.model) for task in (plain, dear))
     assert initial < -340 < without
-    assert initial_and_optimum(seen) == {"ascending": (initial, -340)}
+    assert scores.initial_and_optimum(seen) == {"ascending": (initial, -340)}
 
 
 SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])
@@ -242,7 +226,7 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)
     assert ranked.better["mine width=0.2"] == 2
-    assert [each["method"] for each in facts.nearest(again)["from_files"]] == ["mine width=0.2"]
+    assert [each.method for each in sentences.from_files(again)] == ["mine width=0.2"]
 
 
 def test_trials_to_the_middle_of_the_way():
@@ -260,5 +244,5 @@ def test_trials_to_the_middle_of_the_way():
                 trials[trial - 1] = half[task]
             rewards[run_id] = trials
     vars(seen)["rewards"] = lambda: iter(rewards.items())
-    middle = halfway(seen, "dual-process (EC1, EC4)")
+    middle = runtimes.trials_to_half(seen, "dual-process (EC1, EC4)")
     assert middle == {"ascending": 6.0, "two-armed-1": math.inf}

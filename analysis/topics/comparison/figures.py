@@ -23,7 +23,7 @@ from coartic.robot import Array
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
 """Spends that the figure of costs has a panel of, and their axes."""
-MOST_STEPS = 150
+ECDF_STEPS = 150
 """Steps of an ECDF that are drawn."""
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
@@ -53,7 +53,7 @@ def gaps_to_optimum(study: Study) -> Parts:
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
         draw_group(axes, group, of_group, style.looks(rows.method))
-    farthest = percent[["gap", "high"]].max(axis=None)
+    farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
     panels[-1].set_xlabel(f"gap to the {scores.optimum_in_words(study)}{where} (%)")
@@ -88,11 +88,11 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, s
     "price",
     "What it costs to come near",
     f"Share of {len(runtimes.TARGETS)} reward targets reached within a budget (mean over all tasks "
-    "where there are several). Targets are evenly spaced from the initial solution to the optimum; a run "
-    "counts for each target that it has reached. a: trials; planners make none and are lines. "
-    "b: forward-kinematics evaluations, spread evenly over a run's trials.",
+    "where there are several). Targets are evenly spaced from the initial solution to the optimum; "
+    "a run counts for each target that it has reached. a: trials; planners make none and are "
+    "lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
-def running_times(study: Study) -> Parts:
+def ecdf_of_costs(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
     data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
@@ -125,7 +125,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
         for spend in PANELS:
             if (label, spend) in times:
                 budget, share = runtimes.ecdf(times[label, spend])
-                count = min(len(budget), MOST_STEPS)
+                count = min(len(budget), ECDF_STEPS)
                 at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
                 rows = {"budget": budget[at], "share": share[at]}
                 parts.append(pd.DataFrame({"method": label, "spend": spend, **rows}))

@@ -25,8 +25,8 @@ SPENDS = ("trials", "forward_kinematics", "solve_s")
 """What can be spent: columns of ``runs``; ``solve_s`` is wall time in s."""
 TARGETS = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
-RESAMPLES = 1_999
-Times = Sequence[Array]
+BUDGET_RESAMPLES = 1_999
+RunningTimes = Sequence[Array]
 """Running times of one method: for each task, which count alike, what every run had spent at every
 target, shape ``(runs, 20)``; infinite where the target is not reached."""
 
@@ -80,7 +80,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     for cell in study.cells.values():
         times = scores.solve_times(cell.good).reindex(cell.runs.index)
         runs = cell.runs.assign(solve_s=times)
-        totals = zip(*(scores.numbers(runs[name]).tolist() for name in SPENDS), strict=True)
+        totals = zip(*(scores.floats(runs[name]).tolist() for name in SPENDS), strict=True)
         rows = zip(map(str, runs.run_id), totals, runs.status, runs.reward, strict=True)
         for run_id, spent, status, reward in rows:
             total, trials = dict(zip(SPENDS, spent, strict=True)), trials_of.get(run_id)
@@ -133,12 +133,12 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
 
 
 @cached
-def running_times(study: Study) -> dict[tuple[str, str], Times]:
+def running_times(study: Study) -> dict[tuple[str, str], RunningTimes]:
     """Running times by method and spend, of :func:`cells_compared`.
 
     A run whose spend is not known, such as the time of a cold one, has no part.
     """
-    by_method = {}
+    by_method: dict[tuple[str, str], RunningTimes] = {}
     for method, cells in cells_compared(study).items():
         for spend in SPENDS:
             times = [times_of(study, cell, spend) for cell in cells]
@@ -156,7 +156,7 @@ def times_of(study: Study, cell: CellRuns, spend: str) -> Array:
     return np.array([run.times(spend, targets) for run in known])
 
 
-def pairs(times: Times) -> tuple[Array, Array, NDArray[np.int64]]:
+def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int64]]:
     """Running times of all pairs of run and target in ascending order, their weights, which sum to
     1, and the number of the run of each."""
     values = np.concatenate([of_task.ravel() for of_task in times])
@@ -165,7 +165,7 @@ def pairs(times: Times) -> tuple[Array, Array, NDArray[np.int64]]:
     return values[order], np.concatenate(weights)[order], order // len(TARGETS)
 
 
-def ecdf(times: Times) -> tuple[Array, Array]:
+def ecdf(times: RunningTimes) -> tuple[Array, Array]:
     """Budgets at which the share of targets reached rises, and the share from there on."""
     values, weights, _ = pairs(times)
     last = np.append(values[1:] != values[:-1], True)
@@ -173,13 +173,13 @@ def ecdf(times: Times) -> tuple[Array, Array]:
     return values[reached], np.cumsum(weights)[reached]
 
 
-def share_reached(times: Times) -> float:
+def share_reached(times: RunningTimes) -> float:
     """Share of targets that are reached in the end."""
     values, weights, _ = pairs(times)
     return float(weights[np.isfinite(values)].sum())
 
 
-def budget_for(times: Times, share: float) -> Estimate:
+def budget_for(times: RunningTimes, share: float) -> Estimate:
     """The least budget within which a share of the targets is reached; infinite without any.
 
     With its percentile interval: runs are drawn anew within their task, and the tasks stay. It is
@@ -196,7 +196,7 @@ def budget_for(times: Times, share: float) -> Estimate:
     if min(sizes) < FEWEST:
         return Estimate(budget(weights))
     rng = np.random.default_rng(SEED)
-    drawn = [rng.multinomial(size, np.full(size, 1 / size), RESAMPLES) for size in sizes]
+    drawn = [rng.multinomial(size, np.full(size, 1 / size), BUDGET_RESAMPLES) for size in sizes]
     budgets = [budget(weights * counts[runs]) for counts in np.concatenate(drawn, axis=1)]
     low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
     return Estimate(budget(weights), float(low), float(high))

@@ -25,7 +25,7 @@ from coartic.analysis.words import tally
 from coartic.method import Information
 from coartic.robot import Array
 
-LETTERS = {
+TOLD_LETTERS = {
     Information.GOALS: "G",
     Information.FORWARD_KINEMATICS: "F",
     Information.JACOBIAN: "J",
@@ -56,13 +56,13 @@ def scores(study: Study) -> pd.DataFrame:
     ``solved``: runs with a solution, of which ``reward`` is the mean, ``reward_sd`` the standard
     deviation (ticks), ``gap`` with ``low`` and ``high`` the distance of the mean to the optimum as
     a share of it with its interval over runs, and ``hands`` the sequences, the commonest first;
-    ``told``: a letter for each kind of information (:data:`LETTERS`); ``corrections``: corrective
-    movements in all solutions; ``other_arm``: whether the arm that is not chosen keeps ``still`` in
-    all solutions or ``moves``. ``trials``, ``movement_ticks``, ``forward_kinematics`` and
-    ``jacobians`` are medians over all runs, ``solve_s`` is that of :func:`solve_times`. NaN where a
-    value is not known.
+    ``told``: a letter for each kind of information (:data:`TOLD_LETTERS`); ``corrections``:
+    corrective movements in all solutions; ``other_arm``: whether the arm that is not chosen keeps
+    ``still`` in all solutions or ``moves``. ``trials``, ``movement_ticks``, ``forward_kinematics``
+    and ``jacobians`` are medians over all runs, ``solve_s`` is that of :func:`solve_times`. NaN
+    where a value is not known.
     """
-    frame = pd.DataFrame([score(study, cell) for cell in study.cells.values()])
+    frame = pd.DataFrame([cell_score(study, cell) for cell in study.cells.values()])
     frame["place"] = frame.task.map(list(study.tasks).index)
     frame["is_search"] = frame.method.map(methods.is_search)
     order = ["place", "is_search", "reward"]
@@ -70,7 +70,7 @@ def scores(study: Study) -> pd.DataFrame:
     return frame.drop(columns=order[:2]).set_index(["task", "method"])
 
 
-def score(study: Study, cell: CellRuns) -> dict[str, object]:
+def cell_score(study: Study, cell: CellRuns) -> dict[str, object]:
     """A row of :func:`scores`."""
     good, runs = cell.good, cell.runs
     best = None if locks_base(runs) else study.optima.get(cell.task)
@@ -80,11 +80,11 @@ def score(study: Study, cell: CellRuns) -> dict[str, object]:
     gap, low, high = gap_share(ends, best.reward if best and best.reward else math.nan).tolist()
     told = set(runs.told.iloc[0].split(", ")) if len(runs) else set()
     hands = tally(good.hands.value_counts().to_dict())
-    arm = "still" if (numbers(good.other_arm_travel) <= STILL).all() else "moves"
+    arm = "still" if (floats(good.other_arm_travel) <= STILL).all() else "moves"
     return {
         "task": cell.task,
         "method": cell.label,
-        "told": "".join(letter for item, letter in LETTERS.items() if item.value in told),
+        "told": "".join(letter for item, letter in TOLD_LETTERS.items() if item.value in told),
         "runs": len(runs),
         "solved": len(good),
         "reward": reward.value,
@@ -109,7 +109,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
     warm = runs.warm.to_numpy(dtype=bool, na_value=False)
-    solving, all_in_all = numbers(runs.solve_s), numbers(runs.wall_s)
+    solving, all_in_all = floats(runs.solve_s), floats(runs.wall_s)
     marked = np.where(solving > 0, solving, all_in_all)
     times = pd.Series(marked, runs.index, dtype=runs.solve_s.dtype)
     return times[warm] if warm.any() else times
@@ -117,12 +117,12 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 def median(values: pd.Series) -> float:
     """Median of the known values; NaN where none is, as for runs that crashed."""
-    present = numbers(values)
+    present = floats(values)
     present = present[~np.isnan(present)]
     return float(np.median(present)) if len(present) else math.nan
 
 
-def numbers(values: pd.Series) -> Array:
+def floats(values: pd.Series) -> Array:
     """A column (n,), NaN where a value is missing."""
     return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
 
@@ -136,9 +136,9 @@ def group_of(study: Study, label: str) -> str:
     label = methods.EC1 if label.startswith(methods.TOGETHER) else label
     rows = scores(study).xs(label, level="method")
     told = "".join(rows.told)
-    if LETTERS[Information.REWARD_FORMULA] in told:
+    if TOLD_LETTERS[Information.REWARD_FORMULA] in told:
         return BY_FORMULA
-    learns = LETTERS[Information.REWARD_BY_TRIAL] in told and not (rows.trials <= 1).all()
+    learns = TOLD_LETTERS[Information.REWARD_BY_TRIAL] in told and not (rows.trials <= 1).all()
     return BY_TRIAL if learns else WITHOUT_REWARD
 
 
@@ -199,7 +199,7 @@ def run_gaps(study: Study, task: str, label: str) -> Array:
     """Gap of each run to the optimum, as a share of it, (n,); NaN for a run without a solution."""
     runs = study.cells[task, label].runs
     rewards = runs.reward.where(runs.status == "ok")
-    return gap_share(numbers(rewards), initial_and_optimum(study)[task][1])
+    return gap_share(floats(rewards), initial_and_optimum(study)[task][1])
 
 
 def gaps_by_seed(study: Study, task: str, label: str) -> dict[int, float]:
@@ -225,9 +225,10 @@ def gaps(study: Study) -> pd.DataFrame:
     ``task`` (or :data:`ALL_TASKS`), ``method`` (label), ``knows`` (its group), ``gap``, ``low``,
     ``high``, ``runs``, ``algorithm``.
     """
-    rows: list[Any] = [
+    every: list[Any] = [*over_all_tasks(study), *scores(study).reset_index().to_dict("records")]
+    rows = [
         row | {"knows": group_of(study, row["method"])}
-        for row in [*over_all_tasks(study), *scores(study).reset_index().to_dict("records")]
+        for row in every
         if is_compared(row["method"]) and row["solved"] == row["runs"]
         if not math.isnan(row["gap"])
     ]

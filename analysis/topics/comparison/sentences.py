@@ -9,25 +9,19 @@ import pandas as pd
 
 from coartic.analysis import methods, words
 from coartic.analysis.section import Section
-from coartic.analysis.statistics.estimates import LEVEL
-from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.statistics.estimates import LEVEL, Estimate
+from coartic.analysis.study import CellKey, Study, cached, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import number, plural, two_figures
 
-PLACES = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 LEVELS = {"trials_to_quarter": "a quarter", "trials_to_half": "half"}
 """Columns of the table of costs, and in words the share of targets that each is about."""
 
 
-def with_ends(value: float, low: float, high: float, digits: int | None, unit: str = "") -> str:
-    """A number with its unit and its interval, ``7.3 % [6.9, 7.8]``."""
-    places = 0 if digits is None else digits
-    return f"{number(value, digits)}{unit} {words.in_brackets(low, high, places)}".strip()
-
-
 @cached
-def leaders(study: Study) -> dict[str, list[Any]]:
+def leaders_by_group(study: Study) -> dict[str, list[Any]]:
     """Rows of :func:`.scores.leaders` by group, with their names and gaps in per cent."""
     by_group = {}
     for group in scores.GROUPS:
@@ -38,21 +32,27 @@ def leaders(study: Study) -> dict[str, list[Any]]:
     return by_group
 
 
+def gap_in_words(row: Any, *, interval: bool = False) -> str:
+    """Gap of a leader, ``7.3 %``, or with its ``interval``, ``7.3 % [6.9, 7.8]``."""
+    ends = (row.low, row.high) if interval else ()
+    return words.estimate(Estimate(row.gap, *ends), 1, " %")
+
+
 def finding_of_ranking(study: Study) -> str:
     """Who comes nearest to the optimum, among methods that know as much of the reward."""
-    by_trial, by_formula, others = leaders(study).values()
+    by_trial, by_formula, others = leaders_by_group(study).values()
     if not (by_trial or by_formula or others):
         return ""
     sentences = nearest_by_trial(by_trial) if by_trial else []
     without = "best method that does not use the reward"
     if by_formula:
-        planner = (
-            f"The best planner that knows the reward as a formula ends {gap_of(by_formula[0])}"
+        away = f"{gap_in_words(by_formula[0])} away"
+        beside = f", the {without} {gap_in_words(others[0])}" if others else ""
+        sentences.append(
+            f"The best planner that knows the reward as a formula ends {away}{beside}."
         )
-        beside = f", the {without} {number(others[0].gap, 1)} %" if others else ""
-        sentences.append(f"{planner} away{beside}.")
     elif others:
-        sentences.append(f"The {without} ends {number(others[0].gap, 1)} % away.")
+        sentences.append(f"The {without} ends {gap_in_words(others[0])} away.")
     if optima := study.optima.values():
         proven = sum(best.proven for best in optima)
         elsewhere = "; elsewhere the best known reward takes its place" * (proven < len(optima))
@@ -83,12 +83,12 @@ def nearest_by_trial(rows: list[Any]) -> list[str]:
     elif second and not math.isnan(second.p):
         sure = "significantly" if second.p < LEVEL else "not significantly"
         beside = f", {sure} better than {second.name} ({words.p_value(second.p)})"
-    away = with_ends(best.gap, best.low, best.high, 1, " %")
+    away = gap_in_words(best, interval=True)
     sentences = [f"{beginning}: {away} from the optimum{beside}."]
     rank, learner = learner_among(rows)
     if rank > 1:
-        away = with_ends(learner.gap, learner.low, learner.high, 1, " %")
-        sentences.append(f"The paper's learner ranks {PLACES[rank - 1]}, {away} away.")
+        away = gap_in_words(learner, interval=True)
+        sentences.append(f"The paper's learner ranks {ORDINALS[rank - 1]}, {away} away.")
     return sentences
 
 
@@ -102,7 +102,7 @@ def learner_among(rows: list[Any]) -> tuple[int, Any]:
 
 def answer_nearest(study: Study) -> str:
     """Who comes nearest to the optimum, in a dozen words."""
-    by_trial, *others = leaders(study).values()
+    by_trial, *others = leaders_by_group(study).values()
     if not any((by_trial, *others)):
         return ""
     best = next(row for rows in (by_trial, *others) for row in rows)
@@ -111,11 +111,11 @@ def answer_nearest(study: Study) -> str:
         if by_trial
         else words.capital(best.name)
     )
-    text = f"{who}, {number(best.gap, 1)} % away."
+    text = f"{who}, {gap_in_words(best)} away."
     rank, learner = learner_among(by_trial)
     if rank > 1:
-        place = f"{PLACES[rank - 1]} of {len(by_trial)} algorithms"
-        text += f" The paper's learner is {place}, at {number(learner.gap, 1)} %."
+        place = f"{ORDINALS[rank - 1]} of {len(by_trial)} algorithms"
+        text += f" The paper's learner is {place}, at {gap_in_words(learner)}."
     foreign = from_files(study)
     text += "".join(map(foreign_in_words, foreign[:3]))
     if len(foreign) > 3:
@@ -163,15 +163,17 @@ def failed_compared(study: Study, consequence: str, *groups: str) -> str:
 
 @cached
 def learner_and_rival(study: Study) -> tuple[Any, Any]:
-    """Rows of the table of costs: of the learner, and of the other method by trial that reaches
-    most targets. None without them."""
+    """Rows of the table of costs: of the learner, and of its rival.
+
+    The rival learns from the reward of trials too and reaches most targets. None without them.
+    """
     rows = tables.price(study)
     learners = [label for label in methods.main_methods(rows.index) if methods.is_learner(label)]
     others = [label for label in rivals(study) if is_by_trial(study, label)]
     reached = rows.reached[others]
     return (
         rows.loc[learners[0]] if learners else None,
-        rows.loc[reached.idxmax()] if others else None,
+        rows.loc[str(reached.idxmax())] if learners and others else None,
     )
 
 
@@ -191,7 +193,7 @@ def ratios(study: Study) -> dict[str, float]:
     Where both reach that share of the targets.
     """
     learner, rival = learner_and_rival(study)
-    if learner is None or rival is None:
+    if rival is None:
         return {}
     both = {column: (learner[column], rival[column]) for column in LEVELS}
     return {
@@ -209,16 +211,14 @@ def finding_of_costs(study: Study) -> str:
     ends_of_rival = "" if rival is None else f"{number(100 * rival.reached, 0)} %"
     if at := ratios(study):
         column, *more = reversed(at)
-        needs = [
-            with_ends(row[column], row[f"{column}_low"], row[f"{column}_high"], None)
+        ours, theirs = (
+            Estimate(row[column], row[f"{column}_low"], row[f"{column}_high"])
             for row in (learner, rival)
-        ]
-        trials, *brackets = needs[0].split(" ", 1)
-        ours = " ".join([trials, "trials", *brackets])
+        )
         text = (
             f"To reach {LEVELS[column]} of the reward targets between the initial solution and the "
-            f"optimum, the learner needs {ours} and {who} {needs[1]}, a ratio of "
-            f"{two_figures(at[column])}."
+            f"optimum, the learner needs {words.estimate(ours, unit=' trials')} and {who} "
+            f"{words.estimate(theirs)}, a ratio of {two_figures(at[column])}."
         )
         for column in more:
             text += f" For {LEVELS[column]} of them the ratio is {two_figures(at[column])}."
@@ -257,11 +257,11 @@ def costs_of_planner(study: Study, learner: Any) -> str:
     planners = planners[planners.reached >= 0.5]
     if not len(planners):
         return ""
-    planner: Any = planners.loc[planners.kinematics_to_half.idxmin()]
+    planner: Any = planners.loc[str(planners.kinematics_to_half.idxmin())]
     beside = f" (the learner: {evaluations(learner)})" * math.isfinite(learner.kinematics_to_half)
     return (
-        f" {words.capital(methods.name_of(planner.method))} makes no trials: it reaches half of the "
-        f"targets with {evaluations(planner, ' forward-kinematics evaluations')}{beside}."
+        f" {words.capital(methods.name_of(planner.method))} makes no trials: it reaches half of "
+        f"the targets with {evaluations(planner, ' forward-kinematics evaluations')}{beside}."
     )
 
 
@@ -292,35 +292,48 @@ def answer_price(study: Study) -> str:
 def finding_of_learning(study: Study) -> str:
     """When half of the gain of the learner that explores most is there, by task."""
     half = tables.learning(study).half_gain
-    keys = {name: f"{name} {methods.most_exploring(task)}" for name, task in study.tasks.items()}
-    trials = {
-        study.tasks[name]: half[key]
-        for name, key in keys.items()
-        if half.get(key, math.inf) < math.inf
-    }
-    return ""
+    rows = {f"{name} {methods.most_exploring(task)}": task for name, task in study.tasks.items()}
+    tasks = {row: task for row, task in rows.items() if half.get(row, math.inf) < math.inf}
+    if not tasks:
+        return ""
+    two_armed = any(len(task.hands) > 1 for task in tasks.values())
+    conditions = " (EC1 with one arm, EC4 with two)" if two_armed else ""
+    after = [f"{two_figures(half[row])} trials on {task.label}" for row, task in tasks.items()]
+    return (
+        f"The learner{conditions} has made half of its own gain after about {', '.join(after)} "
+        "(median run)."
+    )
 
 
-def answer_gain(study: Study) -> str:
-    """The learner on the task on which it improves most, in a dozen words."""
-    gains = {}
+@cached
+def most_improved(study: Study) -> tuple[CellKey, float, float] | None:
+    """The cell of the learner that gains the largest share of its initial reward.
+
+    With its initial and its learned reward, means over runs. Of each task's best condition.
+    """
+    gains: dict[float, tuple[CellKey, float, float]] = {}
     for name in study.tasks:
         label = scores.best_condition(study, name)
         if label is not None:
             good = study.cells[name, label].good
             initial, learned = float(good.initial_reward.mean()), float(good.reward.mean())
             if initial < 0:
-                gains[name, label] = (learned - initial) / -initial, initial, learned
-    if not gains:
+                gains.setdefault((learned - initial) / -initial, ((name, label), initial, learned))
+    return gains[max(gains)] if gains else None
+
+
+def answer_gain(study: Study) -> str:
+    """The learner on the task on which it improves most, in a dozen words."""
+    if (best := most_improved(study)) is None:
         return ""
-    (name, label), (_, initial, learned) = max(gains.items(), key=lambda item: item[1][0])
+    (task, label), initial, learned = best
     # Ticks by which the first movement is slower than the corrective process's.
-    changes = study.trajectories(name, label).against_same_hands
+    changes = study.trajectories(task, label).against_same_hands
     slower = len(changes) and changes[:, 0].mean() > 1
     return (
-        f"On {study.tasks[name].label} the {methods.name_of(label)} gets from {number(initial, 0)} "
+        f"On {study.tasks[task].label} the {methods.name_of(label)} gets from {number(initial, 0)} "
         f"to {number(learned, 0)} ticks{', with a slower first movement' if slower else ''}."
-        + failed_runs(study, [(name, label)], " and are not counted")
+        + failed_runs(study, [(task, label)], " and are not counted")
     )
 
 

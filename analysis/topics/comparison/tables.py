@@ -110,14 +110,14 @@ def variants(study: Study) -> Rows:
         if not known.is_search(label):
             labels_by_row.setdefault(f"{method} {variant}".strip(), {})[task] = label
     instances = sample(study)
-    single = {t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None}
+    single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
     for name, labels in labels_by_row.items():
-        of_single = {task: labels[task] for task in sorted(single & labels.keys())}
+        of_single = {task: labels[task] for task in sorted(labels) if task in single}
         row: Row = {"method": name}
         gap = scores.mean_gap(study, of_single)
         if len(of_single) == len(single) and gap is not None:
             row |= interval("gap", gap)
-            best = [best_trial_gaps(study, *key) for key in of_single.items()]
+            best = [best_trial_gaps(study, task, labels[task]) for task in single]
             row["best_trial"] = np.mean([of_task.mean() for of_task in best])
         for task, label in of_single.items():
             row[f"on {task}"] = scores.run_gaps(study, task, label).mean()
