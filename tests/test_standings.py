@@ -246,3 +246,14 @@ def test_trials_to_the_middle_of_the_way():
     vars(seen)["rewards"] = lambda: iter(rewards.items())
     middle = runtimes.trials_to_half(seen, "dual-process (EC1, EC4)")
     assert middle == {"ascending": 6.0, "two-armed-1": math.inf}
+
+
+def test_the_task_with_the_largest_gain():
+    """From -319 to -303 on ascending, from -675 to -485 on two-armed 1; by its best condition."""
+    worse = {("two-armed-1", "dual-process/EC2"): [-500] * 3}
+    seen = study(worse | TEN)
+    seen.runs["initial_reward"] = seen.runs.task.map({"ascending": -319, "two-armed-1": -675})
+    again = MadeUp(study_of(seen.runs, list(seen.tasks.values())), optima=seen.optima)
+    cell, initial, learned = sentences.most_improved(again)
+    assert cell == ("two-armed-1", "dual-process/EC4")
+    assert (initial, learned) == (-675, np.mean(SPREAD - 485))

@@ -14,6 +14,7 @@ from coartic import load_task
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation
+from coartic.analysis.topics.comparison import sentences
 from coartic.analysis.topics.comparison.scores import BY_FORMULA, BY_TRIAL
 from coartic.analysis.trajectories import Trajectories
 from tests.support.made_up import MadeUp, made, made_up_optima, row, study_of
@@ -148,6 +149,8 @@ def test_price(study):
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
     assert len(table) == 3
+    assert [row.method for row in sentences.learner_and_rival(study)] == [BOTH, CMA]
+    assert sentences.ratios(study) == {"trials_to_quarter": 200 / 10, "trials_to_half": 1000 / 10}
 
 
 def test_learning(study):

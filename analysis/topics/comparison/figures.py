@@ -213,7 +213,7 @@ def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
         labels = [
             label
             for label in methods.in_order(solved)
-            if label in CURVES or label.partition(" ")[0] not in methods.KNOWN_METHODS
+            if label in CURVES or not methods.is_built_in(label)
         ]
         two_armed = {*methods.CONDITIONS} & {*labels} - {methods.EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
