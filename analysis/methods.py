@@ -80,13 +80,17 @@ def is_learner(label: str) -> bool:
     return label.startswith((LEARNER, TOGETHER)) and not is_variant(label)
 
 
+def is_built_in(label: str) -> bool:
+    """Whether it is one of coartic's methods, or several of the learner's conditions together."""
+    return label.partition(" ")[0] in KNOWN_METHODS or label.startswith(TOGETHER)
+
+
 def is_variant(label: str) -> bool:
     """Whether it is a built-in method with other parameters, or an ablation of the learner.
 
     A method of somebody else stands by itself with whatever parameters it was run.
     """
-    built_in = label.partition(" ")[0] in KNOWN_METHODS or label.startswith(TOGETHER)
-    return built_in and bool(_VARIANT.search(label))
+    return is_built_in(label) and bool(_VARIANT.search(label))
 
 
 def is_search(label: str) -> bool:
@@ -144,11 +148,7 @@ def main_methods(labels: Iterable[str]) -> list[str]:
         for label in HEADLINES
         if label in labels and not (together and label.startswith(LEARNER))
     ]
-    foreign = [
-        label
-        for label in labels
-        if label.partition(" ")[0] not in KNOWN_METHODS and not label.startswith(TOGETHER)
-    ]
+    foreign = [label for label in labels if not is_built_in(label)]
     return [*together, *single, *foreign] or labels
 
 

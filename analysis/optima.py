@@ -10,15 +10,20 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from coartic import PAPER, MotionModel, Task
+from coartic.analysis.trajectories import initial_solution
 from coartic.inputs import FileData
+from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 
 BASE = "task"
@@ -119,6 +124,17 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(
         {name: [asked[text][name] for text in runs.parameters] for name in default}, runs.index
     )
+
+
+def gap_share(rewards: ArrayLike, optimum: float) -> Array:
+    """(optimum − reward) / |optimum|: 0 at the optimum; 0.01 is 1 % more ticks than it."""
+    return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
+
+
+def initial_reward(task: Task, model: MotionModel) -> float:
+    """Reward of the initial solution, less its penalty; NaN where there is none."""
+    solution = initial_solution(task, model)
+    return math.nan if solution is None or solution.reward is None else float(solution.reward)
 
 
 def essence(task: Task) -> str:

@@ -25,6 +25,7 @@ from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import PARTS, movements_from
 from coartic.runs.store import RUNS_FILE, open_store
+from coartic.tasks.task import address_of
 from coartic.text import counted
 
 CellKey = tuple[str, str]
@@ -65,6 +66,8 @@ def typical_run(cell: CellRuns) -> int:
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
 """Runs of a cell whose solutions are executed again for the signatures."""
+MOST_INSTANCES = 8
+"""Instances that a report has one by one; more are shown together, by family."""
 
 
 def load(folder: str | Path) -> Study:
@@ -234,6 +237,21 @@ def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]
         return result
 
     return once
+
+
+@cached
+def one_by_one(study: Study) -> set[str]:
+    """Names of the tasks that a report has one by one.
+
+    All, but neither instances of families nor tasks with a penalty, if these are many. A variant
+    has the name of its task before the first dot.
+    """
+    drawn = {
+        name
+        for name, task in study.tasks.items()
+        if task.penalty is not None or address_of(name.partition(".")[0]) is not None
+    }
+    return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 
 @lru_cache(maxsize=4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -85,12 +84,6 @@ def initial_solution(task: Task, model: MotionModel) -> Execution | None:
         return corrective(task, initial_hands(task, model=model), model)
     except NotApplicableError:
         return None
-
-
-def initial_reward(task: Task, model: MotionModel) -> float:
-    """Reward of :func:`initial_solution`, less its penalty; NaN where there is none."""
-    solution = initial_solution(task, model)
-    return math.nan if solution is None or solution.reward is None else float(solution.reward)
 
 
 def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:

@@ -12,7 +12,8 @@ from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.topics.families.sample import one_by_one, sample, signs
+from coartic.analysis.study import one_by_one
+from coartic.analysis.topics.families.sample import sample, signs
 from coartic.tasks.families import instances_in
 from tests.support.made_up import MadeUp, made, row, study_of
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from coartic.analysis.statistics.instances import gap_share, other_tasks, task_mean
+from coartic.analysis.optima import gap_share
+from coartic.analysis.statistics.instances import other_tasks, task_mean
 
 
 def simulated(rng, instances, runs, *, between=0.1, within=0.05, mean=0.3):

@@ -14,9 +14,8 @@ from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.report import build
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.study import load
+from coartic.analysis.study import load, one_by_one
 from coartic.analysis.topics import objectives
-from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells

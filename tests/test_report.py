@@ -13,12 +13,13 @@ from coartic import load_task
 from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
-from coartic.analysis.report import facts, numbers, render
+from coartic.analysis.report import numbers, render
 from coartic.analysis.report.build import SECTIONS, report_files
 from coartic.analysis.report.contents import FIGURES, TABLES
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import runs_of, tables_of
 from coartic.analysis.study import Study
+from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
@@ -195,9 +196,8 @@ def test_claims_without_their_runs_are_named(traced):
     spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
     (entry,) = judge_claims(spoiled, [CLAIMS["context"]])
     assert ("ascending", "dual-process/EC1") in entry.failed
-    failed = facts.failed_behind(spoiled, entry.failed)
-    assert failed["failed"] == failed["runs"] > 0
-    assert failed["who"] == "learner EC1"
+    told = failed_runs(spoiled, entry.failed, "")
+    assert re.fullmatch(r" (\d+) of \1 runs of learner EC1 failed\.", told)
 
 
 def test_few_runs_say_so(tmp_path):

@@ -9,21 +9,11 @@ import pytest
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis.optima import KnownOptimum
-from coartic.analysis.report import facts
+from coartic.analysis.optima import KnownOptimum, initial_reward
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.topics.comparison.groups import BY_TRIAL, UNTOLD, group_of
-from coartic.analysis.topics.comparison.runtimes import WAY, Targets, halfway, price, targets
-from coartic.analysis.topics.comparison.scores import (
-    ALL_TASKS,
-    apart,
-    gaps,
-    initial_and_optimum,
-    leaders,
-    standings,
-)
-from coartic.analysis.trajectories import initial_reward
+from coartic.analysis.statistics.estimates import RESAMPLES, SEED
+from coartic.analysis.topics.comparison import runtimes, scores, sentences
+from coartic.analysis.topics.comparison.scores import BY_TRIAL, leaders
 from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
@@ -51,13 +41,13 @@ def test_gaps_of_a_results_folder():
     optima = made_up_optima("two-armed-1")
     seen = MadeUp(results, optima=optima)
     optimum = optima["two-armed-1"].reward
-    assert initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
-    first, second = gaps(seen).gap
+    assert scores.initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
+    first, second = scores.run_gaps(seen, "two-armed-1", "dual-process/EC2")
     assert first == pytest.approx((optimum + 520) / -optimum)
     assert math.isnan(second)
     missed = {"two-armed-1": replace(optima["two-armed-1"], reward=-680)}
     below = MadeUp(results, optima=missed)  # below the initial solution
-    assert gaps(below).empty
+    assert not scores.initial_and_optimum(below)
 
 
 LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],
@@ -67,8 +57,8 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
 
 
 def test_the_learners_conditions_stand_together():
-    table = standings(study(LEARNER | CMA))
-    over = table[table.task == ALL_TASKS]
+    over = scores.main_gaps(study(LEARNER | CMA))
+    assert set(over.task) == {scores.ALL_TASKS}
     assert over.method.tolist() == ["cma-es/bandit", "dual-process (EC1, EC4)"]
     by_task = [(301.5 - 292) / 292, (481.5 - 465) / 465]
     assert over.gap.iloc[1] == pytest.approx(np.mean(by_task))
@@ -82,15 +72,15 @@ def test_intervals_on_single_tasks_are_of_the_gaps_themselves():
     rewards = [-310, -300, -301, -302, -300, -300]
     seen = study({("ascending", "dual-process/EC1"): rewards,
                   ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
-    table = standings(seen)
+    table = scores.gaps(seen)
     by_task = table.set_index("task").loc[["ascending", "two-armed-1"]]
     gap = (np.array(rewards) + 292) / -292
     ends = stats.bootstrap((gap,), np.mean, n_resamples=9_999, rng=np.random.default_rng(SEED))
     low, high = ends.confidence_interval
     assert high - gap.mean() > 1.3 * (gap.mean() - low) > 0
     expected = pd.DataFrame(
-        [("dual-process/EC1", BY_TRIAL, "learner", gap.mean(), low, high, 6),
-         ("dual-process/EC4", BY_TRIAL, "learner", 15 / 465, 15 / 465, 15 / 465, 3)],
+        [("dual-process/EC1", BY_TRIAL, gap.mean(), low, high, 6, "learner"),
+         ("dual-process/EC4", BY_TRIAL, 15 / 465, 15 / 465, 15 / 465, 3, "learner")],
         index=by_task.index, columns=by_task.columns,
     )  # fmt: skip
     pd.testing.assert_frame_equal(by_task, expected, rtol=0.01)
@@ -104,17 +94,24 @@ def test_a_rank_counts_algorithms():
     assert math.isnan(rows.p[0])
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
     assert rows.p[1] == pytest.approx(2 / 2**8, abs=0.003)
-    assert apart(seen, "cma-es/bandit", "cma-es/every").p == 1.0
+    assert scores.paired_difference(seen, "cma-es/bandit", "cma-es/every").p == 1.0
+
+
+def test_the_learner_stands_by_the_form_that_explores_most():
+    better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
+    seen = study(LEARNER | better)
+    assert scores.main_gaps(seen).method.iloc[0] == "dual-process (EC1, EC3)"
+    assert leaders(seen, BY_TRIAL).method.tolist() == ["dual-process (EC1, EC4)"]
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     """The corrective process alone is told of its only trial, and of every hand sequence."""
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
-    assert group_of(alone, "corrective-alone/given") == BY_TRIAL  # ten trials in made-up rows
+    assert scores.group_of(alone, "corrective-alone/given") == BY_TRIAL  # of ten trials
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
     again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
-    assert group_of(again, "corrective-alone/given") == UNTOLD
-    assert group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
+    assert scores.group_of(again, "corrective-alone/given") == scores.WITHOUT_REWARD
+    assert scores.group_of(again, "dual-process (EC1, EC4)") == BY_TRIAL
 
 
 def test_crossings_by_brute_force():
@@ -122,7 +119,6 @@ def test_crossings_by_brute_force():
     rng = np.random.default_rng(5)
     spends = [rng.lognormal(3, 1, (runs, 20)).round() for runs in (6, 9)]
     spends[1][rng.random(spends[1].shape) < 0.3] = math.inf
-    reached = Targets(spends)
 
     def share(budget):
         return np.mean([(part <= budget).mean() for part in spends])
@@ -130,15 +126,15 @@ def test_crossings_by_brute_force():
     budgets = np.unique(np.concatenate([part.ravel() for part in spends]))
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
-        crossing = reached.crossing(level)
+        crossing = runtimes.budget_for(spends, level)
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
-    steps, shares = reached.curve()
+    steps, shares = runtimes.ecdf(spends)
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
-    assert reached.share() == pytest.approx(share(1e300))
-    assert math.isnan(Targets([spends[0][:2]]).crossing(0.5).low)  # too few runs
+    assert runtimes.share_reached(spends) == pytest.approx(share(1e300))
+    assert math.isnan(runtimes.budget_for([spends[0][:2]], 0.5).low)  # too few runs
 
 
 def resampled_ends(spends, level):
@@ -161,12 +157,33 @@ def test_targets_are_evenly_spaced_rewards():
     half = -319 + (319 - 292) / 2
     seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
     vars(seen)["rewards"] = lambda: iter(())
-    reached = targets(seen)["ascending", "posture-based/two-goals", "trials"]
-    assert reached.share() == pytest.approx(len([w for w in WAY if w <= 0.5]) / len(WAY), abs=0.051)
-    assert reached.crossing(0.25).value == 10  # trials of the made-up row
-    paid = price(seen).loc["posture-based/two-goals"]
-    assert (paid.task, paid.trials_to_quarter, paid.trials_to_half) == ("ascending", 10, 10)
-    assert paid.reached == reached.share()
+    paid = TABLES["price"](seen).loc["posture-based/two-goals"]
+    assert paid.reached == 10 / 20
+    assert (paid.trials_to_quarter, paid.trials_to_half) == (10, 10)  # trials of the made-up row
+
+
+def test_a_failed_run_reaches_nothing():
+    """Of four runs the first is cold, so that its time is not known, and two fail."""
+    learner, other = "dual-process/EC1", "posture-based/two-goals"
+    seen = study({("ascending", learner): [-300] * 4, ("ascending", other): [-305] * 4})
+    failed = (seen.runs.method == other) & (seen.runs.run > 1)
+    runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
+    runs["reward"] = runs.reward.mask(failed)
+    again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
+    vars(again)["rewards"] = lambda: iter(())
+    assert scores.gaps(again).method.tolist() == [learner]
+    assert TABLES["against-learner"](again).empty
+    assert TABLES["price"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
+    (times,) = runtimes.running_times(again)[other, "solve_s"]
+    assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
+
+
+def test_a_locked_base_is_another_problem():
+    seen = study({("ascending", name): [-300] * 3 for name in ("dual-process/EC1", "mine")})
+    locked = seen.runs.assign(parameters=np.where(seen.runs.method == "mine", '{"base": ""}', "{}"))
+    again = MadeUp(study_of(locked, list(seen.tasks.values())), optima=seen.optima)
+    assert scores.gaps(again).method.tolist() == ["dual-process/EC1"]
+    assert list(runtimes.cells_compared(again)) == ["dual-process/EC1"]
 
 
 def test_the_initial_reward_loses_the_penalty():
@@ -178,7 +195,7 @@ def test_the_initial_reward_loses_the_penalty():
     seen = MadeUp(study_of(pd.DataFrame([rows]), [dear]), optima=best)
     without, initial = (initial_reward(task, seen.model) for task in (plain, dear))
     assert initial < -340 < without
-    assert initial_and_optimum(seen) == {"ascending": (initial, -340)}
+    assert scores.initial_and_optimum(seen) == {"ascending": (initial, -340)}
 
 
 SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])
@@ -203,29 +220,30 @@ def test_a_method_from_a_file_changes_nobody_elses_p():
     again = TABLES["against-learner"](beside).loc[mine.index]
     assert mine.p_holm.tolist() == again.p_holm.tolist()
     assert (mine.p_holm < 0.05).all()
+    assert TABLES["ranking"](beside).loc["theirs", ["better", "worse"]].tolist() == [0, 0]
     learner = leaders(beside, BY_TRIAL).set_index("method").p["dual-process (EC1, EC4)"]
     without = study(TEN | strangers(("mine", 2), ("yours", 3), runs=10))
     assert leaders(without, BY_TRIAL).set_index("method").p["dual-process (EC1, EC4)"] == learner
 
 
-def test_a_test_that_cannot_reject_counts_nothing():
-    """Three runs against a number have a p of 2/8 at least, by their signs; ten tell them apart."""
-    few = {key: rewards[:3] for key, rewards in TEN.items()}
+@pytest.mark.parametrize("runs", [3, 6, 10])
+def test_a_test_that_cannot_reject_counts_nothing(runs):
+    """Signs of runs against a number have a p of 2/8, 2/64 or 2/1024 at least; on two tasks it is
+    twice that."""
+    few = {key: rewards[:runs] for key, rewards in TEN.items()}
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
-    for rewards, runs in ((few, 3), (TEN, 10)):
-        seen = study(rewards | plan)
-        declared = replace(seen.plan.methods["my-plan"], stochastic=False)
-        seen.plan.methods["my-plan"] = declared
-        rows = TABLES["against-learner"](seen)
-        least = rows.least_p["ascending my-plan"]
-        assert least == pytest.approx(2 / 8 if runs == 3 else 2 / 1024)
-        row_of = TABLES["ranking"](seen).loc["my-plan"]
-        if runs == 3:
-            assert math.isnan(row_of.better)
-            assert math.isnan(row_of.worse)
-        else:
-            assert (row_of.better, row_of.worse) == (2, 0)
+    seen = study(few | plan)
+    declared = replace(seen.plan.methods["my-plan"], stochastic=False)
+    seen.plan.methods["my-plan"] = declared
+    rows = TABLES["against-learner"](seen)
+    assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
+    row_of = TABLES["ranking"](seen).loc["my-plan"]
+    both = "dual-process (EC1, EC4)"
+    test = scores.paired_difference(seen, "my-plan", both)  # with every run
+    assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
+    expected = (2, 0) if runs == 10 else (math.nan, math.nan)
+    assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():
@@ -240,23 +258,32 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)
     assert ranked.better["mine width=0.2"] == 2
-    assert [each["method"] for each in facts.nearest(again)["from_files"]] == ["mine width=0.2"]
+    assert [each.method for each in sentences.from_files(again)] == ["mine width=0.2"]
 
 
 def test_trials_to_the_middle_of_the_way():
     """The median of three runs by task: 4, 6 and never; never, never and 2."""
     half = {"ascending": -305, "two-armed-1": -570}  # of -319 to -292, and of -675 to -465
-    start = {"ascending": -319, "two-armed-1": -675}
     at = {"ascending": (4, 6, None), "two-armed-1": (None, None, 2)}
     seen = study({("ascending", "dual-process/EC1"): [-300] * 3,
                   ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
     rewards = {}
     for (task, _), cell in seen.cells.items():
         for run_id, trial in zip(cell.runs.run_id, at[task], strict=True):
-            trials = np.full(10, float(start[task]))
+            trials = np.full(10, half[task] - 1.0)
             if trial is not None:
                 trials[trial - 1] = half[task]
             rewards[run_id] = trials
     vars(seen)["rewards"] = lambda: iter(rewards.items())
-    middle = halfway(seen, "dual-process (EC1, EC4)")
+    middle = runtimes.trials_to_half(seen, "dual-process (EC1, EC4)")
     assert middle == {"ascending": 6.0, "two-armed-1": math.inf}
+
+
+def test_the_task_with_the_largest_gain():
+    """16 of 319 ticks on ascending are a larger share than 30 of 675 on two-armed 1."""
+    learned = {("ascending", 1): -303, ("two-armed-1", 2): -670, ("two-armed-1", 4): -645}
+    seen = study({(task, f"dual-process/EC{k}"): [at] * 3 for (task, k), at in learned.items()})
+    seen.runs["initial_reward"] = seen.runs.task.map({"ascending": -319, "two-armed-1": -675})
+    again = MadeUp(study_of(seen.runs, list(seen.tasks.values())), optima=seen.optima)
+    assert scores.best_condition(again, "two-armed-1") == "dual-process/EC4"
+    assert sentences.most_improved(again) == (("ascending", "dual-process/EC1"), -319, -303)

@@ -14,7 +14,8 @@ from coartic import load_task
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation
-from coartic.analysis.topics.comparison.groups import BY_FORMULA, BY_TRIAL
+from coartic.analysis.topics.comparison import sentences
+from coartic.analysis.topics.comparison.scores import BY_FORMULA, BY_TRIAL
 from coartic.analysis.trajectories import Trajectories
 from tests.support.made_up import MadeUp, made, made_up_optima, row, study_of
 
@@ -36,7 +37,7 @@ STEPS = {
     (ONE, EC1): ({1: -319, 100: -312, 500: -305, 1000: -300}, {1: -319, 101: -310, 1000: -301},
                  {1: -319, 20: -312, 50: -305, 1000: NONE}),
     (TWO, EC4): ({1: -675, 200: -570, 1000: -480},) * 3,
-    (ONE, CMA): ({1: -319, 10: -293, 100: NONE},) * 3,
+    (ONE, CMA): ({1: -319, 10: -293, 100: NONE},) * 2 + ({1: -319, 10: -293, 1000: NONE},),
     (TWO, CMA): ({1: -675, 10: -470, 100: NONE},) * 3,
 }  # fmt: skip
 
@@ -148,6 +149,8 @@ def test_price(study):
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
     assert len(table) == 3
+    assert [row.method for row in sentences.learner_and_rival(study)] == [BOTH, CMA]
+    assert sentences.ratios(study) == {"trials_to_quarter": 200 / 10, "trials_to_half": 1000 / 10}
 
 
 def test_learning(study):

@@ -17,16 +17,15 @@ import pandas as pd
 from coartic import CoarticError
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.figures.plot import Plot, picture, svg_for_page
-from coartic.analysis.report import facts, text
+from coartic.analysis.report import about, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.next_goal import next_goal
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
-from coartic.analysis.report.text import answers, environment, sentence
+from coartic.analysis.report.text import answers, environment
 from coartic.analysis.section import Section
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
 from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, publish
@@ -112,10 +111,7 @@ def shown(study: Study) -> list[Section]:
 
 def finding(section: Section, study: Study) -> str:
     """The sentence of a section; empty where the runs say nothing."""
-    if section.finding is not None:
-        return text.shown(section.finding(study))
-    of = getattr(facts, section.id)(study) if hasattr(facts, section.id) else None
-    return "" if of is None else sentence(section.id, of)
+    return "" if section.finding is None else text.shown(section.finding(study))
 
 
 @cached
@@ -170,8 +166,8 @@ def page(study: Study) -> str:
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
-        provenance=facts.provenance(study),
-        limits=facts.limits(study),
+        provenance=about.provenance(study),
+        limits=about.limits(study),
         paper_link=PAPER_LINK,
         links=dict(link.split(", ", 1) for link in links),
     )
@@ -183,7 +179,7 @@ def summary(study: Study) -> str:
     return template.render(
         title=title(study),
         answers=answers(study),
-        provenance=facts.provenance(study),
+        provenance=about.provenance(study),
         figures=[name for name in ("postures", "ranking", "price") if name in plots(study)],
     )
 

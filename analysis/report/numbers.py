@@ -13,11 +13,12 @@ import numpy as np
 
 from coartic.analysis.claims.judge import counts
 from coartic.analysis.methods import is_variant, main_methods, name_of
-from coartic.analysis.report import facts
+from coartic.analysis.report import about
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import COLUMNS
 from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.paper.sentences import papers_claims, rewards_by_verdict
 
 MOST = 100
@@ -28,11 +29,11 @@ Number = tuple[str, str, str]
 
 def numbers_tex(study: Study) -> str:
     """The macros as a file that LaTeX inputs."""
-    about = facts.provenance(study)
+    made = about.provenance(study)
     lines = [
-        f"% Headline numbers of suite {about['suite']}, seed {about['seed']}: {about['runs']} runs",
-        f"% of coartic {' '.join(filter(None, (about['version'], about['commit'])))}, "
-        f"{about['date']}.",
+        f"% Headline numbers of suite {made['suite']}, seed {made['seed']}: {made['runs']} runs",
+        f"% of coartic {' '.join(filter(None, (made['version'], made['commit'])))}, "
+        f"{made['date']}.",
         "% `coartic trace TABLE ROW` prints the runs behind a row that a comment names.",
     ]
     macros: dict[str, str] = {}
@@ -74,17 +75,17 @@ def numbers(study: Study) -> Iterator[Number]:
         comment = f"postures at the shared goal: table contexts, row '{shared.row}'"
         yield "PosturesApart", plain(shared.apart, 2), comment
         yield "PosturesApartSD", plain(shared.spreads, 1), comment
-    if price := facts.price(study):
-        for of, label in (("Learner", price["learner"]), (price["rival"], price["rival_label"])):
-            for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
-                if label:
-                    row: Any = TABLES["price"](study).loc[label]
-                    what = COLUMNS[column].header
-                    comment = f"{what} of the targets: table price, row '{label}'"
-                    yield from with_interval(f"{level}{letters(of)}", row, column, 0, 1, comment)
-        for at in price["levels"]:
-            comment = f"ratio of trials, learner over {price['rival']}: table price"
-            yield f"{letters(at['level']).removeprefix('A')}Ratio", plain(at["times"], 1), comment
+    learner, rival = comparison.learner_and_rival(study)
+    for row in (learner, rival):
+        if row is None:
+            continue
+        of = "Learner" if row is learner else letters(name_of(row.method))
+        for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
+            comment = f"{COLUMNS[column].header} of the targets: table price, row '{row.method}'"
+            yield from with_interval(f"{level}{of}", row, column, 0, 1, comment)
+    for column, ratio in comparison.ratios(study).items():
+        comment = f"ratio of trials, learner over {name_of(rival.method)}: table price"
+        yield f"{letters(column).removeprefix('TrialsTo')}Ratio", plain(ratio, 1), comment
     ranking = TABLES["ranking"](study)
     for label in main_methods(str(m) for m in ranking.index if not is_variant(str(m))):
         comment = f"gap to the optimum, per cent: table ranking, row '{label}'"

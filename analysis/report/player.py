@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from coartic import Robot, Task, Trajectory, trajectory
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
-from coartic.analysis.report.facts import gain
-from coartic.analysis.study import Study, typical_run
+from coartic.analysis.study import Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.values import shared_goal
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.topics.comparison.sentences import most_improved
 from coartic.analysis.trajectories import initial_solution
 from coartic.drawing import numbered_below
 from coartic.robot import HANDS
@@ -69,7 +68,7 @@ def views_of(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, An
     """What the player offers first: the same goal before two successors, before and after."""
     place = {(movement["on"], movement["label"]): k for k, movement in enumerate(movements)}
     views: list[dict[str, Any]] = []
-    shared, most = shared_goal(study), gain(study)
+    shared, most = shared_goal(study), most_improved(study)
     if shared is not None:
         views.append(
             {
@@ -81,12 +80,13 @@ def views_of(study: Study, movements: list[dict[str, Any]]) -> list[dict[str, An
             }
         )
     if most is not None:
+        task, label = most[0]
         views.append(
             {
                 "name": "Before and after learning",
                 "watch": "The same task before and after learning. Watch how the learner "
                 "prepares for a goal while it moves to the one before.",
-                "show": [place.get((most["task"], label)) for label in ("", most["label"])],
+                "show": [place.get((task, of)) for of in ("", label)],
             }
         )
     views = [view for view in views if None not in view["show"]]

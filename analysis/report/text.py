@@ -1,35 +1,38 @@
-"""Sentences with their numbers put in, from the templates beside this file."""
+"""Answers to the four questions of the first screen, and the templates beside this file."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic.analysis import words
-from coartic.analysis.report import facts
 from coartic.analysis.study import Study
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
+from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.paper import sentences as paper
 from coartic.text import one_line
 
-QUESTIONS = {
-    "coarticulation": ("Does the next goal change the movement?", "Coarticulation"),
-    "paper": ("Is the paper reproduced?", "Paper"),
-    "nearest": ("Who comes nearest to the optimum?", "Nearest"),
-    "price": ("What does it cost?", "Cost"),
-}
-"""The four questions with their words on the terminal, by the facts that answer them."""
-INSTEAD = {"slopes": "slopes", "gain": "learning"}
-"""Facts that answer the first question where no two tasks share a goal, with their sections."""
-ANSWERS = {
-    "coarticulation": coarticulation.answer,
-    "slopes": coarticulation.answer_by_slopes,
-    "paper": paper.answer,
-}
-"""Answers by the names in :data:`QUESTIONS`; the others are still macros with facts."""
+ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
+    (
+        "Does the next goal change the movement?",
+        "Coarticulation",
+        {
+            "coarticulation": coarticulation.answer,
+            "slopes": coarticulation.answer_by_slopes,
+            "learning": comparison.answer_gain,
+        },
+    ),
+    ("Is the paper reproduced?", "Paper", {"paper": paper.answer}),
+    ("Who comes nearest to the optimum?", "Nearest", {"nearest": comparison.answer_nearest}),
+    ("What does it cost?", "Cost", {"price": comparison.answer_price}),
+)
+"""The four questions with their words on the terminal, and the functions that answer them.
+
+By the section that says more. The first answer that is not empty counts.
+"""
 
 
 @cache
@@ -46,11 +49,8 @@ def environment(*, escape: bool) -> Environment:
     )
     templates.filters |= {
         "number": words.number,
-        "two_figures": words.two_figures,
-        "p_value": words.p_value,
         "listed": words.listed,
-        "brackets": words.in_brackets,
-        "capital": lambda text: text[:1].upper() + text[1:],
+        "capital": words.capital,
     }
     return templates
 
@@ -60,28 +60,15 @@ def shown(text: str) -> str:
     return one_line(text).replace(" %", f"{words.NO_BREAK}%")
 
 
-def sentence(name: str, of: Any) -> str:
-    """A macro of ``sentences.jinja`` with its facts, as one line of plain text."""
-    macros = environment(escape=False).get_template("sentences.jinja").module
-    text = str(getattr(macros, name)(of)).replace("\n", " ")
-    return shown(" ".join(part for part in text.split(" ") if part).replace(" ,", ","))
-
-
 def answers(study: Study) -> list[dict[str, str]]:
     """The answers that a folder gives to the four questions, a dozen words each.
 
     ``id`` of the section that says more, ``question``, ``word``, ``text``.
     """
     answered = []
-    for name, (question, word) in QUESTIONS.items():
-        sections = {name: name} | (INSTEAD if name == "coarticulation" else {})
-        for of, section in sections.items():
-            if of in ANSWERS:
-                text = shown(ANSWERS[of](study))
-            else:
-                values = getattr(facts, of)(study)
-                text = "" if values is None else sentence(f"{of}_short", values)
-            if text:
-                answered.append({"id": section, "question": question, "word": word, "text": text})
-                break
+    for question, word, functions in ANSWERS:
+        texts = ((section, shown(answer(study))) for section, answer in functions.items())
+        if told := next(((section, text) for section, text in texts if text), None):
+            section, text = told
+            answered.append({"id": section, "question": question, "word": word, "text": text})
     return answered

@@ -31,11 +31,6 @@ Scores = Mapping[str, Sequence[Runs]]
 """Scores of the runs on each instance, by family."""
 
 
-def gap_share(rewards: ArrayLike, optimum: float) -> Array:
-    """(optimum − reward) / |optimum|: 0 at the optimum; 0.01 is 1 % more ticks than it."""
-    return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
-
-
 def task_mean(values: Mapping[str, ArrayLike]) -> Estimate:
     """Mean over given tasks of the mean over runs, with stratified BCa interval."""
 

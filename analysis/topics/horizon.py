@@ -17,9 +17,9 @@ from coartic.analysis.claims.register import MARGINS, Finding
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import most_exploring
+from coartic.analysis.optima import gap_share
 from coartic.analysis.section import Section
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.instances import gap_share
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks

@@ -1,4 +1,4 @@
-"""The tasks: start configurations and goals (paper, Figure 4)."""
+"""The tasks: start configurations and goals (paper, Figure 4), and rewards on them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,41 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.methods import LEARNER
 from coartic.analysis.section import Section
-from coartic.analysis.study import Study
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.statistics.estimates import interval, mean
+from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics.comparison.scores import best_condition
+from coartic.analysis.topics.paper.published import published_cell
+from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
+
+
+@table("task, arms, base, initial, condition, learned[], published, optimum, bound")
+def tasks(study: Study) -> Rows:
+    """One row a task: initial, learned, published and best possible reward."""
+    for name in sorted(one_by_one(study), key=list(study.tasks).index):
+        task, label = study.tasks[name], best_condition(study, name)
+        best = study.optima.get(name)
+        row: Row = {
+            "task": marked(task.label, task),
+            "arms": len(task.hands),
+            "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
+            "optimum": best.reward if best else None,
+            "bound": best.bound if best else None,
+        }
+        if label is not None:
+            cell, condition = study.cells[name, label], label.removeprefix(LEARNER)
+            paper = published_cell(name, condition)
+            row |= {
+                "initial": cell.good.initial_reward.dropna().mean(),
+                "condition": condition,
+                **interval("learned", mean(cell.rewards)),
+                "published": paper.summary.mean if paper and paper.summary else None,
+                **runs_of(cell),
+            }
+        yield name, row
 
 
 @figure(
@@ -25,7 +56,7 @@ from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
     "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
     "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
-def tasks(study: Study) -> Parts:
+def start_and_goals(study: Study) -> Parts:
     """Start configuration and goals of each task, one panel for each."""
     shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
     if not shown:

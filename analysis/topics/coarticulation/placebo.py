@@ -20,7 +20,7 @@ from coartic.analysis.statistics.estimates import LEVEL, SEED
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.values import shared_goal
-from coartic.analysis.topics.comparison.groups import BY_TRIAL, group_of
+from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
 from coartic.robot import Hand
 
 

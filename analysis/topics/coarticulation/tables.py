@@ -13,11 +13,10 @@ from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import joined_tasks, moved_goals
 from coartic.analysis.statistics.estimates import Estimate, interval
 from coartic.analysis.statistics.hypotheses import holm
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation.values import signature_values
-from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.words import marked
 
 COLUMN_OF = {

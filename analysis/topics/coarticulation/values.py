@@ -21,8 +21,7 @@ from coartic.analysis.signatures.context import context_pairs
 from coartic.analysis.signatures.locus import LEAST, MovedGoal, joined_tasks, moved_goals
 from coartic.analysis.signatures.register import Signature, of_kind
 from coartic.analysis.statistics.estimates import Estimate, student_mean, wilson
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import HANDS, Array
 

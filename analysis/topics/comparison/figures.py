@@ -4,7 +4,7 @@ how rewards rise with trials."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,17 +12,25 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from coartic import Task
+from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
-from coartic.analysis.methods import in_order, is_learner, name_of
-from coartic.analysis.study import Study
-from coartic.analysis.topics.comparison import tables as comparison
-from coartic.analysis.topics.comparison.groups import GROUPS
-from coartic.analysis.topics.comparison.runtimes import WAY
-from coartic.analysis.topics.comparison.scores import ALL_TASKS, optimum_in_words, standings
-from coartic.analysis.topics.comparison.tables import price_curves
-from coartic.analysis.trajectories import initial_reward
+from coartic.analysis.optima import initial_reward
+from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.topics.comparison import runtimes, scores, tables
 from coartic.analysis.words import in_brackets, number
+from coartic.robot import Array
+
+PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
+"""Spends that the figure of costs has a panel of, and their axes."""
+ECDF_STEPS = 150
+"""Steps of an ECDF that are drawn."""
+WINDOW = 100
+"""Trials over which a learning curve averages the reward of trials."""
+POINTS = 120
+"""Trials of a learning curve that are drawn."""
+CURVES = (*methods.CONDITIONS, "random-search/climbing", "cma-es/bandit")
+"""Built-in methods whose learning curves are drawn; of others they all are."""
 
 
 @figure(
@@ -32,26 +40,25 @@ from coartic.analysis.words import in_brackets, number
     f"there are several), with its {style.CONFIDENCE} bootstrap interval over runs. Methods that "
     "are run once have no interval. Diamonds and bold names: the paper's learner.",
 )
-def ranking(study: Study) -> Parts:
+def gaps_to_optimum(study: Study) -> Parts:
     """Gap to the optimum of every method over all tasks, or on the one that there is."""
-    data = standings(study)
-    if not len(data):
+    rows = scores.main_gaps(study)
+    if not len(rows):
         raise missing(study, "no method with a solution to every run and a known optimum")
-    rows = data[data.task == data.task.iloc[0]]
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "low", "high")})
-    groups = [(group, percent[percent.knows == group]) for group in GROUPS]
+    groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]
     heights = [len(of_group) + 0.8 for _, of_group in groups]
     size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
         draw_group(axes, group, of_group, style.looks(rows.method))
-    farthest = percent[["gap", "high"]].max(axis=None)
+    farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
-    where = "" if rows.task.iloc[0] == ALL_TASKS else f" on {rows.task.iloc[0]}"
-    panels[-1].set_xlabel(f"gap to the {optimum_in_words(study)}{where} (%)")
+    where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
+    panels[-1].set_xlabel(f"gap to the {scores.optimum_in_words(study)}{where} (%)")
     alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
-    return drawing, data, alt, study.tasks.values()
+    return drawing, rows, alt, study.tasks.values()
 
 
 def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
@@ -64,33 +71,30 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, s
         if not math.isnan(row["low"]):
             end = max(row["gap"], row["high"])
             axes.plot([row["low"], row["high"]], [-place, -place], color=color, linewidth=1.4)
-        (dot,) = axes.plot(row["gap"], -place, "D" if is_learner(row["method"]) else "o", **mark)
+        shape = "D" if methods.is_learner(row["method"]) else "o"
+        (dot,) = axes.plot(row["gap"], -place, shape, **mark)
         words = f"{number(row['gap'], 1)} % {in_brackets(row['low'], row['high'], 1)}".strip()
-        style.tip(dot, f"{name_of(row['method'])}: {words}, {row['runs']} runs")
+        style.tip(dot, f"{methods.name_of(row['method'])}: {words}, {row['runs']} runs")
         beside: Any = {"textcoords": "offset points", "va": "center"}
         axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
-    style.name_rows(axes, [name_of(method) for method in rows.method])
+    style.name_rows(axes, [methods.name_of(method) for method in rows.method])
     for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
-        if is_learner(method):
+        if methods.is_learner(method):
             name.set_fontweight("bold")
     axes.axvline(0, **style.OPTIMUM)
-
-
-PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
-"""Spends that the figure has a panel of, and their axes."""
 
 
 @figure(
     "price",
     "What it costs to come near",
-    f"Share of {len(WAY)} reward targets reached within a budget (mean over all tasks where there "
-    "are several). Targets are evenly spaced from the initial solution to the optimum; a run "
-    "counts for each target that it has reached. a: trials; planners make none and are lines. "
-    "b: forward-kinematics evaluations, spread evenly over a run's trials.",
+    f"Share of {len(runtimes.TARGETS)} reward targets reached within a budget (mean over all tasks "
+    "where there are several). Targets are evenly spaced from the initial solution to the optimum; "
+    "a run counts for each target that it has reached. a: trials; planners make none and are "
+    "lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
-def price(study: Study) -> Parts:
+def ecdf_of_costs(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
-    data = price_curves(study)
+    data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
@@ -102,11 +106,30 @@ def price(study: Study) -> Parts:
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    names = dict(zip(map(name_of, ends.method), ends.share, strict=True))
+    names = dict(zip(map(methods.name_of, ends.method), ends.share, strict=True))
     style.label_ends(panels[-1], names, 5.5)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
+
+
+def ecdf_curves(study: Study) -> pd.DataFrame:
+    """Share of targets reached within a budget, of the main methods.
+
+    A row at every step that is drawn: ``method``, ``spend`` (of :data:`PANELS`), ``budget``,
+    ``share``.
+    """
+    parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
+    times = runtimes.running_times(study)
+    for label in methods.in_order(methods.main_methods(tables.price(study).index)):
+        for spend in PANELS:
+            if (label, spend) in times:
+                budget, share = runtimes.ecdf(times[label, spend])
+                count = min(len(budget), ECDF_STEPS)
+                at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
+                rows = {"budget": budget[at], "share": share[at]}
+                parts.append(pd.DataFrame({"method": label, "spend": spend, **rows}))
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
@@ -121,7 +144,7 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
         line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
-        style.tip(drawn, f"{name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
+        style.tip(drawn, f"{methods.name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
     axes.set_xlim(edge, most)
     axes.set_ylim(-2, 102)
 
@@ -130,17 +153,17 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
     "learning-curves",
     "Learning curves",
     "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
-    f"the trials themselves (mean over runs and the last {comparison.WINDOW} trials; failed trials "
+    f"the trials themselves (mean over runs and the last {WINDOW} trials; failed trials "
     "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
     "far below the initial solution are cut off.",
 )
-def learning_curves(study: Study) -> Parts:
+def reward_by_trial(study: Study) -> Parts:
     """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
-    data = comparison.learning_curves(study)
+    data = learning_curves(study)
     if not len(data):
         raise missing(study, "no run that learns by trial")
     tasks = [study.tasks[name] for name in data.task.unique()]
-    labels = in_order(data.method.unique())
+    labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
     drawing, panels = style.figure_of((rows, columns), size, len(tasks))
@@ -151,16 +174,66 @@ def learning_curves(study: Study) -> Parts:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.entry(name_of(label), linewidth=1.3, **look)
+        style.entry(methods.name_of(label), linewidth=1.3, **look)
         for label, look in style.looks(labels).items()
     ]
     handles += [style.entry("initial", **style.INITIAL)]
-    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
+    handles += [style.entry(scores.optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
     return drawing, data, alt, tasks
+
+
+def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
+    """Best reward so far and that of the trials themselves, by task and method.
+
+    Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
+    ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
+    ``best_high``, ``trials`` (mean over runs and the last ``window`` trials).
+    """
+    trials_of = dict(study.rewards())
+    curves = [pd.DataFrame()]
+    for task, label in cells_with_curve(study):
+        ids = map(str, study.cells[task, label].good.run_id)
+        runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
+        if runs:
+            named = {"task": task, "method": label, "runs": len(runs)}
+            curves.append(pd.DataFrame(named | learning_curve(runs, window)))
+    return pd.concat(curves[1:] or curves, ignore_index=True)
+
+
+def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
+    """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        solved = [
+            label for (name, label), cell in study.cells.items() if name == task and len(cell.good)
+        ]
+        labels = [
+            label
+            for label in methods.in_order(solved)
+            if label in CURVES or not methods.is_built_in(label)
+        ]
+        two_armed = {*methods.CONDITIONS} & {*labels} - {methods.EC1}
+        yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
+
+
+def learning_curve(runs: Sequence[Array], window: int) -> dict[str, Array]:
+    """Both curves at chosen trials, from the reward of every trial of runs, NaN where it failed."""
+    length = min(map(len, runs))
+    rewards = np.array([run[:length] for run in runs])
+    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
+    # Until every run has a solution (NaN before) there is no mean of them.
+    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+    low, high = np.quantile(best, [0.25, 0.75], axis=0)
+    sums, counts = (
+        pd.Series(values).rolling(window, min_periods=1).sum()
+        for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
+    )
+    trials = (sums / counts).to_numpy()[at - 1]
+    mean = best.mean(axis=0)
+    return {"trial": at, "best": mean, "best_low": low, "best_high": high, "trials": trials}
 
 
 def draw_curves(

@@ -10,17 +10,13 @@ import pandas as pd
 
 from coartic import Task
 from coartic.analysis.methods import CONDITIONS, PLACEBO, most_exploring
-from coartic.analysis.optima import KnownOptimum, locks_base
+from coartic.analysis.optima import KnownOptimum, gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
-from coartic.analysis.statistics.instances import Runs, Scores, gap_share
+from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.analysis.study import Study, cached
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
-from coartic.tasks.task import address_of
-
-MOST_INSTANCES = 8
-"""Instances that a report has one by one; more are shown together, by family."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,21 +131,6 @@ class Sample:
         ):
             best[task][hands] = max(int(reward), best[task].get(hands, int(reward)))
         return best
-
-
-@cached
-def one_by_one(study: Study) -> set[str]:
-    """Names of the tasks that a report has one by one.
-
-    All, but neither instances of families nor tasks with a penalty, if these are many. A variant
-    has the name of its task before the first dot.
-    """
-    drawn = {
-        name
-        for name, task in study.tasks.items()
-        if task.penalty is not None or address_of(name.partition(".")[0]) is not None
-    }
-    return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 
 @cached

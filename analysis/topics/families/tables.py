@@ -41,6 +41,8 @@ CONTRASTS = (
 """More exploration against less: learning at all; random hands in place of the closest, the other
 arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
 differ in nothing but the hands that they try."""
+INITIAL_SOLUTION = "the initial solution"
+"""How the column of contrasts names it."""
 ALL = "all"
 """What stands in the column of families for the mean over all of them, each counting alike."""
 
@@ -142,7 +144,7 @@ def exploration(study: Study) -> Rows:
     instances = sample(study)
     for first, second in CONTRASTS if instances else ():
         assert instances is not None
-        less = "the initial solution" if second == INITIAL else name_of(second)
+        less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
         contrast = f"{name_of(first)} over {less}"
         for family, names in each_and_all(instances.shared(first, second)):
             scores = gains(instances, first, second, names)

@@ -16,8 +16,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.statistics.equivalence import MARGIN
-from coartic.analysis.study import Study
-from coartic.analysis.topics.families.sample import one_by_one
+from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.topics.paper.tables import hand_shares, published_differences
 from coartic.analysis.words import marked
 from coartic.learner.learning import TRIALS

@@ -11,8 +11,9 @@ from coartic.analysis.methods import LEARNER
 from coartic.analysis.section import Section
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.study import Study
+from coartic.analysis.topics.comparison.scores import best_condition
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.topics.paper.tables import beside_paper, best_condition
+from coartic.analysis.topics.paper.tables import beside_paper
 from coartic.analysis.words import capital, estimate, listed
 
 MOST_CHANGES = 4

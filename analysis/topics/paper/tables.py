@@ -1,4 +1,4 @@
-"""Tables of the tasks, and of the paper's numbers and claims beside ours."""
+"""Tables of the paper's numbers and claims beside ours."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from coartic.analysis.claims.ensemble import held_by, held_in_words
 from coartic.analysis.claims.judge import judgements, words_of_test
 from coartic.analysis.methods import CONDITIONS, LEARNER
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
-from coartic.analysis.statistics.estimates import interval, mean, standard_deviation
+from coartic.analysis.statistics.estimates import interval, standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.sample import one_by_one
 from coartic.analysis.topics.paper.published import (
     RUNS,
     PublishedCell,
@@ -76,42 +75,6 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
                     row["verdict"] = verdict(apart, row["margin"])
             rows.append(row)
     return rows
-
-
-def best_condition(study: Study, task: str) -> str | None:
-    """Label of the learner's own condition with the highest mean reward on a task."""
-    rewards = {
-        label: float(cell.rewards.mean())
-        for (name, label), cell in study.cells.items()
-        if name == task and label in CONDITIONS and len(cell.good)
-    }
-    return max(rewards, key=lambda label: rewards[label]) if rewards else None
-
-
-@table("task, arms, base, initial, condition, learned[], published, optimum, bound")
-def tasks(study: Study) -> Rows:
-    """One row a task: initial, learned, published and best possible reward."""
-    for name in sorted(one_by_one(study), key=list(study.tasks).index):
-        task, label = study.tasks[name], best_condition(study, name)
-        best = study.optima.get(name)
-        row: Row = {
-            "task": marked(task.label, task),
-            "arms": len(task.hands),
-            "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
-            "optimum": best.reward if best else None,
-            "bound": best.bound if best else None,
-        }
-        if label is not None:
-            cell, condition = study.cells[name, label], label.removeprefix(LEARNER)
-            paper = published_cell(name, condition)
-            row |= {
-                "initial": cell.good.initial_reward.dropna().mean(),
-                "condition": condition,
-                **interval("learned", mean(cell.rewards)),
-                "published": paper.summary.mean if paper and paper.summary else None,
-                **runs_of(cell),
-            }
-        yield name, row
 
 
 @table(

@@ -1,0 +1,60 @@
+"""The runs of a folder: how many, made with what and when, and what they cannot show."""
+
+from __future__ import annotations
+
+from collections import Counter
+from shlex import quote
+from typing import Any
+
+from coartic.analysis.methods import LEARNER
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.topics.paper.published import RUNS
+from coartic.learner.learning import TRIALS
+
+
+@cached
+def limits(study: Study) -> dict[str, Any]:
+    """What the results cannot show, as far as it depends on the folder."""
+    runs, made_with = study.runs, study.made_with
+    failed = runs[runs.status != "ok"]
+    learners = [cell for (_, label), cell in study.cells.items() if label.startswith(LEARNER)]
+    trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
+    fewest = min((len(cell.runs) for cell in learners), default=0)
+    tasks = {name: study.tasks[name] for name in study.tasks if name in one_by_one(study)}
+    optima = {name: study.optima.get(name) for name in tasks}
+    reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
+    return {
+        "runs": len(runs),
+        "failed": len(failed),
+        "reasons": [f"{count} × {reason}" for reason, count in reasons],
+        "reconstructed": [task.label for task in tasks.values() if task.reconstructed],
+        "incumbent": tasks["two-armed-1"].label if "two-armed-1" in tasks else "",
+        "trials": sorted(trials) if trials != {TRIALS} else [],
+        "paper_trials": TRIALS,
+        "few": fewest if fewest < RUNS else 0,
+        "paper_runs": RUNS,
+        "seed": study.plan.seed,
+        "unproven": [
+            tasks[name].label for name, best in optima.items() if best and not best.proven
+        ],
+        "unknown": [tasks[name].label for name, best in optima.items() if best is None],
+        "side_by_side": bool(runs.together.fillna(1).max() > 1) if "together" in runs else False,
+        "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
+        "processor": made_with["processor"],
+        "cores": made_with["cores"],
+    }
+
+
+@cached
+def provenance(study: Study) -> dict[str, Any]:
+    """Which runs, how many, made with what and when."""
+    made_with = study.made_with
+    return {
+        "suite": study.suite,
+        "folder": quote(str(study.folder)),
+        "runs": len(study.runs),
+        "seed": study.plan.seed,
+        "version": made_with["coartic"],
+        "commit": made_with["commit"]["id"][:12] if made_with["commit"] else "",
+        "date": made_with["date"][:10],
+    }
