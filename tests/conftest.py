@@ -68,7 +68,7 @@ def report(traced, tmp_path_factory):
     folder = tmp_path_factory.mktemp("traced-report") / "report"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "picture", lambda figure, ending: b"")  # drawn for the page already
-        patch.setattr(build, "shown", lambda study: build.SECTIONS)  # undecided claims as well
+        patch.setattr(build, "visible_sections", lambda study: build.SECTIONS)  # all
         patch.setattr(build, "mostly_undecided", lambda entries: False)
         build.write_report(traced, folder, for_paper=False)
     return folder

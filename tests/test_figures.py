@@ -27,7 +27,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def figures(study):
     """Every figure that these runs allow."""
-    drawn = {name: build.drawn(study, name) for name in FIGURES}
+    drawn = {name: build.draw_figure(study, name) for name in FIGURES}
     return {name: plot for name, plot in drawn.items() if plot}
 
 

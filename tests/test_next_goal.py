@@ -24,7 +24,7 @@ def moved(tmp_path_factory):
 
 
 def test_the_stored_postures_are_those_of_the_suite(moved):
-    ours, stored = next_goal.postures(moved), pd.read_csv(next_goal.STORED)
+    ours, stored = next_goal.locus_postures(moved), pd.read_csv(next_goal.STORED)
     place = ["moved", "x", "y", "method"]
     kept = stored.groupby(place).head(1).merge(ours[place])  # each cell's first run
     pd.testing.assert_frame_equal(

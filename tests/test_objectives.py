@@ -182,7 +182,7 @@ def test_tables_and_the_figure_have_what_was_planted(monkeypatch):
     assert crossings.crossing["region learner"] == pytest.approx(30 + 70 * 17.5 / 22.5)
     assert crossings.crossing["joints cma-es"] == pytest.approx(140)
     assert len(crossings) == 6
-    assert build.drawn(study, "objectives")
+    assert build.draw_figure(study, "objectives")
     assert objectives.finding_of_objectives(study) == (
         "On 10 random tasks with a penalty of weight 300 a planner that believes that ticks alone "
         "count loses 50.0 % of the best known reward with costly joints, 50.0 % with a costly "

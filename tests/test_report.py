@@ -17,7 +17,7 @@ from coartic.analysis.report import numbers, render
 from coartic.analysis.report.build import SECTIONS, report_files
 from coartic.analysis.report.contents import FIGURES, TABLES
 from coartic.analysis.report.text import answers
-from coartic.analysis.report.trace import runs_of, tables_of
+from coartic.analysis.report.trace import row_and_runs, tables_of
 from coartic.analysis.study import Study
 from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
@@ -81,8 +81,8 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, monke
     results = report.parent
     tables = tables_of(results)
     assert set(tables) == {name for name, table in tables_by_name.items() if len(table)}
-    names, _ = runs_of(tables["methods"], None)
-    _, runs = runs_of(tables["methods"], names[0])
+    names, _ = row_and_runs(tables["methods"], None)
+    _, runs = row_and_runs(tables["methods"], names[0])
     method = tables_by_name["methods"].method[names[0]]
     assert set(traced.runs.set_index("run_id").method[runs]) == {method}
     code, text, _ = call(monkeypatch, capsys, "trace", "methods", names[0], "--in", results)

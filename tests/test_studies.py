@@ -260,7 +260,7 @@ def test_a_small_study_of_horizons(small):
     none, every = signs.loc["whole h=0"], signs.loc["whole h=all"]
     assert 0 < none.to_come == pytest.approx(every["mean"] - none["mean"])
     assert none.tasks == sum(len(task.goals) > 1 for task in study.tasks.values())
-    assert build.drawn(study, "horizon")
+    assert build.draw_figure(study, "horizon")
 
 
 def test_a_small_study_of_stops(small):
@@ -279,7 +279,7 @@ def test_a_small_study_of_stops(small):
     for sign, column in (("arm", "nearer"), ("first", "first")):
         ticks = [SIGNS[sign].of(study.trajectories(cell.task, cell.label)) for cell in cells]
         assert full[column] == pytest.approx(np.mean(ticks))
-    assert build.drawn(study, "stops")
+    assert build.draw_figure(study, "stops")
     passing = table.loc["random, one arm trajectory-optimisation/jerk free stop=0"]
     assert stops.finding_of_stops(study).startswith(
         "At free times postures of minimum-jerk plans leave the next goal nearer by "

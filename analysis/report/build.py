@@ -55,7 +55,7 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
                 files[f"tables/{name}.tex"] = latex_table(frame, name, caption).encode()
     files["numbers.tex"] = numbers_tex(study).encode()
     for name in FIGURES if for_paper else plots(study):
-        if plot := plots(study).get(name) or drawn(study, name):
+        if plot := plots(study).get(name) or draw_figure(study, name):
             for ending in (".svg", ".pdf") if for_paper else (".svg",):
                 files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
     return files
@@ -83,7 +83,7 @@ def write_report(
     return list(files)
 
 
-def drawn(study: Study, name: str) -> Plot | None:
+def draw_figure(study: Study, name: str) -> Plot | None:
     """A figure by its id; None where the runs do not allow it."""
     try:
         return FIGURES[name](study)
@@ -94,11 +94,11 @@ def drawn(study: Study, name: str) -> Plot | None:
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    ids = [section.figure for section in shown(study) if section.figure]
-    return {name: plot for name in ids if (plot := drawn(study, name)) is not None}
+    ids = [section.figure for section in visible_sections(study) if section.figure]
+    return {name: plot for name in ids if (plot := draw_figure(study, name)) is not None}
 
 
-def shown(study: Study) -> list[Section]:
+def visible_sections(study: Study) -> list[Section]:
     """Sections but those about single tasks where these are many, and claims if none is decided."""
     alone, claims = one_by_one(study), TABLES["claims"](study)
     decided = ((claims.verdict != "undecided") & (claims.run_ids != "")).any()
@@ -121,7 +121,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
     With their ``finding``; figure or table is None where the runs do not allow it.
     """
     allowed = []
-    for section in shown(study):
+    for section in visible_sections(study):
         plot = plots(study).get(section.figure)
         frame = TABLES[section.table](study) if section.table else pd.DataFrame()
         if plot is None and not len(frame):
@@ -149,7 +149,7 @@ def page(study: Study) -> str:
     player = player_json(study)
     scripts = ["page.js", "next_goal.js", *(["player.js"] if player else []), "address.js"]
     template = environment(escape=True).get_template("page.html.jinja")
-    ids = {section.id for section in shown(study)}
+    ids = {section.id for section in visible_sections(study)}
     script = "\n".join(f"{{\n{(here / name).read_text(encoding='utf-8')}}}" for name in scripts)
     try:
         links = metadata("coartic").get_all("Project-URL") or []

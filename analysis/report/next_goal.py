@@ -1,7 +1,7 @@
 """The figure to touch: a goal is moved, and the posture at the goal before it is looked at.
 
-Suite ``locus`` moves a goal from run to run. :func:`postures` takes what the figure shows from the
-runs of that suite; folders of other suites show ``next_goal.csv``, which is made by the same
+Suite ``locus`` moves a goal from run to run. :func:`locus_postures` takes what the figure shows from
+the runs of that suite; folders of other suites show ``next_goal.csv``, which is made by the same
 function. The page draws every position of each goal, and ``next_goal.js`` chooses one of them.
 """
 
@@ -33,7 +33,7 @@ STORED = Path(__file__).with_name("next_goal.csv")
 """Postures of a folder of suite ``locus``, for folders of other suites."""
 
 
-def postures(study: Study) -> pd.DataFrame:
+def locus_postures(study: Study) -> pd.DataFrame:
     """Which goal is moved and where it is, and the posture at the goal before it: a row a run.
 
     Of the positions at which every method of the figure has solved runs; empty where a goal has
@@ -59,7 +59,7 @@ def postures(study: Study) -> pd.DataFrame:
 
 def store(study: Study) -> None:
     """Keep the postures of a folder of suite ``locus`` for folders of other suites."""
-    kept = postures(study)
+    kept = locus_postures(study)
     if kept.empty:
         raise CoarticError(f"{study.folder} lacks runs of {TASK} with goals moved")
     kept.to_csv(STORED, index=False, float_format="%.4f", lineterminator="\n")
@@ -67,7 +67,7 @@ def store(study: Study) -> None:
 
 def next_goal(study: Study | None = None) -> str:
     """The figure as HTML, from a folder's own runs or from the stored ones."""
-    shown = pd.DataFrame() if study is None else postures(study)
+    shown = pd.DataFrame() if study is None else locus_postures(study)
     is_example = shown.empty
     shown = pd.read_csv(STORED) if is_example else shown
     task = load_task(TASK)

@@ -43,13 +43,13 @@ def numbers_tex(study: Study) -> str:
     return "\n".join([*lines, *list(macros.values())[:MOST]]) + "\n"
 
 
-def letters(text: str) -> str:
+def letters_alone(text: str) -> str:
     """A name in letters alone: ``two-armed-1`` is ``TwoArmedOne``."""
     spelled = re.sub(r"\d", lambda digit: _DIGITS[int(digit[0])].join("  "), text)
     return "".join(word[:1].upper() + word[1:] for word in re.findall("[A-Za-z]+", spelled))
 
 
-def plain(value: Any, digits: int) -> str:
+def decimals(value: Any, digits: int) -> str:
     """A number for LaTeX in decimals; empty where there is none or it is infinite."""
     return f"{value:.{digits}f}" if value is not None and np.isfinite(value) else ""
 
@@ -59,7 +59,7 @@ def with_interval(
 ) -> Iterator[Number]:
     """A number and the ends of its interval."""
     for ending, suffix in (("", ""), ("_low", "Low"), ("_high", "High")):
-        yield f"{name}{suffix}", plain(scale * row[f"{column}{ending}"], digits), comment
+        yield f"{name}{suffix}", decimals(scale * row[f"{column}{ending}"], digits), comment
 
 
 def numbers(study: Study) -> Iterator[Number]:
@@ -67,37 +67,37 @@ def numbers(study: Study) -> Iterator[Number]:
     if entries := papers_claims(study):
         for verdict_of_claim, count in counts(entries).items():
             comment = f"claims that are {verdict_of_claim}: table claims"
-            yield f"Claims{letters(verdict_of_claim)}", str(count), comment
+            yield f"Claims{letters_alone(verdict_of_claim)}", str(count), comment
         for verdict, count in rewards_by_verdict(study).items():
             comment = f"learned rewards of the paper's cells, {verdict}: table published"
-            yield f"Rewards{letters(verdict)}", str(count), comment
+            yield f"Rewards{letters_alone(verdict)}", str(count), comment
     if shared := shared_goal(study):
         comment = f"postures at the shared goal: table contexts, row '{shared.row}'"
-        yield "PosturesApart", plain(shared.apart, 2), comment
-        yield "PosturesApartSD", plain(shared.spreads, 1), comment
+        yield "PosturesApart", decimals(shared.apart, 2), comment
+        yield "PosturesApartSD", decimals(shared.spreads, 1), comment
     learner, rival = comparison.learner_and_rival(study)
     for row in (learner, rival):
         if row is None:
             continue
-        of = "Learner" if row is learner else letters(name_of(row.method))
+        of = "Learner" if row is learner else letters_alone(name_of(row.method))
         for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
             comment = f"{COLUMNS[column].header} of the targets: table price, row '{row.method}'"
             yield from with_interval(f"{level}{of}", row, column, 0, 1, comment)
     for column, ratio in comparison.ratios(study).items():
         comment = f"ratio of trials, learner over {name_of(rival.method)}: table price"
-        yield f"{letters(column).removeprefix('TrialsTo')}Ratio", plain(ratio, 1), comment
+        yield f"{letters_alone(column).removeprefix('TrialsTo')}Ratio", decimals(ratio, 1), comment
     ranking = TABLES["ranking"](study)
     for label in main_methods(str(m) for m in ranking.index if not is_variant(str(m))):
         comment = f"gap to the optimum, per cent: table ranking, row '{label}'"
         row = ranking.loc[label]
-        yield from with_interval(f"Gap{letters(name_of(label))}", row, "gap", 1, 100, comment)
+        yield from with_interval(f"Gap{letters_alone(name_of(label))}", row, "gap", 1, 100, comment)
     for name, row in TABLES["published"](study).iterrows():
-        of = letters(str(name))
+        of = letters_alone(str(name))
         comment = f"published learned reward: table published, row '{name}'"
-        yield f"Published{of}", plain(row.published, 1), comment
+        yield f"Published{of}", decimals(row.published, 1), comment
         comment = f"mean learned reward: table published, row '{name}'"
-        yield f"Reward{of}", plain(row.ours, 1), comment
-        yield f"Reward{of}SD", plain(row.ours_sd, 1), comment
+        yield f"Reward{of}", decimals(row.ours, 1), comment
+        yield f"Reward{of}SD", decimals(row.ours_sd, 1), comment
     for name, row in TABLES["tasks"](study).iterrows():
         comment = f"best known reward: table tasks, row '{name}'"
-        yield f"Optimum{letters(str(name))}", plain(row.optimum, 0), comment
+        yield f"Optimum{letters_alone(str(name))}", decimals(row.optimum, 0), comment

@@ -25,7 +25,7 @@ def tables_of(folder: Path) -> dict[str, Path]:
     return {path.stem: path for path in sorted(reports[0].glob("*.csv"))}
 
 
-def runs_of(table: Path, row: str | None) -> tuple[list[str], list[str]]:
+def row_and_runs(table: Path, row: str | None) -> tuple[list[str], list[str]]:
     """The values of a row, a line each, and the ids of its runs; without a row the rows' names.
 
     Raises CoarticError for a row that the table does not have.

@@ -62,7 +62,7 @@ def trace(
     ] = Path("results"),
 ) -> None:
     """Name the runs behind a row of a report's table."""
-    from coartic.analysis.report.trace import runs_of, tables_of
+    from coartic.analysis.report.trace import row_and_runs, tables_of
     from coartic.benchmarks.registry import registry
 
     tables = tables_of(folder)
@@ -71,7 +71,7 @@ def trace(
         return
     if table not in tables:
         raise CoarticError(unknown("table", table, tables))
-    values, runs = runs_of(tables[table], row)
+    values, runs = row_and_runs(tables[table], row)
     if row is None:
         say(*values)
         return
