@@ -1,7 +1,7 @@
 """The figure to touch: a goal is moved, and the posture at the goal before it is looked at.
 
-Suite ``locus`` moves a goal from run to run. :func:`locus_postures` takes what the figure shows from
-the runs of that suite; folders of other suites show ``next_goal.csv``, which is made by the same
+Suite ``locus`` moves a goal from run to run. :func:`locus_postures` reads its data from the
+runs of that suite; folders of other suites show ``next_goal.csv``, which is made by the same
 function. The page draws every position of each goal, and ``next_goal.js`` chooses one of them.
 """
 
