@@ -26,7 +26,7 @@ RESULTS = {
     "suite_seed": "INTEGER NOT NULL",
     "run": "INTEGER NOT NULL",  # number of the run, from 0
     "seed": "INTEGER NOT NULL",
-    "status": "TEXT NOT NULL",  # ok, infeasible, solver-failed, timeout, crashed
+    "status": "TEXT NOT NULL",  # one of STATUSES
     "reason": "TEXT NOT NULL",  # empty where status is ok
     "hands": "TEXT",  # of the solution, such as LRLR
     "reward": "INTEGER",  # of the solution, executed and scored by the harness
@@ -56,6 +56,8 @@ RESULTS = {
     "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
 }
 """Columns of table ``results`` beside its ``id``."""
+STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
+"""What came of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """How columns of each part begin."""
 PARTS = tuple(PREFIXES)
@@ -93,7 +95,7 @@ class Run:
     key: RunKey
     setting: Setting
     status: str
-    """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
+    """One of :data:`STATUSES`."""
     reason: str
     """Why it is not ok; empty where it is."""
     environment: dict[str, Any]
