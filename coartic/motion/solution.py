@@ -303,9 +303,13 @@ def follow_path(task: Task, run: SolutionRun, movement: Movement, model: MotionM
     """Make a movement along its path."""
     assert movement.waypoints is not None
     goal = task.goals[movement.goal - 1]
-    result = follow(
-        task.robot, run.q, movement.waypoints, movement.hand, goal, task.radius, model=model
-    )
+    try:
+        result = follow(
+            task.robot, run.q, movement.waypoints, movement.hand, goal, task.radius, model=model
+        )
+    except ValueError as error:
+        run.reason = f"goal {movement.goal}: {error}"
+        return
     run.evaluations += result.evaluations
     run.take(movement, result.q, result.ticks, result.hit)
 

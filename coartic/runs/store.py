@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.inputs import MOST_RUNS, MOST_TRIALS, problems_inline
-from coartic.model import check_model, stored_model
+from coartic.model import PAPER, check_model, stored_model
 from coartic.robot import Array
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan, Setting, hash_of
@@ -105,7 +105,6 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     JOIN waypoints ON waypoints.result_id = results.id
     ORDER BY cells.position, results.run, "order", waypoint;
 """
-
 
 
 class _Stored(BaseModel):
@@ -326,6 +325,9 @@ class Store:
             model=check_model(stored_model(json.loads(asked["model"]))),
             trial_budget=asked["trial_budget"],
         )
+        model = setting.model
+        if (model.step, model.max_iterations) != (PAPER.step, PAPER.max_iterations):
+            raise ValueError("no reading has this length of a step or number of iterations")
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
@@ -366,8 +368,8 @@ class Store:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
         rows = self._db.execute(
-            f"SELECT run_id, rewards, trials {_ASKED_FOR} JOIN learning ON learning.result_id = results.id "
-            "ORDER BY cells.position, results.run"
+            f"SELECT run_id, rewards, trials {_ASKED_FOR} "
+            "JOIN learning ON learning.result_id = results.id ORDER BY cells.position, results.run"
         )
         for run_id, blob, trials in rows:
             stored = unpack(blob, trials)
@@ -593,8 +595,8 @@ def has_tables(connection: sqlite3.Connection, folder: Path) -> bool:
     if changed:
         (kind, name), _ = changed[0]
         raise CoarticError(
-            f"{folder / RUNS_FILE} is not as coartic makes it: {kind} {plain(name, 80)} is missing, "
-            "changed or another's. Restore a copy, or run the suite again with another --out."
+            f"{folder / RUNS_FILE} is not as coartic makes it: {kind} {plain(name, 80)} is missing "
+            "or is not ours. Restore a copy, or run the suite again with another --out."
         )
     return True
 
