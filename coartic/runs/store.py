@@ -32,7 +32,7 @@ from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import parse_task
-from coartic.text import plain
+from coartic.text import one_line, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -492,10 +492,8 @@ def open_store(folder: Path) -> Store:
         raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not os.path.lexists(path):
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}")
-    with (
-        explain_errors(folder),
-        connect(folder, f"{path.absolute().as_uri()}?mode=rw", 2.0) as connection,
-    ):
+    check_files(folder)
+    with explain_errors(folder), connect(f"{path.absolute().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
         if not has_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
@@ -514,7 +512,8 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with explain_errors(folder), connect(folder, str(folder / RUNS_FILE), 0.0) as connection:
+    check_files(folder)
+    with explain_errors(folder), connect(str(folder / RUNS_FILE), 0.0) as connection:
         has_tables(connection, folder)  # or it is left as it is
         # No write-ahead log: it is unsafe on network disks.
         connection.execute("PRAGMA journal_mode = DELETE")
@@ -539,10 +538,9 @@ def check_place(folder: Path) -> None:
 
 
 @contextmanager
-def connect(folder: Path, where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
-    """A connection to the runs of a folder by their path or ``file:`` address, which waits so long
-    for a lock; it stays open, unless something is wrong with it."""
-    check_files(folder)
+def connect(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
+    """A connection to a path or a ``file:`` address, which waits so long for a lock; it stays
+    open, unless something is wrong with it."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
@@ -625,8 +623,9 @@ def explain_errors(folder: Path) -> Iterator[None]:
     path = folder / RUNS_FILE
     try:
         yield
-    except CoarticError:
-        raise
+    except CoarticError as error:
+        said = one_line(str(error))
+        raise CoarticError(said if str(folder) in said else f"{path}: {said}") from None
     except sqlite3.OperationalError as error:
         if "locked" in str(error):
             raise CoarticError(
