@@ -21,10 +21,9 @@ from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
-from coartic.motion.solution import execute_many
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import PARTS, movements_from
+from coartic.runs.run import PARTS, execute_all, movements_from
 from coartic.runs.store import RUNS_FILE, explain_errors, open_store
 from coartic.text import counted
 
@@ -202,10 +201,10 @@ class Study:
             solutions = [
                 movements_from(task, rows, waypoints.get(rows.run_id.iloc[0])) for rows in of_runs
             ]
-            executions = execute_many(task, solutions, model=self.model)
+            executions = execute_all(task, solutions, self.model)
             for rows, execution in zip(of_runs, executions, strict=True):
-                done = isinstance(execution, Execution) and execution.completed
-                if not done or execution.ticks != rows.ticks.sum():
+                done = execution.ticks if isinstance(execution, Execution) else None
+                if done != rows.ticks.sum():
                     raise ValueError(f"run {rows.run_id.iloc[0]} does not do what is stored of it")
             runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
         return Trajectories(task, cell.method, cell.variant, runs, self.model)

@@ -371,7 +371,7 @@ def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
     """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
     size = 4 * min(row["trials"] or 0, MOST_TRIALS)
     unpacked = zlib.decompressobj().decompress(row["rewards"] or zlib.compress(b""), size + 1)
-    need(len(unpacked) == size, f"its rewards are not those of {row['trials']} trials")
+    need(len(unpacked) <= size, f"it has more rewards than {row['trials']} trials")
     rewards = np.frombuffer(unpacked, "<i4").tolist()
     content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
     for part, moves in parts.items():

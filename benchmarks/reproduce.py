@@ -14,14 +14,10 @@ from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError, SolutionError
 from coartic.inputs import brief_value
 from coartic.method import Meter
-from coartic.motion.solution import execute
 from coartic.motion.ticks import Trajectory, trajectory
-from coartic.runs.run import PARTS, Run
+from coartic.runs.run import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.text import unknown
-
-MOST_SHOWN = 1_000_000
-"""Ticks of a run."""
 
 
 def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
@@ -57,11 +53,11 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
         raise CoarticError(f"run {run.key.id} has no solution to show: {run.status}, {run.reason}")
     task, model, movements = run.setting.task, run.setting.model, run.scores["solution"].movements
     try:
-        ticks = execute(task, movements, model=model).ticks
-        if ticks > MOST_SHOWN:
-            raise SolutionError(f"it takes {ticks} ticks; {MOST_SHOWN:_} can be shown")
+        (execution,) = execute_all(task, [movements], model)
+        if isinstance(execution, Exception):
+            raise execution
         return trajectory(task, movements, model)
-    except SolutionError as error:
+    except (SolutionError, ValueError) as error:
         raise CoarticError(f"{folder}: run {run.key.id} cannot be shown: {error}") from None
 
 

@@ -369,7 +369,7 @@ def bomb(count):
         "movements SET hand = 'both'",
         "movements SET kind = 'path'",
         "learning SET rewards = 'x'",
-        f"learning SET rewards = {bomb(19)}",
+        f"learning SET rewards = {bomb(21)}",
         f"learning SET rewards = {bomb(30_000_000)}",
     ],
 )

@@ -148,12 +148,11 @@ EDITS = {  # what is said: of which run, and what was edited
     "its seed is not": result(2, "seed = seed + 1"),
     "at least 2 ticks, not 1": movement(2, "ticks = 1"),
     "no count up to": movement(2, "ticks = 1000000000"),
-    "rewards are not those of": (
+    "more rewards than": (
         0,
         """INSERT INTO learning SELECT id, x'789c63606060000000040001' FROM results
         WHERE run = 0""",
     ),
-    "those of 5 trials": result(1, "trials = 5"),
     "the task is too long": (
         2,
         """UPDATE settings SET definition = json_set(definition,

@@ -48,7 +48,6 @@ _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
 _IN_GOAL, _MISSED = 1.0, 2.0  # fates of a lane
-MOST_STEPS = 3_000_000  # of a path, which is kept point by point
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
@@ -357,13 +356,11 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
     Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
     (k, dof). A whole last step goes beyond the end, straight on. Raises ValueError for a
-    wrong shape, and for a path of more than :data:`MOST_STEPS`.
+    wrong shape.
     """
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    if ends[-1] > MOST_STEPS * model.step:
-        raise ValueError(f"a path has {MOST_STEPS:_} steps at most")
     at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
     points[-1] = corners[-1]

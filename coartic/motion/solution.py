@@ -303,13 +303,9 @@ def follow_path(task: Task, run: SolutionRun, movement: Movement, model: MotionM
     """Make a movement along its path."""
     assert movement.waypoints is not None
     goal = task.goals[movement.goal - 1]
-    try:
-        result = follow(
-            task.robot, run.q, movement.waypoints, movement.hand, goal, task.radius, model=model
-        )
-    except ValueError as error:
-        run.reason = f"goal {movement.goal}: {error}"
-        return
+    result = follow(
+        task.robot, run.q, movement.waypoints, movement.hand, goal, task.radius, model=model
+    )
     run.evaluations += result.evaluations
     run.take(movement, result.q, result.ticks, result.hit)
 

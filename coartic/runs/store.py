@@ -654,12 +654,12 @@ def to_json(content: Any, *, sort_keys: bool = False) -> str:
 def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
     """Rewards of all trials as they are stored: those that failed are :data:`FAILED_TRIAL`.
 
-    Raises ValueError where they are not so many.
+    Raises ValueError where there are more of them than trials, some of which have none kept.
     """
     size = 4 * min(trials or 0, MOST_TRIALS)
     content = zlib.decompressobj().decompress(blob, size + 1)
-    if len(content) != size:
-        raise ValueError(f"rewards are not those of {trials} trials")
+    if len(content) > size:
+        raise ValueError(f"there are more rewards than {trials} trials")
     return np.frombuffer(content, dtype="<i4")
 
 
@@ -671,7 +671,7 @@ def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
         rules[name] = runs[name].notna() == solved
     for name in ("hands", "replay_hands", "initial_hands"):
         rules[f"letters of {name}"] = runs[name].fillna("L").str.fullmatch("[LR]+")
-    for name in set(runs) & {*RESULTS}:
+    for name in [name for name in RESULTS if name in runs]:
         if "NOT NULL" in RESULTS[name]:
             rules[f"lack of {name}"] = runs[name].notna()
         if _DTYPES[name] in ("Int64", "Float64"):
