@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic import MotionModel, NotApplicableError, Task, hand_sequences, trajectory
+from coartic import Execution, MotionModel, NotApplicableError, Task, hand_sequences, trajectory
 from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
@@ -23,8 +23,8 @@ from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import PARTS, movements_from
-from coartic.runs.store import RUNS_FILE, open_store
+from coartic.runs.run import PARTS, execute_all, movements_from
+from coartic.runs.store import RUNS_FILE, explain_errors, open_store
 from coartic.tasks.task import address_of
 from coartic.text import counted
 
@@ -68,6 +68,8 @@ MOST_EXECUTED = 500
 """Runs of a cell whose solutions are executed again for the signatures."""
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
+MOST_TICKS = 100_000_000
+"""Of all these solutions; they are kept tick by tick."""
 
 
 def load(folder: str | Path) -> Study:
@@ -197,12 +199,17 @@ class Study:
         self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
     ) -> Trajectories:
         cell, task = self.cells[key], self.tasks[key[0]]
-        solutions = (
-            movements_from(task, movements[run_id], waypoints.get(run_id))
-            for run_id in _executed_of(cell)
-            if run_id in movements
-        )
-        runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
+        of_runs = [movements[run_id] for run_id in _executed_of(cell) if run_id in movements]
+        with explain_errors(self.folder):
+            solutions = [
+                movements_from(task, rows, waypoints.get(rows.run_id.iloc[0])) for rows in of_runs
+            ]
+            executions = execute_all(task, solutions, self.model)
+            for rows, execution in zip(of_runs, executions, strict=True):
+                done = execution.ticks if isinstance(execution, Execution) else None
+                if done != rows.ticks.sum():
+                    raise ValueError(f"run {rows.run_id.iloc[0]} does not do what is stored of it")
+            runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
         return Trajectories(task, cell.method, cell.variant, runs, self.model)
 
     @cached_property
@@ -266,4 +273,6 @@ def _executed_of(cell: CellRuns) -> list[str]:
 
 
 def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    if "ticks" in table and table.ticks.sum() > MOST_TICKS:
+        raise CoarticError(f"the solutions take more than {MOST_TICKS:_} ticks in all")
     return {str(run_id): rows for run_id, rows in table.groupby("run_id")} if len(table) else {}

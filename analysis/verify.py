@@ -3,7 +3,9 @@
 It needs Python and NumPy, and nothing of coartic. ``python verify.py FOLDER`` opens
 ``FOLDER/runs.sqlite`` and checks of every run that its solution (and of a learner its first and
 last trial) keeps the rules, hits every goal, and has the stored ticks, rewards, hands, corrections
-and travel of the other arm; and, by a hash, that no joint and no trial was changed since.
+and travel of the other arm; by a hash, that no joint and no trial was changed since; by its id and
+its seed, that the task, method and parameters are those that it was asked for; and that the tables
+and views through which reports read all this are coartic's, and show each run as what it is.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
 Acquisition*): A robot, a mobile base with two arms, hits goals with its hands, in their order. A
@@ -23,10 +25,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import sqlite3
 import sys
 import zlib
 from collections import defaultdict
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -42,8 +46,14 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
+SCHEMA = "c8883613a85a08599252c2d5029a36506c672dd894cb794fac9b1e5d8df2407f"  # see schema
+# Whatever a file says, it is checked in bounded time and memory.
+MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
+MOST_TRIALS, MOST_TICKS, TICKS_IN_ALL = 10_000_000, 1_000_000, 1_000_000_000  # of run and movement
 UNCHECKED = (
-    "Times, counts of what was spent, tasks, parameters and proven bounds are taken as stored.",
+    "Times, dates, reasons, counts of what was spent, proven bounds, and where and with what it "
+    "was run are taken as stored; so is what methods declare, and what the suite was called.",
+    "That tasks are those of the paper or of a family, and that all runs of a suite are there.",
     "No method is run: `coartic verify --again N` sees whether it finds these solutions again.",
 )
 
@@ -92,9 +102,11 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 def stored_task(definition: str, model: str) -> Any:
     """A task as it is stored, with the constants of movement, and what follows from both."""
+    need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
     need(getattr(task.model, "arrival_tick", 1) == 1, "arrival took no tick, as in version 1.0.0")
+    need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
     robot, middle = task.robot, 2 + len(task.robot.left_links)
@@ -119,26 +131,30 @@ class MoveRow(NamedTuple):
     waypoints: list[Floats]  # of a path
 
 
-def line(q: Floats, target: Floats, model: Any) -> Floats:
-    """The points of a straight movement, in columns."""
+def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
+    """The points of a straight movement, in columns; ``most`` of them and one more."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
-    fractions = np.arange(last + 1) * model.step / (distance or 1.0)
+    fractions = np.arange(min(last, most) + 1) * model.step / (distance or 1.0)
     points: Floats = q[:, None] + fractions * difference[:, None]
-    if last == 0 or not model.whole_last_step:  # another reading has the last step pass q^t
+    # Another reading has the last step pass q^t.
+    if last <= most and (last == 0 or not model.whole_last_step):
         points[:, -1] = target
     return points
 
 
-def path(q: Floats, waypoints: list[Floats], model: Any) -> Floats:
-    """The points of a path, in columns. Point k lies k steps along it, the last at its end."""
+def path(q: Floats, waypoints: list[Floats], model: Any, most: int = MOST_TICKS) -> Floats:
+    """The points of a path, in columns; ``most`` of them and one more. Point k lies k steps along
+    it, the last at its end."""
     corners = np.array([q, *waypoints])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     last = math.ceil(ends[-1] / model.step)
-    along = np.append(np.arange(last) * model.step, ends[-1])
+    along = np.append(np.arange(min(last, most + 1)) * model.step, ends[-1])
     points = np.array([np.interp(along, ends, joint) for joint in corners.T])
+    if last > most:
+        return points[:, :-1]
     points[:, -1] = corners[-1]
     if model.whole_last_step and last:
         final, beyond = np.flatnonzero(lengths)[-1], last * model.step - ends[-1]
@@ -147,10 +163,11 @@ def path(q: Floats, waypoints: list[Floats], model: Any) -> Floats:
 
 
 def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
-    """Make a movement from q: where it stops, after how many ticks, and whether that is a hit."""
-    _, goal, hand, kind, _, target, waypoints = movement
+    """Make a movement from q: where it stops, after how many ticks, and whether that is a hit.
+    One of more ticks than are stored ends a tick after these."""
+    _, goal, hand, kind, most, target, waypoints = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
-    points = path(q, waypoints, model) if on_path else line(q, target, model)
+    points = path(q, waypoints, model, most) if on_path else line(q, target, model, most)
     x, y = hand_at(points, arm, on_path)
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
@@ -181,7 +198,10 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
                 need(is_none, f"{which} is made after goal {goal} is hit")
                 continue
             q, ticks, hit = make(task, q, movement)
-            need(ticks == movement.ticks, f"{which} takes {ticks} ticks, not {movement.ticks}")
+            more = "at least " * (ticks > movement.ticks)
+            need(
+                ticks == movement.ticks, f"{which} takes {more}{ticks} ticks, not {movement.ticks}"
+            )
             reward, corrections = reward - ticks, corrections + is_corrective
         need(hit, f"goal {goal} is not hit")
         hands += to_goal[0].hand[0].upper()
@@ -219,12 +239,11 @@ def check_rules(task: Any, movements: list[MoveRow]) -> None:
     hands = sorted({(movement.goal, movement.hand) for movement in movements})
     need(goals == sorted(goals), f"its goals are out of order: {goals}")
     need([goal for goal, _ in hands] == [*range(1, len(task.goals) + 1)], "a goal has not one hand")
-    for place, (order, _, hand, kind, ticks, target, waypoints) in enumerate(movements):
+    for place, (order, _, hand, kind, _, target, waypoints) in enumerate(movements):
         which, corners = f"movement {order}", np.array([*waypoints, target])
         need(order == place, f"movement {place} is missing")
         need(hand in task.hands, f"{which} uses the {hand} hand, which the task does not have")
         need(kind in ("learned", "planned", "corrective", "path"), f"{which} is of no known kind")
-        need(type(ticks) is int and ticks >= 0, f"{which} takes {ticks} ticks, which is no count")
         need(bool(waypoints) == (kind == "path"), f"{which}: a path, and no other, has waypoints")
         need((np.abs(corners) <= 1e5).all(), f"{which} has an entry that is no number up to 1e5")
         need((corners[-2:] == target).all(), f"{which} does not end at its last waypoint")
@@ -249,8 +268,13 @@ def check_runs(folder: Path) -> Report:
 
 def check_all(db: sqlite3.Connection) -> Report:
     """Check the runs one by one, and that none is better than another proves possible."""
+    db.execute("PRAGMA trusted_schema = OFF")
+    if hash_of(schema(db)) != SCHEMA:
+        foreign = "Tables or views are not as coartic makes them, so that they may say anything."
+        return Report(0, 0, [foreign], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
-    runs = movements = unsolved = 0
+    wrong += [*check_cells(db)]
+    runs = movements = unsolved = spent = 0
     rewards, bounds = defaultdict[Any, Any](list), defaultdict[Any, Any](list)  # by task
     query = """SELECT results.id AS number, * FROM results
         LEFT JOIN settings ON settings.id = setting LEFT JOIN learning ON result_id = results.id"""
@@ -259,8 +283,11 @@ def check_all(db: sqlite3.Connection) -> Report:
         where, runs, unsolved = f"Run {run}", runs + 1, unsolved + (row["status"] != "ok")
         try:
             task, chosen = stored_task(*same), json.loads(row["parameters"])
+            check_identity(row)
             parts = read_parts(db, row["number"], task.columns)
             need(bool(parts["solution"]) == (row["status"] == "ok"), f"status is {row['status']}")
+            spent += sum(move.ticks for moves in parts.values() for move in moves)
+            need(spent <= TICKS_IN_ALL, "it and those before take too many ticks to check")
             for part, moves in parts.items():
                 where, movements = f"Run {run}, {part}", movements + len(moves)
                 outcome = recompute(task, moves) if moves else (None, None, None, None)
@@ -281,9 +308,71 @@ def check_all(db: sqlite3.Connection) -> Report:
     return Report(runs, movements, wrong, [*UNCHECKED, f"Runs without a solution: {unsolved}."])
 
 
+def schema(db: sqlite3.Connection) -> list[list[str]]:
+    """What the file says of its tables, views, indexes and triggers, without columns of joints."""
+    rows = db.execute("SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name")
+    joint = re.compile(r", (base_[xy]|(left|right)_[0-9]+) REAL")
+    of = {"movements": joint, "waypoints": joint}
+    return [
+        [kind, name, table, " ".join(re.sub(of.get(table, "$^"), "", sql or "").split())]
+        for kind, name, table, sql in rows
+    ]
+
+
+def check_identity(row: Any) -> None:
+    """Raises ValueError where a run is not that of its setting: its id is a hash of task, method,
+    parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
+    task, model = json.loads(row["definition"]), json.loads(row["model"])
+    asked = {
+        "task": task,
+        "method": row["method"],
+        "parameters": json.loads(row["parameters"]),
+        "model": {**model, "arrival_tick": 1},  # version 1.0.0 had it, and ids are as they were
+        "trial_budget": row["trial_budget"],
+    }
+    need(row["asked"] == hash_of(asked), "its task, method, parameters or model were changed")
+    need(row["task"] == task["name"], f"its task is not {row['task']}")
+    suite_seed, run = row["suite_seed"], row["run"]
+    digits = hashlib.sha256(f"{row['asked']} {suite_seed} {run}".encode()).hexdigest()[:16]
+    need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
+    words = np.frombuffer(hashlib.sha256(row["task"].encode()).digest()[:16], "<u4").tolist()
+    (state,) = np.random.SeedSequence(suite_seed, spawn_key=(*words, run)).generate_state(1, "u8")
+    need(row["seed"] == int(state) >> 1, f"its seed is not {row['seed']}")
+
+
+def check_cells(db: sqlite3.Connection) -> Iterator[str]:
+    """What the tables that say which runs are shown, and as what, say otherwise than the runs."""
+    query = """SELECT position, variant, defaults, cells.parameters AS chosen,
+        settings.parameters AS complete, settings.definition AS executed, tasks.definition AS shown,
+        settings.code = methods.code AS same_code FROM cells
+        LEFT JOIN settings ON settings.id = setting LEFT JOIN tasks ON tasks.name = settings.task
+        LEFT JOIN methods ON methods.name = settings.method"""
+    for row in db.execute(query):
+        try:
+            chosen, defaults = json.loads(row["chosen"]), json.loads(row["defaults"])
+            variant = [
+                f"{k}={v}" for k, v in chosen.items() if k not in defaults or v != defaults[k]
+            ]
+            need(row["variant"] == ", ".join(variant), f"its parameters are not {row['variant']}")
+            need(chosen.items() <= json.loads(row["complete"]).items(), "it has other parameters")
+            need(json.loads(row["shown"]) == json.loads(row["executed"]), "it has another task")
+            need(row["same_code"], "its method has other code")
+        except Exception as problem:
+            yield f"Cell {row['position']}: {problem}."
+
+
+def hash_of(content: Any) -> str:
+    """SHA-256 of plain data."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
     """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
-    rewards = np.frombuffer(zlib.decompressobj().decompress(row["rewards"] or b""), "<i4").tolist()
+    size = 4 * min(row["trials"] or 0, MOST_TRIALS)
+    unpacked = zlib.decompressobj().decompress(row["rewards"] or zlib.compress(b""), size + 1)
+    need(len(unpacked) <= size, f"it has more rewards than {row['trials']} trials")
+    rewards = np.frombuffer(unpacked, "<i4").tolist()
     content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
     for part, moves in parts.items():
         for _, *facts, q, waypoints in moves:
@@ -302,6 +391,8 @@ def read_parts(db: sqlite3.Connection, run: int, columns: str) -> dict[str, list
         waypoints[order].append(np.array(q, dtype=np.float64))
     query = f'SELECT part, "order", goal, hand, kind, ticks, {columns} FROM movements {where}'
     for part, order, goal, hand, kind, ticks, *q in db.execute(query, [run]):
+        count = type(ticks) is int and 0 <= ticks <= MOST_TICKS
+        need(count, f"movement {order} takes {ticks} ticks, which is no count up to {MOST_TICKS}")
         points = waypoints.pop(order, []) if part == "solution" else []
         parts[part].append(MoveRow(order, goal, hand, kind, ticks, np.array(q, float), points))
     need(not waypoints, "it has waypoints of no movement")
@@ -317,7 +408,8 @@ def main() -> int:
         print(f"{folder} cannot be read: {error}.")
         return 2
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
-    print(*report.wrong or ["Nothing differs."], "Not checked:", *report.unchecked, sep="\n")
+    lines = [*(report.wrong or ["Nothing differs."]), "Not checked:", *report.unchecked]
+    print(*("".join(c if c.isprintable() else "?" for c in line) for line in lines), sep="\n")
     return 1 if report.wrong else 0
 
 

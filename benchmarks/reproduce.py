@@ -11,11 +11,11 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import Job
-from coartic.errors import CoarticError
+from coartic.errors import CoarticError, SolutionError
 from coartic.inputs import brief_value
 from coartic.method import Meter
 from coartic.motion.ticks import Trajectory, trajectory
-from coartic.runs.run import PARTS, Run
+from coartic.runs.run import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.text import unknown
 
@@ -46,12 +46,19 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
         return place, store.run(run_id)
 
 
-def trajectory_of(run: Run) -> Trajectory:
-    """The solution of a run tick by tick. Raises CoarticError where it has none."""
+def trajectory_of(folder: Path, run: Run) -> Trajectory:
+    """The solution of a run of a folder tick by tick. Raises CoarticError where it has none, or
+    none that can be shown."""
     if "solution" not in run.scores:
         raise CoarticError(f"run {run.key.id} has no solution to show: {run.status}, {run.reason}")
-    movements = run.scores["solution"].movements
-    return trajectory(run.setting.task, movements, run.setting.model)
+    task, model, movements = run.setting.task, run.setting.model, run.scores["solution"].movements
+    try:
+        (execution,) = execute_all(task, [movements], model)
+        if isinstance(execution, Exception):
+            raise execution
+        return trajectory(task, movements, model)
+    except (SolutionError, ValueError) as error:
+        raise CoarticError(f"{folder}: run {run.key.id} cannot be shown: {error}") from None
 
 
 def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:

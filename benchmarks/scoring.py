@@ -5,28 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.benchmarks.worker import Job, Outcome
-from coartic.errors import SolutionError
-from coartic.model import MotionModel
-from coartic.motion.solution import Execution, Movement, execute_many, other_arm_travel
+from coartic.motion.solution import Execution, other_arm_travel
 from coartic.runs.plan import RunKey
-from coartic.runs.run import Run, Score
-from coartic.tasks.task import Task, hands_of
+from coartic.runs.run import Run, Score, execute_all
+from coartic.tasks.task import hands_of
 from coartic.text import LONGEST_REASON, plain
 
-MOST_MOVEMENTS = 10_000
-"""Movements of one solution."""
-MOST_STEPS = 1_000_000
-"""Movement steps along one solution, its targets visited in order: thousands do."""
 Executions = Mapping[str, Execution | Exception]
 """The executions of a run by part; in place of one, why there is none."""
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     """The runs of a job, also of one that failed. All their parts are executed side by side."""
+    outcomes = [check_rewards(outcome) for outcome in outcomes]
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
     solutions = [outcomes[n].parts[part] for n, part in parts]
     executions = execute_all(job.setting.task, solutions, job.setting.model)
@@ -34,6 +27,14 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     for (n, part), execution in zip(parts, executions, strict=True):
         by_run[n][part] = execution
     return [score_run(job, *each) for each in zip(job.keys, outcomes, by_run, strict=True)]
+
+
+def check_rewards(outcome: Outcome) -> Outcome:
+    """The outcome, or a crash where the method changed the rewards of its trials or their count:
+    no file would be read that holds both."""
+    if len(outcome.rewards) <= (outcome.meter.trials if outcome.meter else 0):
+        return outcome
+    return Outcome("crashed", "it changed the rewards of its trials, or their number")
 
 
 def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run:
@@ -82,33 +83,3 @@ def final_status(outcome: Outcome, parts: Executions) -> tuple[str, str]:
     if outcome.status == "ok" and "solution" not in parts:
         return "solver-failed", "it reported ok, but returned no solution"
     return outcome.status, outcome.reason
-
-
-def execute_all(
-    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
-) -> list[Execution | Exception]:
-    """Execute solutions side by side: the only scores that count.
-
-    In place of an execution, the error of a solution that breaks the task's rules.
-    """
-    errors = [too_long(task, solution, model) for solution in solutions]
-    short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(task, short, model=model))
-    return [next(executions) if error is None else error for error in errors]
-
-
-def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
-    """The error of a solution that would take very long to execute."""
-    if len(solution) > MOST_MOVEMENTS:
-        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
-    corners = [task.q0]
-    for movement in solution:
-        corners += [] if movement.waypoints is None else list(movement.waypoints)
-        corners += [] if movement.target is None else [movement.target]
-    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
-        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
-        if steps > MOST_STEPS:
-            return SolutionError(
-                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
-            )
-    return None

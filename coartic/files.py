@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from coartic.errors import CoarticError
@@ -18,7 +18,9 @@ def write_atomically(path: Path, data: bytes) -> None:
     """Write a file so that it is there whole or not at all. Raises OSError."""
     beside = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
-        beside.write_bytes(data)
+        beside.unlink(missing_ok=True)
+        with beside.open("xb") as file:  # which follows no link
+            file.write(data)
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -45,11 +47,21 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
         write_listing(folder, {*files})
 
 
-def check_folder(folder: Path, names: Iterable[str] = ()) -> None:
+def check_inside(folder: Path, path: Path) -> None:
+    """Raises CoarticError for a path of a folder that is a link or leads out of it by one."""
+    if path.is_symlink() or not Path(os.path.realpath(path)).is_relative_to(
+        os.path.realpath(folder)
+    ):
+        raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
+
+
+def check_folder(folder: Path, names: Collection[str] = ()) -> None:
     """Raises CoarticError where :func:`publish` would; for those who work long before."""
     if os.path.lexists(folder) and not folder.is_dir():
         raise CoarticError(f"cannot write {folder}: what is there is no folder")
     ours = listed_files(folder)
+    for name in sorted({*ours, *names}):
+        check_inside(folder, folder / name)
     in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
     if in_the_way:
         shown = ", ".join(map(plain, in_the_way[:3]))
@@ -94,8 +106,11 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 def listed_files(folder: Path) -> set[str]:
     """What an earlier call wrote; names that lead elsewhere are none of it."""
+    path = folder / LISTING
+    if path.is_symlink() or not path.is_file():
+        return set()
     try:
-        names = (folder / LISTING).read_text(encoding="utf-8").splitlines()
+        names = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
         return set()
     return {name for name in names if name and not Path(name).is_absolute() and ".." not in name}

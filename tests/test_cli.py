@@ -1,5 +1,6 @@
 """The command line as a user meets it."""
 
+import os
 import sqlite3
 import subprocess
 import sys
@@ -200,3 +201,21 @@ def test_a_mistake_gets_a_sentence(coartic, arguments, words, tmp_path, monkeypa
     assert words in out + error
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("settings", [b"text.usetex: True", b"\xff"])
+def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path, settings):
+    """They may name programs, and the folder may be a stranger's."""
+    (tmp_path / "matplotlibrc").write_bytes(settings)
+    code = """if True:
+        from coartic.cli import main
+        try:
+            main()
+        except SystemExit:
+            import matplotlib
+            print(matplotlib.rcParams["text.usetex"])"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, "--version"], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "False"

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -38,6 +39,22 @@ def lever(folder):
 
     dy = across(np.array([1.0, 6.5]), np.zeros(2))
     return float(dy), sum(across.stats.cache_hits.values())
+
+
+def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
+    code = """if True:
+        import coartic.motion
+        from numba.core import config
+        config.reload_config()
+        print(config.CACHE_DIR, config.DISABLE_JIT)"""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": "/ours"}
+    command = [sys.executable, "-W", "error", "-c", code]
+    for text in ("cache_dir: kept\ndisable_jit: 1\n", ": {{{ \0"):
+        (tmp_path / ".numba_config.yaml").write_text(text, encoding="utf-8")
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.split() == ["/ours", "0"]
 
 
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):

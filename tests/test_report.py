@@ -4,17 +4,18 @@ import html.parser
 import random
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import numbers, render
-from coartic.analysis.report.build import SECTIONS, report_files
+from coartic.analysis.report.build import SECTIONS, inert, report_files, write_report
 from coartic.analysis.report.contents import FIGURES, TABLES
 from coartic.analysis.report.text import answers
 from coartic.analysis.report.trace import row_and_runs, tables_of
@@ -123,6 +124,23 @@ def test_text_from_files_is_escaped():
     assert "\\input{x}" not in latex
     assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in latex
     assert r"\textbackslash{}input\{x\}" in latex
+
+
+def test_names_make_no_tags_and_pictures_in_markdown():
+    hostile = "<script>x</script> ![y](https://z/z.png) p < 0.001, [−3, 4] (ticks)"
+    assert inert(hostile) == (
+        "&lt;script>x&lt;/script> ![y]\\(https://z/z.png) p < 0.001, [−3, 4] (ticks)"
+    )
+
+
+def test_a_report_is_not_written_through_a_link(traced, tmp_path):
+    study = replace(traced, folder=tmp_path / "results")
+    study.folder.mkdir()
+    (tmp_path / "mine").mkdir()
+    (study.folder / "report").symlink_to(tmp_path / "mine")
+    with pytest.raises(CoarticError, match="by a link"):
+        write_report(study, study.folder / "report")
+    assert not list((tmp_path / "mine").iterdir())
 
 
 def test_columns_with_one_header_keep_their_values():

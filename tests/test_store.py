@@ -6,6 +6,7 @@ import sqlite3
 import sys
 import time
 import warnings
+import zlib
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -249,6 +250,26 @@ def foreign(path):
     sql("CREATE TABLE notes (text)")(path)
 
 
+def other_reward(path):
+    with closing(sqlite3.connect(path, isolation_level=None)) as db:
+        (text,) = db.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
+        db.execute("DROP VIEW runs")
+        db.execute(text.replace("results.reward", "results.reward + 100 AS reward", 1))
+
+
+def behind_a_link(path):
+    path.symlink_to(path.rename(path.with_name("elsewhere.sqlite")))
+
+
+def journal_of_several(path):
+    """SQLite would delete the file that it names."""
+    thesis = path.with_name("thesis.tex")
+    thesis.write_text("mine")
+    name = str(thesis).encode()
+    end = [len(name).to_bytes(4), sum(name).to_bytes(4), bytes.fromhex("d9d505f920a163d7")]
+    path.with_name(f"{RUNS_FILE}-journal").write_bytes(b"".join([bytes(512), name, *end]))
+
+
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
@@ -264,6 +285,21 @@ def foreign(path):
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
         (lambda path: path.rename(path.with_name("notes.txt")), "(not|no) .*results"),
+        (sql("CREATE VIEW mine AS SELECT 1"), "view mine is missing or is not ours"),
+        (sql("DROP VIEW paths"), "view paths"),
+        (sql("DROP TABLE learning"), "table learning"),
+        (sql("CREATE INDEX i ON results (reward)"), "index i "),
+        (sql("ALTER TABLE movements ADD COLUMN left_x"), "table movements"),
+        (
+            sql(
+                "CREATE TRIGGER t AFTER INSERT ON results BEGIN UPDATE results SET reward = -1; END"
+            ),
+            "trigger t ",
+        ),
+        (other_reward, "view runs is missing or is not ours"),
+        (behind_a_link, "is no file of its own"),
+        (lambda path: path.with_name(f"{RUNS_FILE}-wal").mkdir(), "-wal is no file of its own"),
+        (journal_of_several, "-journal was not written by coartic"),
     ],
 )
 def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, words):
@@ -279,3 +315,75 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
         assert str(tmp_path) in str(caught.value)
         assert len(str(caught.value).splitlines()) == 1
         assert content() == before
+
+
+def read_all(folder):
+    study = load(folder)
+    for cell in study.cells:
+        study.trajectories(*cell)
+    return list(study.rewards())
+
+
+def bomb(count):
+    return f"x'{zlib.compress(bytes(4 * count)).hex()}'"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "results SET reward = 'abc'",
+        "results SET reward = -291.5",
+        "results SET reward = 1",
+        "results SET reward = NULL",
+        "results SET hands = 'RX'",
+        "results SET status = 'great'",
+        "results SET trials = -1",
+        "results SET wall_s = 'x'",
+        "results SET wall_s = 9e999",
+        "results SET warm = 2",
+        "results SET run_id = randomblob(9), seed = 'x'",
+        "tasks SET definition = '{'",
+        "tasks SET definition = '{}'",
+        "tasks SET definition = json_set(definition, '$.radius', 0.2)",
+        "methods SET told = 'x'",
+        "methods SET told = '[1]'",
+        "methods SET title = NULL",
+        "methods SET name = 'other'",
+        "environments SET content = 'x'",
+        "environments SET content = '{}'",
+        "environments SET content = json_set(content, '$.packages', 1)",
+        "suite SET command = NULL",
+        "suite SET date = NULL",
+        "suite SET seed = 'x'",
+        "suite SET readings = '[]]'",
+        "suite SET readings = '[\"whole-last-step=yes\"]'",
+        "cells SET runs = -1",
+        "cells SET parameters = '[]'",
+        "settings SET model = '{}'",
+        "movements SET left_1 = 'x'",
+        "movements SET left_1 = 9e999",
+        "movements SET left_1 = left_1 + 0.1",
+        "movements SET goal = 7",
+        "movements SET ticks = 1e300",
+        "movements SET ticks = ticks + 1",
+        "movements SET hand = 'both'",
+        "movements SET kind = 'path'",
+        "learning SET rewards = 'x'",
+        f"learning SET rewards = {bomb(21)}",
+        f"learning SET rewards = {bomb(30_000_000)}",
+    ],
+)
+def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
+    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
+    sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
+    with pytest.raises(CoarticError) as caught:
+        read_all(tmp_path)
+    assert str(tmp_path) in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_run_of_absurd_constants_is_refused(undisturbed, tmp_path):
+    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
+    sql("UPDATE settings SET model = json_set(model, '$.step', 1e-6)")(tmp_path / RUNS_FILE)
+    with pytest.raises(CoarticError, match="no reading"), open_store(tmp_path) as store:
+        store.run(undisturbed.runs.run_id[0])

@@ -23,7 +23,7 @@ from coartic.motion.movement import follow
 from coartic.motion.solution import other_arm_travel
 from coartic.robot import HANDS
 from coartic.runs.card import MethodCard
-from coartic.runs.plan import Cell, Plan, RunKey
+from coartic.runs.plan import Cell, Plan
 from coartic.runs.run import PARTS, Run, Score
 from coartic.runs.store import RUNS_FILE, writing
 from coartic.tasks.task import hands_of
@@ -53,7 +53,7 @@ def run_of(setting, number, parts, **more):
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
         more |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
     scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
-    key = RunKey(f"{task.name}-{number}", 0, number, 0)
+    key = setting.key(0, number)
     return Run(key, setting, **{"status": "ok"} | more, reason="", environment={}, date="",
                scores=scores)  # fmt: skip
 
@@ -142,14 +142,71 @@ EDITS = {  # what is said: of which run, and what was edited
     "a path, and no other": (3, 'DELETE FROM waypoints WHERE "order" = 1'),
     "of no movement": (3, 'UPDATE waypoints SET "order" = 9 WHERE "order" = 1'),
     "better than bound": result(4, "proven_bound = -999"),
+    "model were changed": (3, "UPDATE settings SET method = 'other' WHERE task = 'ascending'"),
+    "its task is not": (3, "UPDATE settings SET task = 'descending' WHERE task = 'ascending'"),
+    "that its id says": result(6, "run = 60"),
+    "its seed is not": result(2, "seed = seed + 1"),
+    "at least 2 ticks, not 1": movement(2, "ticks = 1"),
+    "no count up to": movement(2, "ticks = 1000000000"),
+    "more rewards than": (
+        0,
+        """INSERT INTO learning SELECT id, x'789c63606060000000040001' FROM results
+        WHERE run = 0""",
+    ),
+    "the task is too long": (
+        2,
+        """UPDATE settings SET definition = json_set(definition,
+        '$.title', hex(zeroblob(60000))) WHERE task = 'tiny'""",
+    ),
 }
 
 
 @pytest.mark.parametrize("words", EDITS)
 def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
+    with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
+        (run_id,) = db.execute("SELECT run_id FROM results WHERE run = ?", [run]).fetchone()
     wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
-    assert any(f"-{run}" in sentence and words in sentence for sentence in wrong), wrong
+    assert any(run_id in sentence and words in sentence for sentence in wrong), wrong
+
+
+@pytest.mark.parametrize(
+    ("words", "statement"),
+    [
+        ("Cell 1: it has another task", "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'"),
+        ("Cell 4: its parameters are not", "UPDATE cells SET variant = '' WHERE position = 4"),
+        (
+            "Cell 5: it has other param",
+            "UPDATE cells SET setting = 4 WHERE setting = 6",
+        ),
+        ("Cell 0: its method has other code", "UPDATE methods SET code = 'newer'"),
+        ("Tables or views are not", "CREATE VIEW mine AS SELECT 1"),
+        (
+            "Tables or views are not",
+            "CREATE TRIGGER more AFTER UPDATE ON suite BEGIN SELECT 1; END",
+        ),
+        ("Tables or views are not", "ALTER TABLE learning ADD COLUMN base_x REAL"),
+        ("Tables or views are not", "DROP VIEW paths"),
+    ],
+)
+def test_what_is_shown_is_what_was_run(true_folder, tmp_path, words, statement):
+    """The tables and views through which others read the runs are checked as well."""
+    folder = shutil.copytree(true_folder, tmp_path / "edited")
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
+        db.execute(statement)
+        db.commit()
+    assert any(words in sentence for sentence in checker.check_runs(folder).wrong)
+
+
+def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():
+    task = checker.stored_task(tiny_task().model_dump_json(), json.dumps(PAPER._asdict()))
+    task.model.step = 1e-12
+    far = np.full(10, 1e4)
+    for kind, waypoints in (("learned", []), ("path", [far])):
+        _, ticks, hit = checker.make(
+            task, task.q0, checker.MoveRow(0, 1, "right", kind, 7, far, waypoints)
+        )
+        assert (ticks, hit) == (8, False)
 
 
 def test_the_command_says_what_it_found(true_folder, tmp_path, capsys, monkeypatch):
@@ -166,9 +223,9 @@ def test_the_command_says_what_it_found(true_folder, tmp_path, capsys, monkeypat
 
 
 def test_it_stands_on_its_own():
-    """Ten minutes' reading, and nothing of the project that it judges."""
+    """A quarter of an hour's reading, and nothing of the project that it judges."""
     text = Path(checker.__file__).read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 325
+    assert len(text.splitlines()) <= 420
     roots = set(re.findall(r"^ *(?:import|from) (\w+)", text, re.MULTILINE))
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
@@ -203,7 +260,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     else:
         stops = {"stop_on_arrival": kind == "learned" or model.corrective_arrival}
         due = move(robot, q, target, hand, goal, judge.radius, model=model, **stops)
-    movement = checker.MoveRow(0, 1, hand, kind, 0, target, [middle, target])
+    movement = checker.MoveRow(0, 1, hand, kind, 10**6, target, [middle, target])
     stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 

@@ -8,6 +8,7 @@ headline numbers as macros.
 from __future__ import annotations
 
 import os
+import re
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
@@ -28,7 +29,7 @@ from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
 from coartic.analysis.words import NONE, number
-from coartic.files import check_folder, publish
+from coartic.files import check_folder, check_inside, publish
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 SEARCHED = 12
@@ -77,6 +78,8 @@ def write_report(
             f"{folder} holds the results themselves, or lies above them. Give the report a folder "
             "of its own."
         )
+    if study.folder.absolute() in folder.absolute().parents:
+        check_inside(study.folder, folder)
     check_folder(folder, ["report.html"])
     files = report_files(study, for_paper=for_paper)
     publish(folder, files)
@@ -175,13 +178,20 @@ def page(study: Study) -> str:
 
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
-    template = environment(escape=False).get_template("summary.md.jinja")
+    texts = environment(escape=False)
+    texts.filters["inert"] = inert
+    template = texts.get_template("summary.md.jinja")
     return template.render(
         title=title(study),
         answers=answers(study),
         provenance=about.provenance(study),
         figures=[name for name in ("postures", "ranking", "price") if name in plots(study)],
     )
+
+
+def inert(text: str) -> str:
+    """Text for Markdown in which names from elsewhere make no tags, links and pictures."""
+    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", text).replace("](", "]\\(")
 
 
 def title(study: Study) -> str:

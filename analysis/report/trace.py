@@ -8,7 +8,7 @@ import pandas as pd
 
 from coartic import CoarticError
 from coartic.analysis.methods import name_of
-from coartic.text import did_you_mean
+from coartic.text import did_you_mean, plain
 
 
 def tables_of(folder: Path) -> dict[str, Path]:
@@ -16,13 +16,16 @@ def tables_of(folder: Path) -> dict[str, Path]:
 
     Raises CoarticError where there is none, or more than one.
     """
-    reports = sorted({path.parent for path in folder.glob("**/tables/*.csv")})
+    here = folder.resolve()
+    files = [path for path in folder.glob("**/tables/*.csv") if path.is_file()]
+    files = [path for path in files if path.resolve().is_relative_to(here)]  # and no link elsewhere
+    reports = sorted({path.parent for path in files})
     if not reports:
         raise CoarticError(f"there is no report in {folder}. `coartic report FOLDER` writes one.")
     if len(reports) > 1:
         shown = ", ".join(str(path.parent) for path in reports[:4])
         raise CoarticError(f"there are several reports in {folder}: name one with --in ({shown}).")
-    return {path.stem: path for path in sorted(reports[0].glob("*.csv"))}
+    return {path.stem: path for path in sorted(files) if path.parent == reports[0]}
 
 
 def row_and_runs(table: Path, row: str | None) -> tuple[list[str], list[str]]:
@@ -30,7 +33,12 @@ def row_and_runs(table: Path, row: str | None) -> tuple[list[str], list[str]]:
 
     Raises CoarticError for a row that the table does not have.
     """
-    frame = pd.read_csv(table, dtype=str, index_col="row", keep_default_na=False)
+    try:
+        frame = pd.read_csv(table, dtype=str, index_col="row", keep_default_na=False)
+        if "run_ids" not in frame or not frame.index.is_unique:
+            raise ValueError("its rows do not name runs")
+    except ValueError as error:
+        raise CoarticError(f"{table} is no table of a report: {plain(str(error))}") from None
     if row is None:
         return list(frame.index), []
     named = {name_of(name): name for name in frame.index}

@@ -6,6 +6,7 @@ it is called, so that help and completion are there at once.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import io
 import os
@@ -61,6 +62,9 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
+    if os.path.lexists("matplotlibrc"):  # its settings name programs to run: it may be a stranger's
+        with contextlib.chdir(os.path.dirname(__file__)):
+            import matplotlib  # noqa: F401
     try:
         app(prog_name="coartic")
     except CoarticError as error:

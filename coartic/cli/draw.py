@@ -75,8 +75,8 @@ def animate(
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []
     for name in (run_id,) if other is None else (run_id, other):
-        _, run = find_run(name, folder)
-        movement, number = trajectory_of(run), run.key.number
+        place, run = find_run(name, folder)
+        movement, number = trajectory_of(place, run), run.key.number
         title = f"{movement.task.label}: {name_of(run.setting.method)}, run {number}"
         panels.append((title, movement))
     if initial:

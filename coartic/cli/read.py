@@ -82,7 +82,7 @@ def trace(
     say_pairs(pairs)
     say(
         f"{counted(len(runs), 'run')}:",
-        *(f"coartic reproduce {run} --in {results}{file}" for run in runs),
+        *(f"coartic reproduce {quote(run)} --in {results}{file}" for run in runs),
     )
 
 

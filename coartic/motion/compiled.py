@@ -55,8 +55,9 @@ def source_fingerprint() -> str:
 
 def cache_folder() -> Path | None:
     """A writable folder for compiled code, or None where there is none."""
-    roots = [Path(numba.config.CACHE_DIR) / "coartic"] if numba.config.CACHE_DIR else []
-    roots.append(PACKAGE / "__pycache__")
+    roots = [PACKAGE / "__pycache__"]
+    if Path(numba.config.CACHE_DIR).is_absolute():  # or it would change with where one stands
+        roots.insert(0, Path(numba.config.CACHE_DIR) / "coartic")
     given = os.environ.get("XDG_CACHE_HOME", "")
     if Path(given).is_absolute():
         roots.append(Path(given) / "coartic")

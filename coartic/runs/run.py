@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from coartic.errors import SolutionError
 from coartic.learner.kernel import TENTHS
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
-from coartic.motion.solution import Movement
+from coartic.model import MotionModel
+from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.task import Task
 
@@ -26,7 +28,7 @@ RESULTS = {
     "suite_seed": "INTEGER NOT NULL",
     "run": "INTEGER NOT NULL",  # number of the run, from 0
     "seed": "INTEGER NOT NULL",
-    "status": "TEXT NOT NULL",  # ok, infeasible, solver-failed, timeout, crashed
+    "status": "TEXT NOT NULL",  # one of STATUSES
     "reason": "TEXT NOT NULL",  # empty where status is ok
     "hands": "TEXT",  # of the solution, such as LRLR
     "reward": "INTEGER",  # of the solution, executed and scored by the harness
@@ -56,6 +58,12 @@ RESULTS = {
     "result": "TEXT NOT NULL",  # hash of status, solutions, rewards of all trials, bound
 }
 """Columns of table ``results`` beside its ``id``."""
+STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
+"""What came of a run."""
+MOST_MOVEMENTS = 10_000
+"""Movements of one solution."""
+MOST_STEPS = 1_000_000
+"""Movement steps along one solution, its targets visited in order: thousands do."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """How columns of each part begin."""
 PARTS = tuple(PREFIXES)
@@ -93,7 +101,7 @@ class Run:
     key: RunKey
     setting: Setting
     status: str
-    """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
+    """One of :data:`STATUSES`."""
     reason: str
     """Why it is not ok; empty where it is."""
     environment: dict[str, Any]
@@ -251,3 +259,33 @@ def movements_from(
             waypoints = path[joints].to_numpy(dtype=np.float64)
         movements.append(Movement(int(goal), hand, kind, target, int(ticks), waypoints))
     return tuple(movements)
+
+
+def execute_all(
+    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
+) -> list[Execution | Exception]:
+    """Execute solutions side by side: the only scores that count.
+
+    In place of an execution, the error of a solution that breaks the task's rules.
+    """
+    errors = [too_long(task, solution, model) for solution in solutions]
+    short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
+    executions = iter(execute_many(task, short, model=model))
+    return [next(executions) if error is None else error for error in errors]
+
+
+def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+    """The error of a solution that would take very long to execute."""
+    if len(solution) > MOST_MOVEMENTS:
+        return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
+    corners = [task.q0]
+    for movement in solution:
+        corners += [] if movement.waypoints is None else list(movement.waypoints)
+        corners += [] if movement.target is None else [movement.target]
+    if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
+        if steps > MOST_STEPS:
+            return SolutionError(
+                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+            )
+    return None

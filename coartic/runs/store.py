@@ -10,31 +10,36 @@ whatever interrupts it, a batch is there whole or not at all.
 from __future__ import annotations
 
 import json
+import os
+import re
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 
 from coartic.errors import CoarticError
-from coartic.model import stored_model
+from coartic.inputs import MOST_RUNS, MOST_TRIALS, problems_inline
+from coartic.model import PAPER, check_model, stored_model
 from coartic.robot import Array
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan, Setting, hash_of
-from coartic.runs.run import PARTS, RESULTS, Run, movements_from
+from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import parse_task
+from coartic.text import one_line, plain
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
 FORMAT = 1
-"""Raised when a table changes its meaning."""
+"""Raised when a table changes its meaning, or a table or a view its text."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
@@ -50,6 +55,9 @@ _DTYPES: dict[str, Any] = {
     "warm": "boolean",
 }
 """How columns of views are read: with types that have room for what is missing."""
+_JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
+_OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
+_REWARDS = ("reward", "replay_reward", "initial_reward", "proven_bound")  # minus a count
 _OWN = [name for name in RESULTS if name not in ("setting", "suite_seed", "environment", "details")]
 _SCHEMA = f"""
 CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
@@ -98,6 +106,61 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     ORDER BY cells.position, results.run, "order", waypoint;
 """
 
+
+class _Stored(BaseModel):
+    """What is read of a row. The file may be from somebody else, or damaged."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+
+class _Method(_Stored):
+    name: str
+    title: str
+    citation: str
+    told: Json[tuple[str, ...]]
+    secondary: Json[tuple[str, ...]]
+    stochastic: bool
+    defaults: Json[dict[str, Any]]
+    origin: str
+    code: str
+
+
+class _Suite(_Stored):
+    name: str
+    seed: int
+    runs: int
+    trials: int
+    readings: Json[tuple[str, ...]]
+    time_limit_s: float | None
+    trial_budget: int | None
+    command: Json[list[str]]
+    date: str
+
+
+class _Cell(_Stored):
+    task: str
+    method: str
+    parameters: Json[dict[str, Any]]
+    complete: Json[dict[str, Any]]
+    runs: int = Field(ge=0, le=MOST_RUNS)
+
+
+class _Commit(_Stored):
+    id: str
+    dirty: bool
+
+
+class _Environment(_Stored):
+    coartic: str
+    model_code: str
+    commit: _Commit | None
+    python: str
+    packages: dict[str, str]
+    platform: str
+    processor: str
+    cores: int
+
+
 _SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
 _METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
@@ -107,16 +170,17 @@ _WAYPOINT = ("result_id", "order", "waypoint")
 class Store:
     """The runs of one results folder. Made by :func:`open_store` and :func:`writing`."""
 
-    def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
+    def __init__(self, folder: Path, connection: sqlite3.Connection, *, reads: bool) -> None:
         self.folder = folder
         self._db = connection
+        self._reads = reads
 
     def __enter__(self) -> Store:
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._db.close()
-        if isinstance(error, sqlite3.DatabaseError | zlib.error):
+        if isinstance(error, Exception if self._reads else sqlite3.DatabaseError):
             with explain_errors(self.folder):
                 raise error
 
@@ -157,50 +221,51 @@ class Store:
             for name, definition in definitions.items():
                 self._insert("tasks", {"name": name, "definition": definition})
             robots = [task.robot for task in plan.tasks.values()]
-            self._add_joints(dict.fromkeys(name for robot in robots for name in robot.joint_names))
+            add_joints(self._db, (name for robot in robots for name in robot.joint_names))
 
     def plan(self) -> Plan:
         """What was asked for last. Raises CoarticError where nothing was yet."""
         row = self._one("SELECT * FROM suite")
         if row is None:
             raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
+        suite = _Suite.model_validate(dict(row))
         methods = {}
         for method in self._db.execute("SELECT * FROM methods"):
-            parts = {name: json.loads(method[name]) for name in ("told", "secondary", "defaults")}
-            methods[method["name"]] = MethodCard(
-                **dict(method) | parts
-                | {"told": tuple(parts["told"]), "secondary": tuple(parts["secondary"])}
-                | {"stochastic": bool(method["stochastic"])}
-            )  # fmt: skip
+            card = MethodCard(**_Method.model_validate(dict(method)).model_dump())
+            methods[card.name] = card
         tasks = {
-            name: parse_task(json.loads(definition), str(self.folder))
+            name: parse_task(json.loads(definition), str(self.folder / RUNS_FILE))
             for name, definition in self._db.execute("SELECT name, definition FROM tasks")
         }
-        cells = self._db.execute(
-            "SELECT task, method, cells.parameters, settings.parameters AS complete, runs "
-            "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
-        )
-        return Plan(
-            suite=row["name"],
-            **{key: row[key] for key in _SUITE},
-            readings=tuple(json.loads(row["readings"])),
+        rows = self._db.execute(
+            "SELECT task, method, cells.parameters, settings.parameters AS complete, runs, "
+            "setting, definition, model FROM cells JOIN settings ON settings.id = setting "
+            "ORDER BY position"
+        ).fetchall()
+        asked = [_Cell.model_validate(dict(each)) for each in rows]
+        plan = Plan(
+            **{key: getattr(suite, key) for key in (*_SUITE, "readings")},
+            suite=suite.name,
             cells=tuple(
-                Cell(
-                    tasks[cell["task"]],
-                    methods[cell["method"]],
-                    json.loads(cell["parameters"]),
-                    json.loads(cell["complete"]),
-                    cell["runs"],
-                )
-                for cell in cells
+                Cell(tasks[c.task], methods[c.method], c.parameters, c.complete, c.runs)
+                for c in asked
             ),
         )
+        for each, setting in zip(rows, plan.settings, strict=True):
+            if json.loads(each["definition"]) != setting.definition:
+                raise ValueError(f"task {setting.task.name} is not the one of its runs")
+            if stored_model(json.loads(each["model"])) != plan.model:
+                raise ValueError("the readings are not those of the runs")
+        if len({each["setting"] for each in rows}) < len(rows):
+            raise ValueError("two cells have one setting")
+        return plan
 
     def made_with(self) -> dict[str, Any]:
         """With what the suite was run last: versions, platform, commit, command, date."""
         row = self._one(
             "SELECT content, command, date FROM suite JOIN environments ON id = environment"
         )
+        _Environment.model_validate_json(row["content"])
         how = {"command": json.loads(row["command"]), "date": row["date"]}
         return {**json.loads(row["content"]), **how}
 
@@ -252,19 +317,22 @@ class Store:
         row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
         asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
         setting = Setting(
-            task=parse_task(json.loads(asked["definition"]), str(self.folder)),
+            task=parse_task(json.loads(asked["definition"]), str(self.folder / RUNS_FILE)),
             method=asked["method"],
             code=asked["code"],
             told=tuple(filter(None, asked["told"].split(", "))),
             parameters=json.loads(asked["parameters"]),
-            model=stored_model(json.loads(asked["model"])),
+            model=check_model(stored_model(json.loads(asked["model"]))),
             trial_budget=asked["trial_budget"],
         )
+        model = setting.model
+        if (model.step, model.max_iterations) != (PAPER.step, PAPER.max_iterations):
+            raise ValueError("no reading has this length of a step or number of iterations")
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
         paths = self._table("SELECT * FROM waypoints WHERE result_id = ?", row["id"])
-        rewards = [] if blob is None else unpack(blob["rewards"]).tolist()
+        rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
         return Run.from_row(
             row,
             setting,
@@ -286,7 +354,8 @@ class Store:
     def frame(self, view: str) -> pd.DataFrame:
         """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""
         inner = ["result_id", "part"]
-        return self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
+        table = self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
+        return check_runs(table) if view == "runs" else table
 
     def movements(self, part: str) -> pd.DataFrame:
         """Movements of one part (:data:`PARTS`) of each run asked for, as view ``solutions``."""
@@ -299,11 +368,11 @@ class Store:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
         rows = self._db.execute(
-            f"SELECT run_id, rewards {_ASKED_FOR} JOIN learning ON learning.result_id = results.id "
-            "ORDER BY cells.position, results.run"
+            f"SELECT run_id, rewards, trials {_ASKED_FOR} "
+            "JOIN learning ON learning.result_id = results.id ORDER BY cells.position, results.run"
         )
-        for run_id, blob in rows:
-            stored = unpack(blob)
+        for run_id, blob, trials in rows:
+            stored = unpack(blob, trials)
             yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
     # Inside.
@@ -389,16 +458,6 @@ class Store:
         }
         return self._id_of("environments", row, "content")
 
-    def _add_joints(self, names: Iterable[str]) -> None:
-        """Columns for these joints, and the views anew, which show them."""
-        for table in ("movements", "waypoints"):
-            there = {row["name"] for row in self._db.execute(f"PRAGMA table_info({table})")}
-            for name in names:
-                if name not in there:
-                    self._db.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
-        for statement in _VIEWS.split(";\n"):
-            self._db.execute(statement)
-
     def _forget(self, run_id: str) -> None:
         row = self._one("SELECT id FROM results WHERE run_id = ?", run_id)
         if row is not None:
@@ -413,10 +472,12 @@ class Store:
         rows = self._db.execute(query, values)
         names = [column[0] for column in rows.description]
         columns = list(zip(*rows, strict=True)) or [() for _ in names]
-        arrays = {
-            name: pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
-            for name, column in zip(names, columns, strict=True)
-        }
+        arrays = {}
+        for name, column in zip(names, columns, strict=True):
+            try:
+                arrays[name] = pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
+            except (ValueError, TypeError, OverflowError) as error:
+                raise ValueError(f"{name}: {error}") from None
         return pd.DataFrame(arrays)
 
 
@@ -429,13 +490,14 @@ def open_store(folder: Path) -> Store:
     path = folder / RUNS_FILE
     if not folder.exists():
         raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}")
-    with explain_errors(folder), connect(f"{path.resolve().as_uri()}?mode=rw", 2.0) as connection:
+    check_files(folder)
+    with explain_errors(folder), connect(f"{path.absolute().as_uri()}?mode=rw", 2.0) as connection:
         connection.execute("PRAGMA query_only = ON")
         if not has_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
-    return Store(folder, connection)
+    return Store(folder, connection, reads=True)
 
 
 @contextmanager
@@ -450,6 +512,7 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
+    check_files(folder)
     with explain_errors(folder), connect(str(folder / RUNS_FILE), 0.0) as connection:
         has_tables(connection, folder)  # or it is left as it is
         # No write-ahead log: it is unsafe on network disks.
@@ -458,8 +521,8 @@ def writing(folder: Path) -> Iterator[Store]:
         connection.execute("BEGIN EXCLUSIVE")
         connection.execute("COMMIT")
         if not has_tables(connection, folder):
-            connection.executescript(f"BEGIN;{_SCHEMA}COMMIT;")
-    with Store(folder, connection) as store:
+            connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
+    with Store(folder, connection, reads=False) as store:
         yield store
 
 
@@ -483,10 +546,28 @@ def connect(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
     )
     connection.row_factory = sqlite3.Row
     try:
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
         yield connection
     except BaseException:
         connection.close()
         raise
+
+
+def check_files(folder: Path) -> None:
+    """Raises CoarticError where opening the file of a stranger would change another one."""
+    for ending in ("", "-journal", "-wal", "-shm"):
+        path = folder / f"{RUNS_FILE}{ending}"
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise CoarticError(
+                f"{path} is no file of its own, as a link is none: name the folder that holds it"
+            )
+        # After it has rolled back, SQLite deletes the journal of several files that this one names.
+        if ending == "-journal" and path.exists() and path.stat().st_size >= len(_OF_SEVERAL):
+            with path.open("rb") as file:
+                file.seek(-len(_OF_SEVERAL), os.SEEK_END)
+                if file.read() == _OF_SEVERAL:
+                    raise CoarticError(f"{path} was not written by coartic, and names another file")
 
 
 def has_tables(connection: sqlite3.Connection, folder: Path) -> bool:
@@ -504,25 +585,64 @@ def has_tables(connection: sqlite3.Connection, folder: Path) -> bool:
         if tables:
             raise CoarticError(f"{folder / RUNS_FILE} is not a file of coartic; move it away")
         return False
+    with closing(sqlite3.connect(":memory:")) as ours:
+        ours.executescript(f"{_SCHEMA}{_VIEWS}")
+        columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
+        add_joints(ours, filter(_JOINT.fullmatch, columns))
+        changed = sorted(schema(connection).items() ^ schema(ours).items())
+    if changed:
+        (kind, name), _ = changed[0]
+        raise CoarticError(
+            f"{folder / RUNS_FILE} is not as coartic makes it: {kind} {plain(name, 80)} is missing "
+            "or is not ours. Restore a copy, or run the suite again with another --out."
+        )
     return True
+
+
+def schema(connection: sqlite3.Connection) -> dict[tuple[str, str], str]:
+    """The text of each table, view, index and trigger, by kind and name."""
+    rows = connection.execute("SELECT type, name, sql FROM sqlite_master")
+    return {(kind, name): " ".join((sql or "").split()) for kind, name, sql in rows}
+
+
+def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
+    """Columns for these joints, and the views anew, which show them."""
+    names = list(dict.fromkeys(names))
+    for table in ("movements", "waypoints"):
+        there = {column[1] for column in connection.execute(f"PRAGMA table_info({table})")}
+        for name in names:
+            if name not in there:
+                connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
+    for statement in _VIEWS.split(";\n"):
+        connection.execute(statement)
 
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Raises CoarticError for an error of SQLite."""
+    """Raises CoarticError for an error of SQLite, and for content that cannot be read."""
+    path = folder / RUNS_FILE
     try:
         yield
+    except CoarticError as error:
+        said = one_line(str(error))
+        raise CoarticError(said if str(folder) in said else f"{path}: {said}") from None
     except sqlite3.OperationalError as error:
         if "locked" in str(error):
             raise CoarticError(
                 f"another `coartic run` is at work in {folder}; wait for it, or choose another "
                 "folder"
             ) from None
-        raise CoarticError(f"cannot use {folder / RUNS_FILE}: {error}") from None
-    except (sqlite3.DatabaseError, zlib.error) as error:
+        if "readonly" in str(error):
+            raise CoarticError(
+                f"{path} was left in the middle of writing, and cannot be put right, since the "
+                "folder cannot be written. Copy the whole folder, and use the copy."
+            ) from None
+        raise CoarticError(f"cannot use {path}: {error}") from None
+    except Exception as error:
+        wrong = problems_inline(error, []) if isinstance(error, ValidationError) else str(error)
         raise CoarticError(
-            f"{folder / RUNS_FILE} is damaged ({error}). Move it away and repeat the `coartic run` "
-            "command, or restore a copy."
+            f"{path} is damaged ({plain(wrong, 200) or type(error).__name__}). Move it away and "
+            "repeat the `coartic run` command, or restore a copy."
         ) from None
 
 
@@ -531,6 +651,33 @@ def to_json(content: Any, *, sort_keys: bool = False) -> str:
     return json.dumps(content, ensure_ascii=False, sort_keys=sort_keys)
 
 
-def unpack(blob: bytes) -> NDArray[np.int32]:
-    """Rewards of all trials as they are stored: those that failed are :data:`FAILED_TRIAL`."""
-    return np.frombuffer(zlib.decompress(blob), dtype="<i4")
+def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
+    """Rewards of all trials as they are stored: those that failed are :data:`FAILED_TRIAL`.
+
+    Raises ValueError where there are more of them than trials, some of which have none kept.
+    """
+    size = 4 * min(trials or 0, MOST_TRIALS)
+    content = zlib.decompressobj().decompress(blob, size + 1)
+    if len(content) > size:
+        raise ValueError(f"there are more rewards than {trials} trials")
+    return np.frombuffer(content, dtype="<i4")
+
+
+def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
+    """View ``runs``, if all is of the kind that runs have. Raises ValueError where it is not."""
+    solved = runs.status == "ok"
+    rules = {"status": runs.status.isin(STATUSES)}
+    for name in ("reward", "hands"):
+        rules[name] = runs[name].notna() == solved
+    for name in ("hands", "replay_hands", "initial_hands"):
+        rules[f"letters of {name}"] = runs[name].fillna("L").str.fullmatch("[LR]+")
+    for name in [name for name in RESULTS if name in runs]:
+        if "NOT NULL" in RESULTS[name]:
+            rules[f"lack of {name}"] = runs[name].notna()
+        if _DTYPES[name] in ("Int64", "Float64"):
+            size = runs[name].fillna(0) * (-1 if name in _REWARDS else 1)
+            rules[f"size of {name}"] = (size >= 0) & (size < np.inf)
+    for name, holds in rules.items():
+        if not holds.all():
+            raise ValueError(f"run {runs.run_id[~holds].iloc[0]}: {name}")
+    return runs
