@@ -10,7 +10,7 @@ from typing import Any
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, brief_value
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
 from coartic.tasks.readings import condition_under, load_readings, model_under
 from coartic.tasks.task import check_task
@@ -101,6 +101,8 @@ def plan_suite(
     suite's. Raises CoarticError for anything unknown, out of bounds, or that does not go together.
     """
     chosen = Options(**options)
+    if not isinstance(select, Selection):
+        raise CoarticError(f"select is {brief_value(select)}; it must be a Selection")
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
     if cells is None:
