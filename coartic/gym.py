@@ -333,7 +333,7 @@ class TaskEnv(gymnasium.Env):
         if given.shape != centre.shape:
             raise ValueError(f"target has shape {given.shape}; it must be {centre.shape}")
         away = (given - centre)[self.arms.free] / self.arms.scale
-        if (far := np.nanmax(np.abs(away), initial=0.0)) > 1.0:
+        if (far := np.nanmax(np.abs(away), initial=0.0)) > 1.0 + 1e-9:
             raise ValueError(
                 f"the target is outside of the box: it needs a scale of {far * self.arms.scale:.3g}"
             )
