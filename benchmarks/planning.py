@@ -10,7 +10,7 @@ from typing import Any
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, brief_value
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
 from coartic.tasks.readings import condition_under, load_readings, model_under
 from coartic.tasks.task import check_task
@@ -47,7 +47,8 @@ class Options:
 
     def __post_init__(self) -> None:
         for name, (least, most) in LIMITS.items():
-            check_number(name, getattr(self, name), least, most)
+            if getattr(self, name) is not None or name == "seed":  # the suite has none
+                check_number(name, getattr(self, name), least, most)
         check_list("readings", self.readings)
 
 
@@ -81,7 +82,7 @@ def check_number(name: str, number: object, least: float, most: int) -> None:
     not."""
     kind = int if isinstance(least, int) else int | float
     is_number = isinstance(number, kind) and not isinstance(number, bool)
-    if number is not None and not (is_number and least <= number <= most):  # type: ignore[operator]
+    if not (is_number and least <= number <= most):  # type: ignore[operator]
         raise CoarticError(f"{name} is {number!r}; it must be from {least} to {most:_}")
 
 
@@ -101,6 +102,8 @@ def plan_suite(
     suite's. Raises CoarticError for anything unknown, out of bounds, or that does not go together.
     """
     chosen = Options(**options)
+    if not isinstance(select, Selection):
+        raise CoarticError(f"select is {brief_value(select)}; it must be a Selection")
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
     if cells is None:

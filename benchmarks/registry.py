@@ -19,6 +19,7 @@ from types import ModuleType
 
 from coartic.benchmarks.code_identity import code_of
 from coartic.errors import CoarticError
+from coartic.inputs import check_file
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information, Method
 from coartic.runs.card import BUILT_IN, MethodCard, card_of, load_file, methods_in
@@ -107,8 +108,7 @@ def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) ->
 def cards_of_file(path: Path) -> Iterator[MethodCard]:
     """The methods of a file. Raises CoarticError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
-    if not path.is_file():
-        raise CoarticError(f"{shown}: there is no such file")
+    check_file(path)
     try:
         module = load_file(path)
     except (Exception, SystemExit) as error:

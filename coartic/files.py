@@ -98,10 +98,17 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """A folder by its name. Raises CoarticError for an empty one, which is not the current one."""
+    """A folder by its name. Raises CoarticError for an empty one, which is not the current one, and
+    for one that no folder can have."""
     if isinstance(name, str) and not name.strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
-    return Path(name)
+    try:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+            os.lstat(name)  # ValueError: a NUL in the name
+        return Path(name)
+    except (OSError, ValueError, TypeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise CoarticError(f"{what} {plain(repr(name), 80)} cannot be used: {reason}") from None
 
 
 def listed_files(folder: Path) -> set[str]:

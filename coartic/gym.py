@@ -7,17 +7,23 @@ Importing this module registers ``coartic/Ascending-v0``, ``Descending``, ``TwoA
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from coartic.model import PAPER, MotionModel
+from coartic.inputs import WIDTHS, check_limits, real_array
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.robot import LARGEST_FIGURE, Array, Hand
+from coartic.text import unknown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,6 +32,7 @@ if TYPE_CHECKING:
 
     from coartic.tasks.task import Task
 
+MOST_ENVS = 1_000_000
 LETTERS = np.array(["L", "R", ""])  # of hands 0 and 1; -1 is no hand yet
 
 
@@ -60,7 +67,7 @@ class Arms:
     -----
     An action has an entry that chooses the left hand (below 0) or the right one, unless the robot
     has one hand or ``hands`` are given, and an entry for each joint that can move. The box is
-    from -1 to 1; actions beyond it are taken as they are. Where the entries of all joints are NaN,
+    from -1 to 1; the environments clip actions to it. Where the entries of all joints are NaN,
     no movement is made to a target: the corrective process acts alone, and the step takes 0 ticks
     if the hand is inside the goal already. With ``hands``, an arm that hits neither this goal nor
     a later one keeps its posture.
@@ -85,8 +92,10 @@ class Arms:
         from coartic.motion.trials import Trials, hand_codes
         from coartic.tasks.task import as_task, hands_of
 
+        check_limits("num_envs", count, 1, MOST_ENVS)
+        check_limits("scale", scale, *WIDTHS)
         self.task = as_task(task)
-        self.scale, self.model = scale, model
+        self.scale, self.model = scale, check_model(model, radius=self.task.radius)
         goals, dof = len(self.task.goals), self.task.robot.dof
         if isinstance(around, str):
             if {*around} - {"L", "R"} or len(around) != goals:
@@ -94,9 +103,11 @@ class Arms:
                     f"around is {around!r}; it must have L or R for each of {goals} goals"
                 )
             around = corrective_trial(self.task, around, model=model).configurations
-        self.around = None if around is None else np.array(around, dtype=np.float64)
+        self.around = None if around is None else real_array("around", around).copy()
         if self.around is not None and self.around.shape != (goals, dof):
             raise ValueError(f"around has shape {self.around.shape}; it must be ({goals}, {dof})")
+        if self.around is not None and not (np.abs(self.around) <= LARGEST_FIGURE).all():
+            raise ValueError(f"around has figures that are not finite or beyond {LARGEST_FIGURE:g}")
         if observe not in ("learner", "posture"):
             raise ValueError(f"observe is {observe!r}; it is 'learner' or 'posture'")
         self.sees_posture = observe == "posture"
@@ -151,7 +162,7 @@ class Arms:
         from coartic.optimisers import FAILED
 
         rows = np.flatnonzero(which)
-        chosen = np.asarray(actions, dtype=np.float64)
+        chosen = real_array("actions", actions)
         shape = len(which), *self.action_space.shape
         if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
@@ -165,8 +176,7 @@ class Arms:
         no_hand = self.chooses_hands and np.isnan(chosen[:, 0]).any()
         if no_hand or not (np.abs(targets[~without][:, self.free]) <= LARGEST_FIGURE).all():
             raise ValueError(
-                "an action is not finite, or far beyond the box; NaN is for all joints, not for "
-                "some, and not for the hand"
+                "an action is not finite; NaN is for all joints, not for some, and not for the hand"
             )
         targets = np.where(self.moves[goal], targets, self.q[rows])
         targets[without] = np.nan
@@ -219,11 +229,59 @@ class Arms:
         }
 
 
+OPTIONS = tuple(inspect.signature(Arms).parameters)[2:]
+
+
+def make_arms(count: int, task: Task | str | Path, options: dict[str, Any]) -> Arms:
+    """Robots with the options of an environment. Raises TypeError for one that there is not."""
+    for name in options.keys() - OPTIONS:
+        raise TypeError(unknown("option", name, [*OPTIONS, "render_mode"]))
+    return Arms(count, task, **options)
+
+
+def clip(actions: Any) -> Array:
+    """Actions within the box; NaN, which is no target, stays."""
+    return np.clip(real_array("actions", actions), -1.0, 1.0)
+
+
+def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
+    """The mode itself. Raises ValueError for one that there is not."""
+    if mode is not None and mode not in metadata["render_modes"]:
+        raise ValueError(f"render_mode is {mode!r}; it must be one of {metadata['render_modes']}")
+    return mode
+
+
+def picture(arms: Arms, row: int) -> NDArray[np.uint8]:
+    """A robot and its goals, ``(height, width, 3)``."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 4))
+    canvas: Any = FigureCanvasAgg(figure)
+    draw_arms(figure, arms, row)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def draw_arms(figure: Figure, arms: Arms, row: int) -> None:
+    """Draw a robot and its goals; those that it has hit are filled."""
+    from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
+
+    task = arms.task
+    (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+    figure.clear()
+    axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+    draw_robot(axes, task, arms.q[row], weight=1.5)
+    number_goals(axes, task, weight=1.5)
+    fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[row])
+
+
 class TaskEnv(gymnasium.Env):
     """One robot and one task; the options are those of :class:`Arms`.
 
     An episode is a trial, of as many steps as there are goals; it ends earlier where the
     corrective process fails, which costs ``coartic.optimisers.FAILED``. Nothing is random.
+    Actions are clipped to the box.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}
@@ -231,11 +289,12 @@ class TaskEnv(gymnasium.Env):
     def __init__(
         self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
     ) -> None:
-        self.arms = Arms(1, task, **options)
+        self.arms = make_arms(1, task, options)
         self.action_space = self.arms.action_space
         self.observation_space = self.arms.observation_space
-        self.render_mode = render_mode
+        self.render_mode = check_render_mode(render_mode, self.metadata)
         self._figure: Figure | None = None
+        self._goes_on = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -243,6 +302,7 @@ class TaskEnv(gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=seed)
         self.arms.reset(np.array([True]))
+        self._goes_on = True
         if self.render_mode == "human":
             self.render()
         return self.arms.observations()[0], self._info()
@@ -250,8 +310,11 @@ class TaskEnv(gymnasium.Env):
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Make the next subtask of the trial."""
-        rewards, ended = self.arms.step(np.asarray(action)[None], np.array([True]))
+        """Make the next subtask of the trial. Raises ResetNeeded where it has ended."""
+        if not self._goes_on:
+            raise ResetNeeded("no trial goes on: reset first")
+        rewards, ended = self.arms.step(clip(action)[None], np.array([True]))
+        self._goes_on = not ended[0]
         if self.render_mode == "human":
             self.render()
         return self.arms.observations()[0], float(rewards[0]), bool(ended[0]), False, self._info()
@@ -260,42 +323,34 @@ class TaskEnv(gymnasium.Env):
         """The action that moves this hand to a target ``(dof,)``, to replay a solution.
 
         Without a target, which is None or NaN, the corrective process acts alone: the entries of
-        the joints are NaN. A movement of kind ``"corrective"`` is replayed so.
+        the joints are NaN. A movement of kind ``"corrective"`` is replayed so. Raises ValueError
+        for a target outside of the box, which no action leads to.
         """
+        if hand not in self.arms.task.hands:
+            raise ValueError(f"hand is {hand!r}; it must be one of {self.arms.task.hands}")
         centre = self.arms.centre(np.array([0]))[0]
-        given = np.full_like(centre, np.nan) if target is None else target
+        given = np.full_like(centre, np.nan) if target is None else real_array("target", target)
+        if given.shape != centre.shape:
+            raise ValueError(f"target has shape {given.shape}; it must be {centre.shape}")
         away = (given - centre)[self.arms.free] / self.arms.scale
+        if (far := np.nanmax(np.abs(away), initial=0.0)) > 1.0 + 1e-9:
+            raise ValueError(
+                f"the target is outside of the box: it needs a scale of {far * self.arms.scale:.3g}"
+            )
         return np.array([-1.0 if hand == "left" else 1.0, *away][not self.arms.chooses_hands :])
 
     def render(self) -> NDArray[np.uint8] | None:
         """Show the robot and the goals in a window, or as a picture ``(height, width, 3)``."""
         if self.render_mode is None:
             return None
-        from matplotlib import pyplot
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
         if self.render_mode == "rgb_array":
-            figure = Figure(figsize=(6, 4))
-            canvas: Any = FigureCanvasAgg(figure)
-            self._draw(figure)
-            canvas.draw()
-            return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+            return picture(self.arms, 0)
+        from matplotlib import pyplot
+
         self._figure = self._figure or pyplot.figure(figsize=(6, 4))
-        self._draw(self._figure)
+        draw_arms(self._figure, self.arms, 0)
         pyplot.pause(1 / self.metadata["render_fps"])
         return None
-
-    def _draw(self, figure: Figure) -> None:
-        from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
-
-        arms, task = self.arms, self.arms.task
-        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-        figure.clear()
-        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, arms.q[0], weight=1.5)
-        number_goals(axes, task, weight=1.5)
-        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[0])
 
     def close(self) -> None:
         """Close the window."""
@@ -312,17 +367,30 @@ class TaskEnv(gymnasium.Env):
 class TaskVectorEnv(VectorEnv):
     """N robots side by side, which takes a fraction of the time; options as :class:`Arms`.
 
-    An episode that has ended begins anew in the next step, whose action is ignored.
+    ``autoreset_mode`` is one of Gymnasium's. By default, ``"NextStep"``, an episode that has ended
+    begins anew in the next step, whose action is ignored. Actions are clipped to the box.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": [],
+        "render_modes": ["rgb_array"],
+        "render_fps": TaskEnv.metadata["render_fps"],
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
-    def __init__(self, num_envs: int, task: Task | str | Path, **options: Any) -> None:
+    def __init__(
+        self,
+        num_envs: int,
+        task: Task | str | Path,
+        *,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **options: Any,
+    ) -> None:
         self.num_envs = num_envs
-        self.arms = Arms(num_envs, task, **options)
+        self.arms = make_arms(num_envs, task, options)
+        self.render_mode = check_render_mode(render_mode, self.metadata)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]
         self.single_action_space = self.arms.action_space
         self.single_observation_space = self.arms.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -330,26 +398,70 @@ class TaskVectorEnv(VectorEnv):
         self._ended = np.zeros(num_envs, dtype=np.bool_)
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin all trials."""
+        """Begin all trials, or those of ``options["reset_mask"]``, shape ``(num_envs,)``.
+
+        A seed, or one for each environment, is taken as by Gymnasium; nothing is random.
+        """
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+            if len(seed) != self.num_envs:
+                raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
+            for each in seed:
+                seeding.np_random(each)  # raises for what is none
+            seed = seed[0]
         super().reset(seed=seed)
-        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        self.arms.reset(~self._ended)
-        return self.arms.observations(), self._infos()
+        which = np.ones(self.num_envs, dtype=np.bool_)
+        if options is not None and "reset_mask" in options:
+            which = options["reset_mask"]
+            fits = isinstance(which, np.ndarray) and which.dtype == np.bool_
+            if not fits or which.shape != (self.num_envs,) or not which.any():
+                raise ValueError(
+                    f"reset_mask must be an array of {self.num_envs} booleans, at least one of "
+                    "them True"
+                )
+        self._ended[which] = False
+        self.arms.reset(which)
+        return self.arms.observations(), self._infos(which)
 
     def step(
         self, actions: Array
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Make the next subtask of each trial that goes on; begin the others anew."""
-        self.arms.reset(self._ended)
-        rewards, self._ended = self.arms.step(actions, ~self._ended)
-        truncated = np.zeros(self.num_envs, dtype=np.bool_)
-        return self.arms.observations(), rewards, self._ended.copy(), truncated, self._infos()
+        """Make the next subtask of each trial that goes on; begin the others anew.
 
-    def _infos(self) -> dict[str, Any]:
+        Raises ResetNeeded where they are not begun by themselves, in the mode ``"Disabled"``.
+        """
+        if self._ended.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(
+                f"the trials of environments {np.flatnonzero(self._ended).tolist()} have ended: "
+                "reset them first"
+            )
+        self.arms.reset(self._ended)
+        rewards, ended = self.arms.step(clip(actions), ~self._ended)
+        self._ended, truncated = ended.copy(), np.zeros_like(ended)
+        observations, infos = self.arms.observations(), self._infos(np.ones_like(ended))
+        if ended.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            last = np.full(self.num_envs, None, dtype=object)
+            for row in np.flatnonzero(ended):
+                last[row] = observations[row]
+            final = {"final_obs": last, "final_info": self._infos(ended)}
+            observations, _ = self.reset(options={"reset_mask": ended})
+            infos = self._infos(np.ones_like(ended)) | final
+            infos |= {f"_{name}": ended.copy() for name in final}
+        return observations, rewards, ended, truncated, infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """A picture of each robot and its goals."""
+        if self.render_mode is None:
+            return None
+        return tuple(picture(self.arms, row) for row in range(self.num_envs))
+
+    def _infos(self, which: NDArray[np.bool_]) -> dict[str, Any]:
         infos = self.arms.infos()
-        return infos | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in infos}
+        return infos | {f"_{name}": which.copy() for name in infos}
 
 
 TASKS = {

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from coartic.errors import CoarticError
+from coartic.inputs import brief_value, check_limits
 
 
 class MotionModel(NamedTuple):
@@ -69,15 +70,16 @@ def stored_model(fields: Mapping[str, Any]) -> MotionModel:
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """The model itself; ValueError for constants no movement can be made with.
+    """The model itself; ValueError for constants no movement can be made with,
+    TypeError for what is no model.
 
     ``radius`` of the goals, where known: a corrective process that ends farther from a
     goal's centre than that never hits it.
     """
+    if not isinstance(model, MotionModel):
+        raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
     for name, (least, most) in _BOUNDS.items():
-        value = getattr(model, name)
-        if not least <= value <= most:
-            raise ValueError(f"model.{name} is {value}; it must be from {least:g} to {most:g}")
+        check_limits(f"model.{name}", getattr(model, name), least, most)
     if radius is not None and model.correction_tolerance >= radius:
         raise ValueError(
             f"model.correction_tolerance {model.correction_tolerance} is not below the goals' "

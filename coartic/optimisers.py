@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from coartic.inputs import WIDTHS, check_limits, real_array
 from coartic.learner.learning import TRIALS
 from coartic.method import (
     BudgetError,
@@ -91,6 +92,7 @@ class Objective:
         half_width: float = HALF_WIDTH,
         trials: int | None = None,
     ) -> None:
+        check_limits("half_width", half_width, *WIDTHS)
         self._session = session
         self._end = None if trials is None else session.meter.trials + trials
         sequences = sequences_of(session) if hands is None else [hands]
@@ -142,8 +144,12 @@ class Objective:
 
     def __call__(self, x: ArrayLike) -> Any:
         """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
-        them; see :meth:`many`."""
-        points = np.asarray(x, dtype=np.float64)
+        them; see :meth:`many`, which takes rows, for as many points as they have entries."""
+        points = real_array("x", x)
+        if points.ndim not in (1, 2) or len(points) != self.dim:
+            raise ValueError(
+                f"x has shape {points.shape}; needed is ({self.dim},) or ({self.dim}, N)"
+            )
         return float(self.many(points[None])[0]) if points.ndim == 1 else self.many(points.T)
 
     def many(self, points: ArrayLike) -> Array:
@@ -154,7 +160,7 @@ class Objective:
         Raises ValueError for another shape, for infinite entries and for goals that are NaN in
         part.
         """
-        array = np.asarray(points, dtype=np.float64)
+        array = real_array("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         targets = self._targets(array)
@@ -210,9 +216,9 @@ def objective(
     of the optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 %
     of it.
 
-    Raises TaskError for a task that cannot be used, ValueError for hands that do not fit,
-    MethodError where the corrective process completes no sequence, or where there are too many to
-    try.
+    Raises TaskError for a task that cannot be used, ValueError for hands that do not fit and for
+    a half width that is not from 1e-9 to 100, TypeError for a model that is none, MethodError where
+    the corrective process completes no sequence, or where there are too many to try.
     """
     chosen = as_task(task)
     if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):
@@ -227,7 +233,7 @@ class OptimiserParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
     """Hand sequence; by default the one with which the corrective process alone does best."""
-    half_width: Annotated[float, Field(gt=0, le=100)] = HALF_WIDTH
+    half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Of the bounds, length unit (base) and rad (joints)."""
 
 

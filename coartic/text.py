@@ -9,6 +9,7 @@ through :func:`one_line` wherever it comes from: each language escapes its own m
 from __future__ import annotations
 
 import difflib
+import re
 import unicodedata
 from collections.abc import Iterable
 from typing import Annotated, Any
@@ -86,10 +87,23 @@ def shown_fact(value: Any) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """``; did you mean 'a'?`` with the name that is nearest; empty where none is near."""
-    by_letters = {each.lower(): each for each in names}
-    close = difflib.get_close_matches(name.lower(), by_letters, n=1)
-    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""
+    """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
+
+    Near are names that differ in small letters and hyphens, begin so, are spelt alike or end in the
+    same word, in this order.
+    """
+    meant, by_letters = _letters(name), {_letters(each): each for each in reversed([*names])}
+    of_prefix = [each for each in reversed(by_letters) if meant and each.startswith(meant)]
+    close = difflib.get_close_matches(meant, by_letters, n=1)
+    last = meant.rpartition("-")[2]  # of a name in a table, such as "learner EC4"
+    of_last = [each for each in reversed(by_letters) if last and each.endswith(f"-{last}")]
+    hints = [meant] * (meant in by_letters) + of_prefix + close + of_last
+    return f"; did you mean {by_letters[hints[0]]!r}?" if hints else ""
+
+
+def _letters(name: str) -> str:
+    """A name in small letters, with a hyphen for all that is neither letter nor digit."""
+    return re.sub(r"[\W_]+", "-", name.lower()).strip("-")
 
 
 def unknown(kind: str, name: str, names: Iterable[str]) -> str:
@@ -98,7 +112,7 @@ def unknown(kind: str, name: str, names: Iterable[str]) -> str:
     hint = did_you_mean(name, several)
     rest = len(several) - _MOST_NAMED
     more = f" and {rest} other{'s' * (rest > 1)}" if rest > 0 else ""
-    return f"unknown {kind} {name!r}" + (
+    return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}" + (
         hint or f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
     )
 

@@ -9,6 +9,9 @@ import signal
 import threading
 from collections.abc import Iterator
 
+from coartic.inputs import check_limits
+
+MOST_JOBS = 10_000
 ONE_THREAD = dict.fromkeys(
     (
         "OMP_NUM_THREADS",
@@ -23,8 +26,12 @@ ONE_THREAD = dict.fromkeys(
 
 
 def threads_for(jobs: int) -> int:
-    """Number of threads or processes; ``jobs`` is -1 for one a core."""
-    if jobs > 0:
+    """Number of threads or processes; ``jobs`` is -1 for one a core.
+
+    Raises ValueError for 0, which is none, and for what is no number of them.
+    """
+    if jobs != -1 or isinstance(jobs, float):
+        check_limits("jobs", jobs, 1, MOST_JOBS)
         return jobs
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

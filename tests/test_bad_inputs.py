@@ -1,15 +1,19 @@
 """What a user writes wrong gets one sentence, with the key and what would be right."""
 
+import os
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, builtin_tasks, load_task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import Selection, run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.tasks.families import read_family
+from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN
 
@@ -166,3 +170,77 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
         run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**selection)} | rest)
     assert words in str(caught.value)
     assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("read", [load_task, cells, read_family, lambda path: registry([path])])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large", "long"])
+def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
+    path = tmp_path / "mine.v1.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "large":
+        with path.open("wb") as file:
+            file.truncate(3_000_000_000)
+    else:
+        path = tmp_path / f"{'a' * 5000}.v1.toml"
+    with pytest.raises(CoarticError, match=r"cannot be read|at most") as caught:
+        read(path)
+    (line,) = str(caught.value).splitlines()
+    assert len(line) < 700
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "x\0y", 3, None])
+def test_a_folder_that_cannot_be(name):
+    with pytest.raises(CoarticError, match=r"'?.* cannot be used: ") as caught:
+        run_suite("paper", name, select=Selection(tasks=["ascending"], methods=["EC1"]), runs=1)
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("learner EC4", "dual-process/EC4"),
+        ("the learner EC1", "dual-process/EC1"),
+        ("CMA-ES", "cma-es/bandit"),
+        ("CMA-ES, every hand sequence", "cma-es/every"),
+        ("nullspace", "nullspace-qp/none"),
+        ("Posture based: two goals", "posture-based/two-goals"),
+        ("Two-armed 1", "two-armed-1"),
+        ("two armed 2", "two-armed-2"),
+        ("DESCENDING", "descending"),
+    ],
+)
+def test_a_name_as_tables_and_figures_have_it_is_understood(name, meant):
+    assert did_you_mean(name, [*builtin_tasks(), *KNOWN]) == f"; did you mean {meant!r}?"
+
+
+@pytest.mark.parametrize("name", ["", "-", "qqq", "."])
+def test_what_is_like_no_name_has_no_hint(name):
+    assert did_you_mean(name, [*builtin_tasks(), *KNOWN]) == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        *((["run", "paper", "--jobs", v], f"--jobs {v}: it must be -1") for v in ("0", "-2", "x")),
+        (["draw", "ascending", "--out", ""], "--out is empty"),
+        (["draw", "ascending", "--out", "a" * 5000], "File name too long"),
+        (["animate", "x", "--out", ""], "--out is empty"),
+        (["report", "a" * 5000], "File name too long"),
+        (["run", "paper", "--out", "a" * 5000], "File name too long"),
+        (["check", "/dev/zero.toml"], "no such file"),
+    ],
+)
+def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "coartic", *command], cwd=tmp_path, capture_output=True, text=True
+    )
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, done.stdout) == (2, "")
+    assert line.startswith("Error: ")
+    assert words in line
+    assert not [*tmp_path.iterdir()]

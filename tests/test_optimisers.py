@@ -126,7 +126,7 @@ def test_an_optimum_gets_its_reward_through_every_door(name):
     assert cost(targets[cost.joints]) == -entry.reward
     assert execute(task, cost.solution).reward == entry.reward
     gymnasium, door = pytest.importorskip("gymnasium"), pytest.importorskip("coartic.gym")
-    options = {"task": task, "around": entry.hands}
+    options = {"task": task, "around": entry.hands, "scale": 4.0}
     env = gymnasium.make("coartic/Task-v0", **options)
     env.reset()
     actions, rewards = [], []
@@ -213,3 +213,22 @@ def test_the_first_program_of_the_page(capsys):
     shown = capsys.readouterr().out
     cost, reward = re.search(r"([0-9.]+) ticks", shown)[1], re.search(r"\n(-\d+)\n", shown)[1]
     assert float(cost) == -int(reward)
+
+
+@pytest.mark.parametrize("wrong", [0, -1.0, np.nan, np.inf, "1", None, True, [1.0], 101])
+def test_a_wrong_half_width_is_refused(wrong):
+    with pytest.raises(ValueError, match="half_width is .*; it must be a number from 1e-09 to 100"):
+        coartic.objective("ascending", half_width=wrong)
+
+
+def test_what_is_no_point_is_refused_with_its_own_shape():
+    cost = coartic.objective("ascending")
+    with pytest.raises(ValueError, match=r"x has shape \(5,\); needed is \(18,\) or \(18, N\)"):
+        cost(np.zeros(5))
+    for wrong in ("abc", ["1.0"] * 18, [None] * 18, {}, cost.x0 + 1j, np.zeros(18, bool)):
+        for call in (cost, cost.many):
+            with pytest.raises(ValueError, match="needed are real numbers"):
+                call(wrong)
+    with pytest.raises(ValueError, match="rows of different lengths"):
+        cost.many([[1, 2], [3]])
+    assert cost.evaluations == 0

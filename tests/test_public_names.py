@@ -267,3 +267,38 @@ def test_docstrings_say_what_goes_in_and_what_comes_out(name):
         assert f"\n{parameter} : " in text.partition("Parameters\n---")[2], parameter
     assert "\nReturns\n-------\n" in text
     assert "\nRaises\n------\n" in text or not inspect.signature(FUNCTIONS[name]).parameters
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "words"),
+    [
+        *(({"seeds": [v]}, ValueError, "seed is") for v in (-1, 1.5, "1", None, True, [1], 2**128)),
+        *(({"seeds": v}, TypeError, "seeds is .*; it must be a list") for v in ("12", b"12", 3, None)),
+        *(({"trials": v}, ValueError, "trials is") for v in (0, 1.5, "5", None, True, 10**12)),
+        *(({"jobs": v}, ValueError, "jobs is") for v in (0, -2, 1.5, -1.0, "2", None, True, 10**9)),
+        *(({"model": v}, TypeError, "must be a MotionModel") for v in (None, "PAPER", {})),
+        ({"model": coartic.MotionModel(step="x")}, ValueError, "model.step is 'x'; it must be"),
+        ({"model": coartic.MotionModel(max_iterations=1.5)}, ValueError, "must be a whole number"),
+        *(({"start": v}, coartic.SolutionError, "ovement") for v in ("x", [1], 3)),
+    ],
+)  # fmt: skip
+def test_what_the_learner_cannot_use_is_refused_with_its_name(wrong, error, words):
+    with pytest.raises(error, match=words):
+        coartic.learn_many(TASK, "EC4", **{"seeds": [0], "trials": 2} | wrong)
+
+
+def test_numbers_of_numpy_are_numbers():
+    seeds, trials = np.arange(2), np.int64(3)
+    runs = coartic.learn_many(TASK, "EC4", seeds=seeds, trials=trials, jobs=np.int32(1))
+    again = coartic.learn_many(TASK, "EC4", seeds=[0, 1, 1], trials=3)
+    assert [run.reward for run in runs] == [run.reward for run in again[:2]]
+    assert again[1].rewards.tolist() == again[2].rewards.tolist()
+
+
+def test_what_is_no_solution():
+    for wrong in (None, 3, Movement(1, "left", "corrective")):
+        with pytest.raises(coartic.SolutionError, match="the solution is .*; needed is a list"):
+            execute(TASK, wrong)
+    target = ["a"] * 10
+    with pytest.raises(coartic.SolutionError, match="goal 1: configuration .* real numbers"):
+        execute(TASK, [Movement(1, "left", "learned", target)])

@@ -10,6 +10,24 @@ import typer
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_SECONDS
+from coartic.threads import MOST_JOBS, threads_for
+
+
+def job_count(text: str | int) -> int:
+    """A number of processes. Raises CoarticError for 0 and for what is none."""
+    try:
+        threads_for(int(text))
+    except ValueError:
+        raise CoarticError(
+            f"--jobs {text}: it must be -1, one process for each core, or from 1 to {MOST_JOBS}."
+        ) from None
+    return int(text)
+
+
+def output_named(name: str | Path) -> Path:
+    """A file or folder to write. Raises CoarticError for an empty name."""
+    return folder_named(name, "--out")
+
 
 SuiteName = Annotated[
     str,
@@ -48,7 +66,10 @@ RunCount = Annotated[
     typer.Option(min=1, metavar="N", help="Runs of each cell."),
 ]
 TrialCount = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
-Jobs = Annotated[int, typer.Option(min=-1, metavar="N", help="Processes; -1 is one for each core.")]
+Jobs = Annotated[
+    int,
+    typer.Option(parser=job_count, metavar="N", help="Processes; -1 is one for each core."),
+]
 Tasks = Annotated[str | None, typer.Option(metavar="A,B", help="Only these tasks.")]
 Methods = Annotated[str | None, typer.Option(metavar="X,Y", help="Only these methods.")]
 Subject = Annotated[

@@ -22,7 +22,12 @@ def draw(
         typer.Argument(metavar="TASK", help="Tasks, task files, or long/v1/i000..i003."),
     ] = None,
     out: Annotated[
-        Path, typer.Option(metavar="FILE", help="Picture (.png, .svg, .pdf), or a folder.")
+        Path,
+        typer.Option(
+            parser=given.output_named,
+            metavar="FILE",
+            help="Picture (.png, .svg, .pdf), or a folder.",
+        ),
     ] = Path("tasks.svg"),
     replace: given.Replace = False,
 ) -> None:
@@ -51,7 +56,12 @@ def draw(
 
 def animate(
     run_id: given.RunId,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Film to write: .gif or .mp4.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            parser=given.output_named, metavar="FILE", help="Film to write: .gif or .mp4."
+        ),
+    ],
     other: Annotated[
         str | None, typer.Argument(metavar="OTHER_RUN", help="A run to show beside it.")
     ] = None,

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from coartic.errors import NotApplicableError
+from coartic.inputs import MOST_TRIALS, brief_value, check_limits
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
     COUNT,
@@ -39,6 +40,7 @@ from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
 from coartic.threads import threads_for
 
 TRIALS = 10_000  # trials of one run (printed)
+_MOST_SEED = 2**128 - 1  # seeds of runs are hashes
 
 
 def learn(
@@ -80,10 +82,10 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        The task is neither a Task nor a text nor a path, or the condition is none.
+        The task is neither a Task nor a text nor a path, or the condition or the model is none.
     ValueError
-        The seed is negative, there is no trial, no movement can be made with the model, or the
-        task was changed so that it contradicts itself.
+        The seed is no whole number from 0, there is no trial, no movement can be made with the
+        model, or the task was changed so that it contradicts itself.
 
     Notes
     -----
@@ -138,23 +140,29 @@ def learn_many(
     CoarticError
         The condition is unknown.
     TypeError
-        The task is neither a Task nor a text nor a path, or the condition is none.
+        The task is neither a Task nor a text nor a path, or the condition or the model is none.
     SolutionError
         The movements of ``start`` break the task's rules.
     ValueError
-        A seed is negative, there is no trial, no movement can be made with the model, or the task
-        was changed so that it contradicts itself.
+        A seed is no whole number from 0, there is no trial, ``jobs`` is neither -1 nor at least 1,
+        no movement can be made with the model, or the task was changed so that it contradicts
+        itself.
     """
     task = as_task(task)
     condition = load_condition(condition)
     reason = condition.why_not(task)
     if reason is not None:
         raise NotApplicableError(reason)
-    if trials < 1:
-        raise ValueError(f"trials is {trials}; trial 0 is the initial solution, so at least 1")
-    check_model(model, radius=task.radius)
-    first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
+    check_limits("trials", trials, 1, MOST_TRIALS)
+    if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
+        raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of whole numbers")
     ordered: Sequence[int] = list(seeds)
+    for seed in ordered:
+        check_limits("seed", seed, 0, _MOST_SEED)
+    check_model(model, radius=task.radius)
+    if start:
+        movements_by_goal(task, start)  # or it says what is wrong with them
+    first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[first : first + together] for first in range(0, len(ordered), together)]
@@ -188,7 +196,7 @@ def learn_together(
     """
     runs, dof = len(seeds), task.robot.dof
     first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
-    for number, movements in movements_by_goal(task, list(start)) if start else ():
+    for number, movements in movements_by_goal(task, start) if start else ():
         first_targets[number - 1] = 0.0  # beyond the joints of a smaller robot
         first_targets[number - 1, :dof] = movements[0].target
     codes = [HANDS.index(hand) for hand in hands_of(first_hands)]

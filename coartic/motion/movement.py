@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from coartic.inputs import real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.compiled import entry, fill_row, inner, lanewise
@@ -373,7 +374,7 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
 def configuration(robot: Robot, q: Any) -> Array:
     """A contiguous copy of one configuration; ValueError where the shape is wrong."""
-    array = np.array(q, dtype=np.float64)
+    array = np.array(real_array("configuration", q), order="C")
     if array.shape != (robot.dof,):
         raise ValueError(f"configuration has shape {array.shape}; this robot needs ({robot.dof},)")
     if not (np.abs(array) <= LARGEST_ENTRY).all():

@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from coartic.errors import SolutionError
+from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import check_goal, configuration, follow
 from coartic.motion.penalty import penalties
@@ -182,7 +183,7 @@ def execute_many(
     runs: list[SolutionRun | Refused] = []
     for solution in solutions:
         try:
-            runs.append(SolutionRun(task, list(solution)))
+            runs.append(SolutionRun(task, solution))
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             runs.append(error)
     going = [run for run in runs if isinstance(run, SolutionRun)]
@@ -215,7 +216,7 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 class SolutionRun:
     """An execution while it goes on."""
 
-    def __init__(self, task: Task, solution: list[Movement]) -> None:
+    def __init__(self, task: Task, solution: Iterable[Movement]) -> None:
         self.task = task
         # The corrective process has the last word.
         self.due = [
@@ -353,12 +354,17 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
     return Reached._make(field[:, 0] for field in reached)
 
 
-def movements_by_goal(task: Task, solution: list[Movement]) -> list[tuple[int, list[Movement]]]:
+def movements_by_goal(task: Task, solution: Iterable[Movement]) -> list[tuple[int, list[Movement]]]:
     """The movements grouped by goal, checked against the task."""
+    if not isinstance(solution, Iterable):
+        raise SolutionError(
+            f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
+            "movements"
+        )
     groups: list[tuple[int, list[Movement]]] = []
     for movement in solution:
         if not isinstance(movement, Movement):
-            raise SolutionError(f"task {task.name!r}: {movement!r} is not a Movement")
+            raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
         if not groups or groups[-1][0] != movement.goal:
             groups.append((movement.goal, []))
         of_goal = groups[-1][1]
