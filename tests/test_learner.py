@@ -239,12 +239,6 @@ def test_models_no_movement_can_be_made_with(model):
         execute(load_task("ascending"), [], model=model)
 
 
-def test_fewer_trials_are_a_prefix():
-    task = load_task("ascending")
-    long, short = (learn(task, "EC1", seed=5, trials=n) for n in (500, 200))
-    np.testing.assert_array_equal(long.rewards[:200], short.rewards)
-
-
 def failing_task():
     """The left hand starts on a stationary point: its corrective process cannot leave."""
     return tiny_task(
@@ -355,30 +349,6 @@ def test_credit_of_subtasks_equals_the_slow_learner(fields):
     assert bettered(slow) >= 2
     slow = assert_equals_reference(failing_task(), replace(condition, epsilon=0.5), trials=12)
     assert set(slow.completed) == {True, False}
-
-
-def test_a_subtask_learned_alone_does_not_know_what_follows():
-    """Two tasks begin with the same goal: what is learned of it is the same, bit for bit, as long
-    as its own reward alone is credited."""
-    start = {"left": [0.0] * 4, "right": [0.9, -0.8, 0.7, 0.5]}
-    tasks = [
-        tiny_task(goals=[[5.0, 1.0], [5.5, y]], initial_hands="RR", start=start)
-        for y in (2.5, -1.5)
-    ]
-
-    def learned(condition):
-        """Targets of goal 1, after a trial and after many, for either successor."""
-        trials = (1, 1500)
-        runs = [[learn(t, condition, seed=3, trials=n) for n in trials] for t in tasks]
-        return np.array([[run.targets[0, 2, 1] for run in pair] for pair in runs])
-
-    alone = VARIANTS["EC1-subtask"]
-    (first, last), (_, other) = learned(alone)
-    np.testing.assert_array_equal(last, other)
-    assert np.linalg.norm(last - first) > 0.05  # something was learned
-    for condition in (replace(alone, discount=1.0), CONDITIONS["EC1"]):
-        (_, last), (_, other) = learned(condition)
-        assert np.linalg.norm(last - other) > 0.1
 
 
 def test_without_corrective_process_a_missed_goal_ends_the_trial():

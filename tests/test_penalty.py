@@ -13,18 +13,15 @@ from coartic import (
     Task,
     execute,
     learn,
-    learn_many,
     load_task,
     parse_task,
 )
 from coartic.analysis import verify as checker
 from coartic.analysis.optima import essence
-from coartic.baselines.cma_es import Bandit
 from coartic.baselines.optimum import DynamicProgramming
 from coartic.benchmarks.run import run_suite
 from coartic.method import Session
 from coartic.motion.trials import make_trials, movements_of
-from coartic.optimisers import objective
 from coartic.tasks.families import task_text
 from coartic.tasks.task import hands_of
 from tests.support import reference
@@ -93,17 +90,6 @@ def test_the_learner_feels_them_as_the_slow_learner_does(task, condition):
     assert slow.rewards[0] == run.initial_reward
 
 
-@pytest.mark.parametrize("terms", [{"joints": 200.0}, {"distinct": 150.0}], ids=str)
-def test_learning_lowers_them(terms):
-    plain, task = load_task("ascending"), with_penalty("ascending", **terms)
-    felt, unfelt = (
-        learn_many(t, "EC1", seeds=range(4), trials=3000, jobs=1) for t in (task, plain)
-    )
-    with_it = [run.reward for run in felt]
-    without = [execute(task, run.solution).reward for run in unfelt]
-    assert np.mean(with_it) > np.mean(without) + 10
-
-
 def test_a_penalty_of_no_ticks_changes_nothing():
     plain, nothing = load_task("two-armed-2"), with_penalty("two-armed-2")
     runs = [learn(task, "EC4", seed=3, trials=300) for task in (plain, nothing)]
@@ -112,20 +98,6 @@ def test_a_penalty_of_no_ticks_changes_nothing():
     assert "penalty" not in json.loads(plain.model_dump_json())
     assert "penalty" in nothing.model_dump()
     assert essence(plain) != essence(nothing)
-
-
-def test_what_optimisers_and_sessions_see():
-    task = with_penalty("ascending", **TERMS["distinct"])
-    cost = objective(task)
-    first = execute(task, cost.solution)
-    assert cost.best_cost == -first.reward > first.ticks
-    session = Session(task, 0, Bandit.told)
-    result = Bandit(Bandit.Parameters(trials=400)).solve(session)
-    best = execute(task, result.solution)
-    assert best.reward == max(session.rewards)
-    assert best.reward > session.rewards[0]  # CMA-ES improves on the true reward
-    single = Session(task, 0, Bandit.told)
-    assert single.trial(result.solution).reward == single.rewards[0] == best.reward
 
 
 def test_environments_pay_at_the_goal_that_costs():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from coartic import Movement, learn, trajectory
+from coartic import learn
 from coartic.analysis.verify import stored_task
 from coartic.errors import CoarticError
 from coartic.learner.conditions import (
@@ -22,8 +22,7 @@ from coartic.learner.conditions import (
 )
 from coartic.learner.method import DualProcessParameters
 from coartic.model import PAPER, stored_model
-from coartic.motion.movement import follow
-from coartic.robot import HANDS, Robot
+from coartic.robot import HANDS
 from coartic.tasks.catalogue import load_task
 from coartic.tasks.readings import (
     condition_under,
@@ -154,41 +153,6 @@ def test_a_learned_replay_is_the_replay():
     run = learn(task, replace(CONDITIONS["EC1"], learned="replay"), seed=3, trials=25)
     assert run.reward == run.replay_reward != max(run.rewards)
     assert run.execute().reward == run.reward
-
-
-def test_rows_of_a_trajectory_start_where_the_robot_does():
-    """Two lines of 3 and 2 steps and a goal hit where the robot stands, counted by hand."""
-    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
-    ahead = [np.array([x, *[0.0] * 9]) for x in (0.06, 0.08)]
-    path = trajectory(
-        task,
-        [
-            Movement(1, "right", "corrective"),
-            Movement(2, "right", "planned", ahead[0]),
-            Movement(3, "right", "planned", ahead[1]),
-        ],
-    )
-    np.testing.assert_allclose(100 * path.configurations[:, 0], [0, 1, 2, 3, 3, 4, 5], atol=1e-12)
-    np.testing.assert_allclose(path.subtask(1)[:, 0], [0.0])
-
-
-@pytest.mark.parametrize("first_step", [False, True])
-@pytest.mark.parametrize("whole_last_step", [False, True])
-def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, whole_last_step):
-    model = PAPER._replace(first_step=first_step, whole_last_step=whole_last_step)
-    rng, hits = np.random.default_rng(5), 0
-    for _ in range(30):
-        q, target = rng.uniform(-1, 1, (2, 10))
-        near = target if rng.random() < 0.5 else q
-        goal = tuple(Robot().forward_kinematics(near, "left") + rng.uniform(-0.11, 0.11, 2))
-        path = follow(Robot(), q, target[None], "left", goal, 0.1, model=model)
-        line = reference.move(
-            Robot(), q, target, "left", goal, 0.1, stop_on_arrival=False, model=model
-        )
-        assert (path.ticks, path.hit) == (line.ticks, line.hit)
-        np.testing.assert_allclose(path.q, line.q, atol=1e-12)
-        hits += path.hit
-    assert 10 < hits < 30
 
 
 def test_what_version_1_stored_is_read_unless_its_reading_is_gone():
