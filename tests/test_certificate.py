@@ -11,12 +11,7 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import (
-    Multipliers,
-    Relaxation,
-    stiff_joints,
-    support_of,
-)
+from coartic.baselines.relaxation import Multipliers, Relaxation, stiff_joints, support_of
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement

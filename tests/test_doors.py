@@ -31,12 +31,7 @@ from tests.support.strategies import PAPER_CELLS, sample, tiny_task, uneven_task
 
 PENALTY = {"joints": 30.0, "region": 40.0, "distinct": 50.0}
 TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
-    "uneven": uneven_task(
-        [1.0],
-        [0.5, -0.5, 0.2, 1.0],
-        goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
-        initial_hands="RLR",
-    ),
+    "uneven": uneven_task(),
     "penalty": parse_task(
         load_task("two-armed-1").model_dump(mode="json") | {"penalty": PENALTY}, "test"
     ),

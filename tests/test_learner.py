@@ -103,13 +103,7 @@ def test_variants_equal_the_slow_learner_trial_by_trial(variant):
 )
 def test_conditions_are_data(chosen, other, hands):
     """Every combination of the condition's fields, on an uneven robot on a rail."""
-    task = uneven_task(
-        [1.0],
-        [0.5, -0.5, 0.2, 1.0],
-        locked_base=["x"],
-        goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
-        initial_hands="RLR",
-    )
+    task = uneven_task(locked_base=["x"])
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
     slow = assert_equals_reference(task, condition, 8 if hands == "random" else 6, seed=0)
     assert slow.corrections > len(task.goals)

@@ -11,18 +11,11 @@ from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade, stat
 from coartic.baselines.nullspace_qp import FACES, METHODS, Aim, Controller, NextGoal, NullspaceQP
 from coartic.method import MethodError, Session
 from coartic.robot import directions
-from tests.support.strategies import tiny_task
+from tests.support.strategies import solve, tiny_task
 
 ROBOT = Robot()
 ANGLES = 2 * np.pi * np.arange(FACES) / FACES
 NORMALS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
-
-
-def solve(method, task, **parameters):
-    method = method(method.Parameters(**parameters))
-    session = Session(task, 0, method.told, trusted=True)
-    result = method.solve(session)
-    return result, execute(task, result.solution), session
 
 
 def problems(count, seed, far=0.5, preferred=0.3):

@@ -12,11 +12,10 @@ from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
 from coartic.benchmarks.suites import Cell
-from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed
+from tests.support.strategies import changed, solve
 from tests.support.suites import KNOWN, run_and_write
 
 SOLVED = [entry for entry in entries() if entry.reward is not None]
@@ -76,9 +75,8 @@ def test_the_optimum_of_every_task_is_proven_or_bounded(name):
 )
 def test_searches_find_what_is_shipped(method, parameters):
     task = load_task("descending")
-    session = Session(task, 0, method.told, trusted=True)
-    result = method(method.Parameters(**parameters)).solve(session)
-    assert execute(task, result.solution).reward == -304
+    result, execution, session = solve(method, task, **parameters)
+    assert execution.reward == -304
     assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
     assert session.meter.solver_iterations > 30
     if method is BranchAndBound:
@@ -89,9 +87,7 @@ def test_searches_find_what_is_shipped(method, parameters):
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
-    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1, chains=1))
-    session = Session(task, 0, method.told, trusted=True)
-    execution = execute(task, method.solve(session).solution)
+    _, execution, _ = solve(DynamicProgramming, task, nodes=60, graphs=1, chains=1)
     assert execution.hands == "RL"
     assert execution.ticks_by_goal()[1] == 0
     assert execution.corrections == 0

@@ -7,15 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from coartic import (
-    CONDITIONS,
-    VARIANTS,
-    Task,
-    execute,
-    learn,
-    load_task,
-    parse_task,
-)
+from coartic import CONDITIONS, VARIANTS, Task, execute, learn, load_task, parse_task
 from coartic.analysis import verify as checker
 from coartic.analysis.optima import essence
 from coartic.baselines.optimum import DynamicProgramming
@@ -36,12 +28,7 @@ TERMS = {
     "distinct": {"distinct": 70.0, "apart": 1.5},
     "all": {"joints": 30.0, "region": 40.0, "centre": [2.0, 1.5], "radius": 3.0, "distinct": 50.0},
 }
-UNEVEN = uneven_task(
-    [1.0],
-    [0.5, -0.5, 0.2, 1.0],
-    goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
-    initial_hands="RLR",
-)
+UNEVEN = uneven_task()
 
 
 def with_penalty(task, **penalty):

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from coartic import PAPER, Robot, execute, load_task
+from coartic import PAPER, Robot, load_task
 from coartic.baselines.optimum import DynamicProgramming
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.method import Session
 from coartic.motion.costs import joint_costs, segment_lengths
 from coartic.motion.ticks import trajectory
-from tests.support.strategies import tiny_task
+from tests.support.strategies import solve, tiny_task
 from tests.support.suites import KNOWN
 
 FEW = {"graphs": 1, "chains": 1}
@@ -25,9 +24,7 @@ INSTANCES = ["one-armed/v1/d001", "two-armed/v1/d006", THREE_GOALS]
 
 def solved(task, method=RecedingHorizon, **parameters):
     """Result and execution of a method on a task."""
-    session = Session(task, 0, method.told, trusted=True)
-    result = method(method.Parameters(**{**FEW, **parameters})).solve(session)
-    return result, execute(task, result.solution)
+    return solve(method, task, **{**FEW, **parameters})[:2]
 
 
 @cache

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from coartic import (
-    PAPER,
-    CoarticError,
-    Movement,
-    execute,
-    load_task,
-)
+from coartic import PAPER, CoarticError, Movement, execute, load_task
 from coartic.benchmarks.scoring import MOST_STEPS, execute_all
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of

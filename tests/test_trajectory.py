@@ -11,15 +11,10 @@ from scipy.optimize import minimize
 from coartic import Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.baselines.trajectory_optimisation import METHODS, path_movements
-from coartic.baselines.trajectory_problem import (
-    Instance,
-    segment_cost,
-    spline,
-    trajectory_problem,
-)
+from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
-from tests.support.strategies import changed
+from tests.support.strategies import changed, solve
 
 ORDERS = {"acceleration": 2, "jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
@@ -202,10 +197,8 @@ def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, nam
     task = load_task(name)
     if name == "two-armed-2":
         task = changed(name, goals=task.goals[:3], initial_hands="RRR")
-    session = Session(task, 0, method.told, trusted=True)
     few = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 2}
-    result = method(method.Parameters(other_arm=other_arm, **few)).solve(session)
-    execution = execute(task, result.solution)
+    result, execution, session = solve(method, task, other_arm=other_arm, **few)
     costs = result.details["costs"]
     assert execution.hands == min(costs, key=costs.get)
     assert execution.corrections == 0
@@ -225,7 +218,7 @@ def test_goals_out_of_reach_are_infeasible():
     goals = [[6, 0.1], [6, 90]]
     task = changed("ascending", goals=goals, locked_base=["y"], initial_hands="RR")
     with pytest.raises(MethodError, match="goal 2: no posture was found") as failure:
-        method().solve(Session(task, 0, method.told, trusted=True))
+        solve(method, task)
     assert failure.value.outcome == "infeasible"
 
 
@@ -253,10 +246,8 @@ def test_of_too_many_hand_sequences_a_beam_is_planned():
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
     for most in (3, 8, 64):
-        parameters = method.Parameters(
-            nodes=40, graphs=1, chains=1, noisy_starts=0, most_sequences=most
-        )
-        result = method(parameters).solve(Session(task, 0, method.told, trusted=True))
+        few = {"nodes": 40, "graphs": 1, "chains": 1, "noisy_starts": 0}
+        result, *_ = solve(method, task, most_sequences=most, **few)
         costs[most] = result.details["costs"]
     assert len(costs[3]) == 3
     assert len(costs[8]) == 8
