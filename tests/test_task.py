@@ -12,7 +12,7 @@ from coartic import (
 )
 from coartic.tasks.task import parse_task
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import tiny_task
+from tests.support.strategies import TIED, tiny_task
 
 
 def write(tmp_path, text):
@@ -82,6 +82,7 @@ def test_initial_hand_policies():
     task = parse_task(content, "x")
     assert initial_hands(task) == "LRLR"
     assert initial_hands(task, ("right",)) == "RRRR"
+    assert initial_hands(TIED) == "RRL"
     assert corrective_trial(task, "LRLR").reward == -532
 
 

@@ -49,6 +49,13 @@ def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **cha
     )
 
 
+TIED = tiny_task(
+    goals=[[4.0, 0.1], [4.9, 0.1], [3.1, 0.1]], radius=0.6, initial_hands="best-of-all"
+)
+"""At the start both hands are in goal 1, the right one in goal 2 and the left one in goal 3: of LRL
+and RRL, which need no movement, RRL has fewer changes of hand."""
+
+
 def changed(like, **update):
     """A shipped task with some keys changed, reachable or not."""
     content = {**load_task(like).model_dump(mode="json"), **update}
