@@ -22,7 +22,9 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.learner.method import METHODS
 from coartic.method import Information, Session
+from coartic.motion.lanes import LANES
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
 from tests.support import reference
@@ -226,7 +228,7 @@ def test_what_a_policy_spends_is_counted():
         MotionModel(step=1e-20),
         MotionModel(gain=0.0),
         MotionModel(arrival_tolerance=-1.0),
-        MotionModel(correction_tolerance=0.2),
+        MotionModel(correction_tolerance=0.1),
         MotionModel(max_iterations=-1),
     ],
 )
@@ -272,11 +274,22 @@ def test_run_without_any_completed_trial():
         run.execute()
 
 
+def test_a_replay_that_misses_a_goal_is_no_solution():
+    condition = replace(VARIANTS["EC4-uncorrected"], learned="replay")
+    run = learn(load_task("two-armed-1"), condition, seed=0, trials=40)
+    assert run.completed.any()
+    assert (run.status, run.learned, run.reward, run.hands) == ("infeasible", (), None, None)
+    assert "the replay of what was learned did not hit" in run.reason
+
+
 def test_errors():
     with pytest.raises(CoarticError, match="unknown exploration condition 'EC5'; did you mean"):
         learn(load_task("ascending"), "EC5", seed=0)
     with pytest.raises(NotApplicableError, match="has no left hand"):
         learn(load_task("ascending"), "EC3", seed=0)
+    both = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"})
+    with pytest.raises(NotApplicableError, match="only the right hand, .* starts with LRLR"):
+        learn(both, "EC1", seed=0)
     with pytest.raises(ValueError, match="at least 1"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
@@ -306,6 +319,15 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
     if "initial_hands" not in update:  # which only the learner reads
         with pytest.raises(ValueError):  # noqa: PT011
             make_trials(task, "RRRR", np.full((1, 4, 10), np.nan))
+
+
+def test_methods_of_the_learner():
+    """Who looks for the closest hand is told where things are; long runs go in small batches."""
+    told = {method.name for method in METHODS if Information.GOALS in method.told}
+    assert told == {"dual-process/EC2"}
+    method, parameters = METHODS[0], METHODS[0].Parameters
+    sizes = [method(parameters(trials=n)).most_together() for n in (1000, 10**6, 10**7)]
+    assert sizes == [LANES, 4, 1]
 
 
 def test_one_hand_is_always_the_closest():

@@ -82,15 +82,18 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
             cost.many(wrong)
 
 
-@pytest.mark.parametrize(("budget", "trials"), [(30, None), (None, 30), (30, 50)])
-def test_the_objective_ends_with_the_trials(budget, trials):
+@pytest.mark.parametrize(
+    ("budget", "trials", "before"), [(30, None, 0), (None, 30, 0), (30, 50, 0), (40, 30, 2)]
+)
+def test_the_objective_ends_with_the_trials(budget, trials, before):
     session = Session(load_task("two-armed-2"), 0, TOLD, trial_budget=budget)
+    session.trials("RRRR", np.full((before, 4, 10), np.nan))
     cost = Objective(session, trials=trials)
     points = np.tile(cost.x0, (10, 1))
     assert len(cost.many(points)) == 10
     with pytest.raises(BudgetError):
         cost.many(points)  # 16 for the hands, and 4 of these
-    assert (cost.evaluations, session.meter.trials) == (14, 30)
+    assert (cost.evaluations, session.meter.trials) == (14, 30 + before)
     with pytest.raises(BudgetError):
         cost(cost.x0)
 

@@ -1,6 +1,8 @@
 """The optimum: what is shipped holds, and can be found again."""
 
+import itertools
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,12 +12,21 @@ import renew_optima
 from coartic import PAPER, builtin_tasks, execute, load_task
 from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
-from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
+from coartic.baselines.optimum import (
+    METHODS,
+    BranchAndBound,
+    DynamicProgramming,
+    Multistart,
+    with_locks,
+)
+from coartic.baselines.shortest_paths import fewer
+from coartic.baselines.whole_ticks import TickPlan
 from coartic.benchmarks.suites import Cell
+from coartic.method import MethodError
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed, solve
+from tests.support.strategies import changed, solve, tiny_task
 from tests.support.suites import KNOWN, run_and_write
 
 SOLVED = [entry for entry in entries() if entry.reward is not None]
@@ -80,8 +91,24 @@ def test_searches_find_what_is_shipped(method, parameters):
     assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
     assert session.meter.solver_iterations > 30
     if method is BranchAndBound:
-        assert result.details["proven_optimal"] is True
+        assert (result.details["proven_optimal"], result.details["ticks_left"]) == (True, 0)
         assert result.bound == -304
+
+
+def test_the_base_is_locked_beside_the_task():
+    task = tiny_task(locked_base=["x"], goals=[[4.5, 0.1]], initial_hands="R")
+    assert with_locks(task, "task") == task
+    assert with_locks(task, "y").locked_base == ("x", "y")
+    with pytest.raises(MethodError, match="out of reach") as caught:
+        with_locks(load_task("ascending"), "xy")
+    assert caught.value.outcome == "infeasible"
+
+
+def test_of_as_many_ticks_fewer_corrections_are_better():
+    ranked = [SimpleNamespace(ticks=t, corrections=c) for t, c in ((5, 2), (6, 0), (6, 1))]
+    for one, other in itertools.product(range(3), repeat=2):
+        assert fewer(ranked[one], ranked[other]) == (one < other)
+    assert TickPlan((3, 0, 2), np.empty((3, 10))).ticks == 4 + 0 + 3
 
 
 def test_a_hand_that_is_there_already_saves_a_tick():

@@ -99,6 +99,7 @@ def test_environments_pay_at_the_goal_that_costs():
     hits, hands = list(execution.configurations), list(hands_of(execution.hands))
     lost = np.add(execution.ticks_by_goal(), reference.penalty(task, hits, hands))
     assert [-reward for reward in rewards] == lost.tolist()
+    assert env.arms.trials.rewards.tolist() == [execution.reward]
 
 
 def test_planners_that_believe_in_ticks_alone_plan_as_without():

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from coartic import load_task
-from coartic.baselines.posture_based import OneGoal, TwoGoals
-from coartic.method import MethodError
+from coartic.baselines.posture_based import OneGoal, PosturePlanner, TwoGoals
+from coartic.method import MethodError, Session
 from tests.support.strategies import solve, tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -159,6 +159,25 @@ def test_a_free_arm_is_preshaped():
     still, *_ = solve(TwoGoals, task)
     assert still.solution[0].target[3] == task.q0[3]
     assert sum(still.details["expected_ticks"]) > sum(result.details["expected_ticks"]) + 40
+
+
+def test_another_round_of_generation_never_costs_more():
+    task = bent(goals=[[5.0, 1.0]], initial_hands="R", hands=["right"])
+    for seed in range(12):
+        one, two = (solve(OneGoal, task, seed, stored=20, rounds=rounds)[0] for rounds in (1, 2))
+        lengths = [math.dist(task.q0, each.solution[0].target) for each in (one, two)]
+        assert lengths[1] <= lengths[0]
+
+
+def test_the_way_on_is_that_of_the_base_and_the_next_hand():
+    """By the right arm 1.0 and on by the left one 0.5, or by the base 0.7 and on by 0.86."""
+    task = bent(goals=[[5.0, 1.0], [4.0, 2.5]])
+    session = Session(task, 0, TwoGoals.told, trusted=True)
+    planner = PosturePlanner(session, TwoGoals.Parameters(), 2)
+    q, unit = task.q0, np.eye(10)
+    first, second = np.stack([q + 1.0 * unit[6], q + 0.7 * unit[0]]), q + 0.5 * unit[2]
+    chosen = planner.most_promising(q, ("right", "left"), [first, second[None]])
+    np.testing.assert_array_equal(chosen, [first[0], first[0] + second - q])
 
 
 @pytest.mark.parametrize("method", [OneGoal, TwoGoals], ids=["one goal", "two goals"])

@@ -25,6 +25,7 @@ from coartic.model import PAPER, stored_model
 from coartic.robot import HANDS
 from coartic.tasks.catalogue import load_task
 from coartic.tasks.readings import (
+    ChosenReading,
     condition_under,
     load_reading,
     load_readings,
@@ -74,6 +75,16 @@ def test_a_choice_is_loaded_as_it_is_written(reading):
 def test_what_cannot_be_loaded_is_said(texts, says):
     with pytest.raises(CoarticError, match=says):
         load_readings(texts)
+
+
+def test_what_the_text_says_if_it_is_taken_at_its_word():
+    said = [
+        str(ChosenReading(r, choice)) for r in readings() for choice in r.choices if choice.printed
+    ]
+    assert said == [
+        "corrective-arrival=true", "equal-distance=random", "first-trial=learns",
+        "state=previous-hand",
+    ]  # fmt: skip
 
 
 def test_the_default_choice_is_no_reading():

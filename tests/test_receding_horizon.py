@@ -45,6 +45,8 @@ def test_with_all_goals_in_view_it_is_the_search_for_the_optimum(name):
     reference, best = solved(task, DynamicProgramming, nodes=nodes)
     assert execution.reward == best.reward
     assert result.details["windows"] == 1
+    assert result.details["solves"] == reference.details["solves"]
+    assert result.details["failed_solves"] == 0
     # The plan with the fewest ticks, which need not be the very shortest.
     shortest = reference.details["path_length"]
     assert shortest - 1e-8 <= result.details["path_length"] < shortest + PAPER.step
@@ -105,13 +107,20 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
     rewards = {horizon: [] for horizon in (0, 1, 9)}
     for name in INSTANCES:
         for horizon, of_horizon in rewards.items():
-            execution = planned(name, horizon=horizon)[1]
+            result, execution = planned(name, horizon=horizon)
             of_horizon.append(execution.reward)
             assert execution.corrections == 0
+            rounded = execution.ticks - result.details["path_length"] / PAPER.step
+            assert 0 < rounded <= 2 * len(execution.hands)
     gaps = [np.mean(np.divide(rewards[horizon], rewards[9]) - 1) for horizon in (0, 1)]
     assert gaps[0] > gaps[1] > 0
     # By luck of rounding it may be a tick better.
     assert all(np.array(rewards[9]) >= np.array(rewards[0]) - 1)
+
+
+def test_the_shortest_starts_are_polished():
+    """Of one graph's chains one has the best hands already."""
+    assert planned("two-armed-2", horizon=3, starts=1)[1].hands == "RLRR"
 
 
 def test_with_hands_given_only_postures_look_ahead():

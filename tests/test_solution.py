@@ -71,6 +71,10 @@ def test_a_planned_movement_is_always_made():
     corrective = execute(task, [Movement(1, "right", "corrective")])
     assert corrective.reward == 0
     assert corrective.hands == "R"
+    stay = Movement(1, "right", "path", waypoints=np.array([posture(0.0)]))
+    for model in (PAPER, PAPER._replace(first_step=True)):  # there is no step to make
+        assert execute(task, [stay], model=model).reward == -1
+        assert execute(task, planned(posture(0.0)), model=model).reward == -1
 
 
 WAY = np.zeros((1, 10))

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import casadi
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.optimize import minimize
 
 from coartic import Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
-from coartic.baselines.trajectory_optimisation import METHODS, path_movements
+from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
 from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
@@ -150,6 +151,15 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost, free_times):
         h = plan.durations[goal] / 400
         total += ((np.diff(points, n=order, axis=0) / h**order) ** 2).sum() * h
     assert total == pytest.approx(plan.cost, rel=0.03)
+
+
+def test_the_cheapest_plan_that_converged_is_kept():
+    plans = [SimpleNamespace(cost=c, converged=c > 1, spent={"hessians": 1}) for c in (3, 2, 1, 4)]
+    session = Session(small_task(), 0, ())
+    for given, kept in ((plans, plans[1]), ([plans[2], plans[2]], plans[2])):
+        problem = SimpleNamespace(solve=lambda _, plan, **options: plan)
+        assert cheapest_plan(session, problem, None, given) is kept
+    assert session.meter.hessians == 6
 
 
 def test_given_lengths_are_kept():

@@ -5,7 +5,7 @@ import pytest
 
 from coartic import MotionModel, load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
-from coartic.motion.trials import hand_codes, make_trials
+from coartic.motion.trials import hand_codes, make_trials, movements_of
 from coartic.optimisers import TOLD
 from tests.support.strategies import sample
 
@@ -62,6 +62,10 @@ def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
     assert told.corrections.sum() > 0
     hidden = (blind.corrections, blind.iterations, blind.targets, blind.reached)
     assert [len(field) for field in hidden] == [0] * 4
+    solution = movements_of(hands[0], targets[0])
+    single = session.trial(solution)
+    assert (single.reward, len(single.configurations)) == (blind.rewards[0], 0)
+    assert [movement.ticks for movement in single.movements] == [None] * 3
     targets[1, 2] = np.nan
     with pytest.raises(UndeclaredError, match="corrective process"):
         session.trials(hands, targets)
