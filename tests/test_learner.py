@@ -36,10 +36,13 @@ def _tenths(values):
     return [values[part == number] for number in range(10)]
 
 
-def assert_equals_reference(task, condition, trials, seed=11):
-    model = MotionModel(max_iterations=400)  # failures soon enough for the slow side
-    fast = learn(task, condition, seed=seed, trials=trials, model=model)
-    slow = reference.learn(task, condition, seed=seed, trials=trials, model=model)
+SOON_FAILED = MotionModel(max_iterations=400)  # soon enough for the slow side
+
+
+def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED, start=()):
+    options = {"trials": trials, "model": model, "start": start}
+    (fast,) = learn_many(task, condition, seeds=[seed], jobs=1, **options)
+    slow = reference.learn(task, condition, seed=seed, **options)
     np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
     counters = fast.counters
     assert counters.movement_ticks == slow.movement_ticks
@@ -328,6 +331,10 @@ def test_methods_of_the_learner():
     method, parameters = METHODS[0], METHODS[0].Parameters
     sizes = [method(parameters(trials=n)).most_together() for n in (1000, 10**6, 10**7)]
     assert sizes == [LANES, 4, 1]
+    for budget, trials in ((50, 20), (10, 10)):
+        session = Session(load_task("ascending"), 0, method.told, trial_budget=budget, trusted=True)
+        method(parameters(trials=20)).solve(session)
+        assert session.meter.trials == trials
 
 
 def test_one_hand_is_always_the_closest():

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import renew_optima
 
-from coartic import PAPER, builtin_tasks, execute, load_task
+from coartic import PAPER, builtin_tasks, correct, execute, load_task
 from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import (
@@ -22,7 +22,7 @@ from coartic.baselines.optimum import (
 from coartic.baselines.shortest_paths import fewer
 from coartic.baselines.whole_ticks import TickPlan
 from coartic.benchmarks.suites import Cell
-from coartic.method import MethodError
+from coartic.method import MethodError, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
@@ -93,6 +93,32 @@ def test_searches_find_what_is_shipped(method, parameters):
     if method is BranchAndBound:
         assert (result.details["proven_optimal"], result.details["ticks_left"]) == (True, 0)
         assert result.bound == -304
+
+
+def test_searches_keep_the_other_arm_still():
+    goals = [[2.6, 1.0], [-1.6, 1.0]]
+    start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
+    task, few = tiny_task(goals=goals, start=start), {"nodes": 40, "graphs": 1, "chains": 1}
+    travels = []
+    for other_arm in ("free", "still"):
+        _, execution, _ = solve(DynamicProgramming, task, other_arm=other_arm, **few)
+        hands = hands_of(execution.hands)
+        travels.append(other_arm_travel(task, hands, execution.configurations))
+    assert travels[0] > travels[1] == 0.0
+
+
+def test_random_starts_begin_with_the_corrective_process():
+    task = load_task("two-armed-2")
+    session = Session(task, 0, Multistart.told, trusted=True)
+    found = Multistart(Multistart.Parameters(starts=2)).starts(session, task)
+    (hands, first), (_, second) = itertools.islice(found, 2)
+    q, iterations = task.q0, 0
+    for hand, goal, reached in zip(hands, task.goals, first, strict=True):
+        correction = correct(task.robot, q, hand, goal)
+        np.testing.assert_array_equal(reached, correction.q)
+        q, iterations = correction.q, iterations + correction.iterations
+    assert session.meter.jacobians == iterations == session.meter.forward_kinematics - 4
+    assert (second != first).all()
 
 
 def test_the_base_is_locked_beside_the_task():

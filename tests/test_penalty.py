@@ -10,14 +10,12 @@ import pytest
 from coartic import CONDITIONS, VARIANTS, Task, execute, learn, load_task, parse_task
 from coartic.analysis import verify as checker
 from coartic.analysis.optima import essence
-from coartic.baselines.optimum import DynamicProgramming
 from coartic.benchmarks.run import run_suite
-from coartic.method import Session
 from coartic.motion.trials import make_trials, movements_of
 from coartic.tasks.families import task_text
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import sample, tiny_task, uneven_task
+from tests.support.strategies import sample, uneven_task
 from tests.support.suites import InProcess
 from tests.test_learner import assert_equals_reference
 
@@ -100,16 +98,6 @@ def test_environments_pay_at_the_goal_that_costs():
     lost = np.add(execution.ticks_by_goal(), reference.penalty(task, hits, hands))
     assert [-reward for reward in rewards] == lost.tolist()
     assert env.arms.trials.rewards.tolist() == [execution.reward]
-
-
-def test_planners_that_believe_in_ticks_alone_plan_as_without():
-    plain = tiny_task(hands=["right"])
-    solutions = []
-    for task in (plain, with_penalty(plain, **TERMS["all"])):
-        method = DynamicProgramming(DynamicProgramming.Parameters(**DynamicProgramming.quick))
-        solutions.append(method.solve(Session(task, 0, method.told, trusted=True)).solution)
-    for one, other in zip(*solutions, strict=True):
-        np.testing.assert_array_equal(one.target, other.target)
 
 
 def test_files_say_them_and_nothing_that_cannot_be():

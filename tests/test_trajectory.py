@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from coartic import Robot, Task, corrective_trial, execute, load_task
+from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
 from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
+from coartic.motion.solution import other_arm_travel
 from tests.support.strategies import changed, solve
 
 ORDERS = {"acceleration": 2, "jerk": 3}
@@ -198,7 +199,41 @@ def test_whole_ticks_are_what_is_executed():
         assert execution.corrections == 0
         assert execution.ticks <= rounded.ticks
         assert rounding.least(plan) <= rounded.ticks <= rounding.least(plan) + 1
-        assert min(p.ticks for p in rounding.every(plan)) <= rounded.ticks
+        assert other_arm_travel(task, sequence, execution.configurations) == 0.0
+        exact = plan.lengths(task.q0)[:-1] / PAPER.step
+        choices = itertools.product(*[(math.floor(steps), math.ceil(steps)) for steps in exact])
+        every = list(rounding.every(plan))
+        assert min(each.ticks for each in every) <= rounded.ticks
+        nearest_first = sorted(choices, key=lambda steps: np.abs(steps - exact).sum())
+        assert [each.steps[:-1] for each in every] == nearest_first
+
+
+def test_goals_that_one_posture_hits_are_merged_in_every_way():
+    task = small_task(goals=((2.6, 1.0), (2.65, 1.05), (2.6, 1.1)), initial_hands="RRR")
+    instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
+    problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
+    plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
+    rounding = Rounding(Session(task, 0, ()), problem, instance)
+    plans = dict(rounding.plans(plan, task, lambda ticks: True))
+    assert list(plans) == [(), (1,), (2,), (1, 2)]
+    for merged, merger in plans.items():
+        np.testing.assert_allclose(merger.lengths(task.q0)[list(merged)], 0.0, atol=1e-9)
+
+
+def test_joints_and_rates_that_are_held():
+    """Base, one joint of the left arm, two of the right one; held before or after a goal."""
+    task = small_task(locked_base=("y",))
+    problem = trajectory_problem(task.robot, task.hands, 2, "acceleration")
+    free, still = (Instance.of(task, ("right", "left"), still=s, radius=0.1) for s in (False, True))
+    assert free.held.tolist() == [[False, True, False, False, False]] * 2
+    assert still.held.tolist() == [
+        [False, True, True, False, False], [False, True, False, True, True],
+    ]  # fmt: skip
+    rest, passing = [0.0] * 5, [np.inf, 0.0, np.inf, np.inf, np.inf]
+    assert problem.rate_bound(free, None).tolist() == [*rest, *passing, *rest]
+    assert problem.rate_bound(still, None).tolist() == [*rest, np.inf, *rest[1:], *rest]
+    alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
+    assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

@@ -21,7 +21,7 @@ def test_hands_as_text_and_as_numbers():
     both = session.trials(hands, targets), session.trials(codes, targets)
     for one, other in zip(*both, strict=True):
         np.testing.assert_array_equal(one, other)
-    for wrong in (codes[:5], codes[:, :3], codes + 1, hands[:5], "LLL"):
+    for wrong in (codes[:5], codes[:, :3], codes + 1, codes - 1, hands[:5], "LLL"):
         with pytest.raises(ValueError, match="hand"):
             session.trials(wrong, targets)
 

@@ -91,8 +91,9 @@ def test_trials_counted_kept_and_made_again(method, name):
     assert again.reward == max(completed)
     assert session.rewards.index(again.reward) == result.details["best_trial"]
     assert -sum(completed) == session.meter.movement_ticks  # none failed
-    limited, _ = solve(method, task, budget=23, trials=301)
-    assert limited.meter.trials == 23
+    for budget, trials in ((23, 301), (301, 23)):
+        limited, _ = solve(method, task, budget=budget, trials=trials)
+        assert limited.meter.trials == 23
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
@@ -249,9 +250,9 @@ def test_failed_trials_rank_last():
         failed.append(practice.failed.mean())
     assert -26.0 < strategy.reward <= -25.0
     assert 0.0 < np.mean(failed) < 0.7
-    while practice.sizes[-1] < 28:  # it begins anew with twice as many
+    for _ in range(400):
         strategy.generation()
-    assert [*dict.fromkeys(practice.sizes)] == [7, 14, 28]
+    assert [*dict.fromkeys(practice.sizes)][:3] == [7, 14, 28]  # it begins anew with twice as many
 
 
 def test_guesses_fill_the_box():
