@@ -130,8 +130,22 @@ def test_drawn_tests_count_what_was_seen():
     assert context.beyond_p(near, far, rng(), resamples=19) == 1.0
     assert math.isnan(context.beyond_p((far[0][:1], far[1]), near, rng()))
     assert context.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
-    assert context.dependence_below(*far, 1.0, rng(), resamples=9) == 1.0
     assert math.isnan(context.dependence_below(near[0][:1], near[1], 1.0, rng()))
+
+
+def test_dependence_below_a_bound_by_brute_force():
+    """Every bootstrap sample of three runs and of two, counted one by one."""
+    first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
+    reached = [
+        distance_of_means(a, b) >= 2.0 * math.sqrt((((a - a.mean(0)) ** 2).sum()
+                                                    + ((b - b.mean(0)) ** 2).sum()) / 3)
+        for a in itertools.product(first, repeat=3)
+        for b in itertools.product(second, repeat=2)
+        for a, b in [(np.array(a), np.array(b))]
+    ]  # fmt: skip
+    p = context.dependence_below(first, second, 2.0, rng())
+    assert 0.1 < p < 0.9
+    assert p == pytest.approx(np.mean(reached), abs=0.02)
 
 
 def test_slopes_count_where_they_exceed_the_placebos():
@@ -268,6 +282,29 @@ def test_isolated_reaches_are_the_corrective_process():
     assert subtasks.isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert subtasks.isolated_reach(unreachable, unreachable.q0, 3, "right") is None
+    stays = SimpleNamespace(configurations=np.tile(unreachable.q0, (3, 1)))
+    path = SimpleNamespace(task=unreachable, hands=("right",) * 3, execution=stays)
+    assert subtasks.ticks_slower(path)[2] == math.inf
+
+
+def test_what_a_posture_serves():
+    """The corrective process itself gains nothing; half the way ahead, half the way is left."""
+    task = as_released("two-armed-2")
+    initial = trajectory(task, corrective_trial(task, "RRRR").movements)
+    assert subtasks.served(initial) == pytest.approx(np.zeros((3, 2)))
+    alone = initial.execution.configurations
+    q = alone.copy()
+    q[:-1] += 0.5 * np.diff(alone, axis=0)
+    ticks = np.add(initial.execution.ticks_by_goal(), [7, 0, 0, 0])
+    execution = SimpleNamespace(configurations=q, ticks_by_goal=lambda: ticks)
+    path = SimpleNamespace(task=task, hands=initial.hands, execution=execution)
+    left = subtasks.isolated_reach(task, q[0], 2, "right")[0]
+    gain = subtasks.isolated_reach(task, alone[0], 2, "right")[0] - left
+    assert gain > 0.4 * left
+    assert subtasks.served(path)[0] == pytest.approx([7, gain])
+    # What the other arm does is not the chosen one's.
+    q[0, task.robot.joints("left")] += 0.3
+    assert subtasks.served(path)[0, 1] == gain
 
 
 def test_other_hands_are_no_sacrifice():
@@ -519,9 +556,10 @@ def test_frame_of_a_family():
         assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
         assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
     assert slopes.value[1, "right", "base_y"] > 0.001
-    assert (
-        slopes["where"][3, "right", "base_y"] == "goal 3, carry-over of goal 2, right hand, base_y"
-    )
+    assert slopes["where"].xs("base_y", level="joint").tolist() == [
+        "goal 1, anticipatory of goal 2, right hand, base_y",
+        "goal 3, carry-over of goal 2, right hand, base_y",
+    ]
     assert frame[frame.signature == "context distance"].why_not.str.contains("locus slopes").all()
     steepest = tables.slopes(study_with(*cells))
     assert steepest.kind.tolist() == ["anticipatory", "carry-over"]
