@@ -12,14 +12,15 @@ import pytest
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context, subtasks
-from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.between import NOWHERE, TwoContexts
 from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.topics.coarticulation import placebo, sentences, tables
+from coartic.analysis.statistics.estimates import wilson
+from coartic.analysis.topics.coarticulation import placebo, sentences, tables, values
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -171,7 +172,8 @@ def test_pairs_of_contexts():
     assert context_pairs(tasks) == [("ascending", "descending", 1)]
     moved = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
     other = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.5]], initial_hands="RRR")
-    assert context_pairs({"a": moved, "b": other, "c": moved}) == [
+    apart = tiny_task(goals=[[5.0, 1.5], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
+    assert context_pairs({"a": moved, "b": other, "c": moved, "d": apart}) == [
         ("a", "b", 2),
         ("b", "c", 2),
     ]
@@ -345,6 +347,8 @@ def test_choice_in_isolation():
     agrees = REGISTER["hand as in isolation"].measure(Trajectories(task, "", "", tuple(paths)))
     assert agrees[:, 0].tolist() == [True, False]
     assert agrees[0, 1]
+    shares = values.over_runs(REGISTER["hand as in isolation"], np.arange(10) < 7, NOWHERE)
+    assert (shares.estimate, shares.n) == (wilson(7, 10), 10)
     assert SIGNS["hand"].of_run(np.array([[0.0, 1.0, 1.0]])) == 0.5  # not of the last goal
     assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
 
@@ -531,8 +535,16 @@ def test_frame_of_two_contexts():
     ]
     # A row has a value, or says why it has none.
     assert (frame.value.notna() | (frame.why_not != "")).all()
-    p_holm = tables.contexts(study_with(*cells)).p_holm[f"ascending {EC1} goal 1 right"]
-    assert p_holm == one(EC1, "context dependence").p
+    shown = tables.contexts(study_with(*cells)).loc[f"ascending {EC1} goal 1 right"]
+    assert shown.p_holm == one(EC1, "context dependence").p
+    for column, signature in (
+        ("distance", "context distance"),
+        ("dependence", "context dependence"),
+        ("equivalent", "motor-equivalent part"),
+        ("other", "non-motor-equivalent part"),
+        ("lead", "lead time"),
+    ):
+        assert shown[column] == one(EC1, signature).value
 
 
 def test_frame_of_a_family():
@@ -606,6 +618,28 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
         assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
 
 
+@pytest.mark.parametrize("apart", [0.0, 0.5])
+def test_a_method_that_draws_nothing_needs_no_test(apart):
+    """One run a context, and no placebo."""
+    cells = [
+        posed(load_task(name), "trajectory-optimisation/jerk", [posture(x)])
+        for name, x in (("ascending", 0.0), ("descending", apart))
+    ]
+    study = study_with(*cells)
+    study.runs["trials"] = 0
+    found = placebo.difference(study)
+    assert (found.selects, found.differ, found.seen) == (False, apart > 0, apart > 0)
+
+
+def test_p_values_are_corrected_over_the_contexts_of_a_method():
+    rows = [
+        (name, {"method": name[0], "p_holm": p})
+        for name, p in (("a1", 0.01), ("b1", 0.04), ("a2", 0.03))
+    ]
+    adjusted = {name: row["p_holm"] for name, row in tables.adjust_p(rows)}
+    assert adjusted == pytest.approx({"a1": 0.02, "b1": 0.04, "a2": 0.03})
+
+
 def test_slopes_beside_the_placebo():
     """The learner follows a moved goal by 0.9 of its way, the placebo by 0.2."""
     tasks, cells = family_of([1.5, 2.0, 2.5]), []
@@ -641,3 +675,6 @@ def test_signs_beside_the_placebo():
     assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
     assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
     assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))
+    shown = tables.signatures(study).loc[f"ascending {EC1}"]
+    assert (shown.first_p, shown["first"]) == (p, np.mean(slower[EC1]))
+    assert math.isnan(shown.preshaping_p)  # there is no other arm
