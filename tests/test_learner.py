@@ -306,7 +306,7 @@ def test_errors():
     both = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"})
     with pytest.raises(NotApplicableError, match="only the right hand, .* starts with LRLR"):
         learn(both, "EC1", seed=0)
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="trials is 0"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
         ("epsilon", 1.5), ("noise_sd", float("nan")), ("noise_sd", -1.0), ("noise_sd", 1e20),

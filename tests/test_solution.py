@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coartic import PAPER, CoarticError, Movement, execute
-from coartic.benchmarks.scoring import MOST_STEPS, execute_all
+from coartic.runs.run import MOST_STEPS, execute_all
 from tests.support.strategies import tiny_task
 
 
