@@ -183,6 +183,6 @@ def test_a_suite_has_variants_of_tasks_and_its_folder_can_be_checked(tmp_path):
         words = ("distinct-50", "distinct-100", "region-50-radius-2")
         assert names == {f"two-armed-1.{n}" for n in words}
         db.execute("UPDATE settings SET definition = replace(definition, '100.0', '200.0')")
-    wrong = checker.check_runs(folder).wrong
+    wrong = [words for words in checker.check_runs(folder).wrong if words.startswith("Run")]
     assert len(wrong) == 3  # those of one of three tasks
     assert all("reward is " in sentence for sentence in wrong)

@@ -19,11 +19,11 @@ from coartic import (
     load_task,
     move,
 )
-from coartic.benchmarks.scoring import MOST_STEPS, execute_all
 from coartic.errors import SolutionError
 from coartic.learner.conditions import load_condition
 from coartic.motion.movement import follow
 from coartic.motion.solution import execute_many, other_arm_travel
+from coartic.runs.run import MOST_STEPS, execute_all
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import tiny_task
