@@ -7,7 +7,6 @@ from fnmatch import fnmatch
 
 import numpy as np
 import pytest
-from coartic.analysis.topics.paper.rewards import beside_paper
 
 from coartic import (
     PAPER,
@@ -18,6 +17,7 @@ from coartic import (
     hand_sequences,
     load_task,
 )
+from coartic.analysis.topics.paper.rewards import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import Selection, perform, plan_suite
