@@ -199,16 +199,16 @@ class Study:
         self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
     ) -> Trajectories:
         cell, task = self.cells[key], self.tasks[key[0]]
-        of_runs = [movements[run_id] for run_id in _executed_of(cell) if run_id in movements]
+        ids = [run_id for run_id in _executed_of(cell) if run_id in movements]
         with explain_errors(self.folder):
             solutions = [
-                movements_from(task, rows, waypoints.get(rows.run_id.iloc[0])) for rows in of_runs
+                movements_from(task, movements[run_id], waypoints.get(run_id)) for run_id in ids
             ]
             executions = execute_all(task, solutions, self.model)
-            for rows, execution in zip(of_runs, executions, strict=True):
+            for run_id, execution in zip(ids, executions, strict=True):
                 done = execution.ticks if isinstance(execution, Execution) else None
-                if done != rows.ticks.sum():
-                    raise ValueError(f"run {rows.run_id.iloc[0]} does not do what is stored of it")
+                if done != movements[run_id].ticks.sum():
+                    raise ValueError(f"run {run_id} does not do what is stored of it")
             runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
         return Trajectories(task, cell.method, cell.variant, runs, self.model)
 

@@ -22,7 +22,7 @@ from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
 from coartic.runs import store as store_module
 from coartic.runs.run import Score
-from coartic.runs.store import FORMAT, RUNS_FILE, Store, open_store, writing
+from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
 from tests.support.strategies import tiny_task
 from tests.support.suites import (
     KNOWN,
@@ -359,6 +359,7 @@ def bomb(count):
         "suite SET readings = '[\"whole-last-step=yes\"]'",
         "cells SET runs = -1",
         "cells SET parameters = '[]'",
+        "cells SET variant = 'x'",
         "settings SET model = '{}'",
         "movements SET left_1 = 'x'",
         "movements SET left_1 = 9e999",
@@ -380,6 +381,15 @@ def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_folder_that_only_its_owner_can_put_right(tmp_path):
+    """An interrupted transaction, and no right to write."""
+    with (
+        pytest.raises(CoarticError, match=r"runs.sqlite was left .* Copy"),
+        explain_errors(tmp_path),
+    ):
+        raise sqlite3.OperationalError("attempt to write a readonly database")
 
 
 def test_a_run_of_absurd_constants_is_refused(undisturbed, tmp_path):

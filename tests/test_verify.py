@@ -179,6 +179,10 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
             "Cell 5: it has other param",
             "UPDATE cells SET setting = 4 WHERE setting = 6",
         ),
+        (
+            "Two cells show",
+            "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
+        ),
         ("Cell 0: its method has other code", "UPDATE methods SET code = 'newer'"),
         ("Tables or views are not", "CREATE VIEW mine AS SELECT 1"),
         (

@@ -239,7 +239,7 @@ class Store:
         }
         rows = self._db.execute(
             "SELECT task, method, cells.parameters, settings.parameters AS complete, runs, "
-            "setting, definition, model FROM cells JOIN settings ON settings.id = setting "
+            "variant, setting, definition, model FROM cells JOIN settings ON settings.id = setting "
             "ORDER BY position"
         ).fetchall()
         asked = [_Cell.model_validate(dict(each)) for each in rows]
@@ -251,7 +251,9 @@ class Store:
                 for c in asked
             ),
         )
-        for each, setting in zip(rows, plan.settings, strict=True):
+        for each, cell, setting in zip(rows, plan.cells, plan.settings, strict=True):
+            if each["variant"] != cell.variant:
+                raise ValueError(f"variant {each['variant']!r} is not that of its parameters")
             if json.loads(each["definition"]) != setting.definition:
                 raise ValueError(f"task {setting.task.name} is not the one of its runs")
             if stored_model(json.loads(each["model"])) != plan.model:
