@@ -16,6 +16,7 @@ import contextlib
 import json
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -39,6 +40,7 @@ from coartic.benchmarks.worker import (
     prepare,
 )
 from coartic.errors import CoarticError
+from coartic.interruption import at_end
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
 from coartic.threads import begin_worker, end_group, one_thread_each, threads_for, undisturbed
@@ -96,7 +98,17 @@ class Local:
         of_jobs = [(job.setting.task, learns(job.setting.method)) for _, job in jobs]
         tasks = list({(task.robot, learned): (task, learned) for task, learned in of_jobs}.values())
         waiting, crew, lost = deque(jobs), list[Worker](), 0
-        with tempfile.TemporaryDirectory(prefix="coartic-") as folder, one_thread_each():
+
+        def clear() -> None:
+            for worker in crew:
+                worker.end()
+            shutil.rmtree(folder, ignore_errors=True)
+
+        with (
+            tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True) as folder,
+            one_thread_each(),
+            at_end(clear),
+        ):
             try:
                 while waiting or crew:
                     while waiting and len(crew) < workers:
