@@ -29,6 +29,7 @@ from coartic.method import (
     Result,
     Session,
     UndeclaredError,
+    outline_of,
 )
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
@@ -189,7 +190,7 @@ _seen: set[str] = set()
 def solve(job: Job, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
     """What the method returns in each session."""
     method = job.method.configure(job.setting.parameters)
-    reason_not = method.why_not(job.setting.task)
+    reason_not = method.why_not(outline_of(job.setting.task))
     if reason_not is not None:
         raise MethodError("infeasible", str(reason_not))
     if len(sessions) == 1:

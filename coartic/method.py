@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -27,7 +27,7 @@ from coartic.motion.initial import search_initial_hands
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.motion.trials import HandSequences, Trials, hand_codes, make_trials
 from coartic.robot import Array, Hand
-from coartic.tasks.task import Task
+from coartic.tasks.task import INITIAL_POLICIES, Task
 
 
 class Information(StrEnum):
@@ -158,6 +158,29 @@ class Result:
     """Of a learner: one greedy trial, without noise, with what it has learned. No paths either."""
     bound: int | None = None
     """Reward that no solution exceeds, where proven; for searches of this project."""
+
+
+class Outline(NamedTuple):
+    """What a method is told of a task to say whether it applies."""
+
+    name: str
+    """Of the task, for the sentence."""
+    goals_count: int
+    dof: int
+    hands: tuple[Hand, ...]
+    """Hands the robot has."""
+    initial_hands: str
+    """Hand sequence, or policy, that the task names for a first solution."""
+
+    @property
+    def initial_is_policy(self) -> bool:
+        """Whether it is a policy."""
+        return self.initial_hands in INITIAL_POLICIES
+
+
+def outline_of(task: Task) -> Outline:
+    """The outline of a task."""
+    return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
 class TaskView:
@@ -517,7 +540,7 @@ class Method(ABC):
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """Why the method does not apply to a task, or None where it does."""
         return None
 

@@ -22,6 +22,7 @@ from coartic.method import (
     Information,
     Method,
     MethodError,
+    Outline,
     Parameters,
     Result,
     Session,
@@ -215,7 +216,9 @@ def objective(
     try.
     """
     chosen = as_task(task)
-    if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):
+    goals = len(chosen.goals)
+    reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
+    if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
     session = Session(chosen, 0, TOLD, model=model)
     return Objective(session, hands, half_width=half_width)
@@ -240,9 +243,11 @@ class Optimiser(Method):
     told = TOLD
     Parameters = OptimiserParameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        return None if self.parameters.hands else too_many_sequences(task, len(task.hands))
+        if self.parameters.hands:
+            return None
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""
