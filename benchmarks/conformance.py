@@ -170,7 +170,10 @@ def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
     problems = [
         f"on {task}: {run.reason}"
         for task, run in runs.items()
-        if any(words in run.reason for words in ("does not declare", "own compiled"))
+        if any(
+            words in run.reason
+            for words in ("does not declare", "own compiled", "outside its session")
+        )
     ]
     if declared - used:
         problems.append(f"declared but never used: {', '.join(sorted(declared - used))}")

@@ -219,7 +219,8 @@ class Worker:
     def last_words(self) -> str:
         """The last lines that it has printed."""
         lines = self._printed.decode(errors="replace").strip().splitlines()
-        return plain("\n".join(lines[-_LAST_WORDS:]), 1000) or "it left no message"
+        last = "\n".join(line[:300] for line in lines[-_LAST_WORDS:])
+        return plain(last, 1000) or "it left no message"
 
     def give(self, waiting: deque[Numbered]) -> None:
         """Hand it the next job; one that is large only if it has none."""

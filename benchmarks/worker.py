@@ -31,6 +31,7 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
+from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import SEARCH, RunKey, Setting
@@ -151,14 +152,19 @@ def perform_job(job: Job) -> list[Outcome]:
             model=setting.model,
             trial_budget=setting.trial_budget,
             trusted=job.method.is_ours,
+            of_run=True,
         )
         for key in job.keys
     ]
     warm = setting.method in _seen
     _seen.add(setting.method)
-    wall, cpu = time.perf_counter(), time.process_time()
+    wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
         results = solve(job, sessions)
+        made = trials_outside() - made
+        if made and not job.method.is_ours:
+            words = f"the method made {made} trials outside its session, which are not counted"
+            raise UndeclaredError(f"{words}: by coartic.objective, learn or execute")
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu

@@ -31,6 +31,7 @@ from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
 from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
+from coartic.motion.outside import note_trials
 from coartic.motion.problem import problem_of
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
@@ -155,6 +156,7 @@ def learn_many(
     check_model(model, radius=task.radius)
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     ordered: Sequence[int] = list(seeds)
+    note_trials(trials * len(ordered))
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
     batches = [ordered[first : first + together] for first in range(0, len(ordered), together)]
