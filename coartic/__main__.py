@@ -5,8 +5,8 @@ from coartic.interruption import Interrupted, catch_signals, end_interrupted, ig
 
 def main() -> None:
     """Run a command, which may be interrupted from now on."""
-    catch_signals()
     try:
+        catch_signals()
         from coartic.cli import main as run_command
 
         run_command()
