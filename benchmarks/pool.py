@@ -101,7 +101,7 @@ class Local:
 
         def clear() -> None:
             for worker in crew:
-                worker.end()
+                worker.kill()
             shutil.rmtree(folder, ignore_errors=True)
 
         with (
@@ -280,10 +280,15 @@ class Worker:
                 break
         return read
 
-    def end(self) -> None:
+    def kill(self) -> None:
         """End it, with the processes that it has started."""
         if self._process.pid is not None:
             end_group(self._process.pid)
+
+    def end(self) -> None:
+        """The same, and give back what it took."""
+        self.kill()
+        if self._process.pid is not None:
             self._process.join(_POLL_S)
         for end in (self._orders, self._answers, self._prints):
             end.close()

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 from coartic.threads import ENDING
 
-GRACE_S = 3.0
+GRACE_S = 2.0
 """Time to put things in order."""
 _LATER_S = 0.02
 _sentences: list[Callable[[], str]] = []
