@@ -206,11 +206,11 @@ def test_what_is_killed_costs_its_runs_alone(tmp_path, whom, most):
     task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", body)])
     cells = [Cell(task, replace(does, stochastic=True))]
     run_and_write(tmp_path / "before", cells, executor=Local(1), runs=1)  # the server is there
-    killed = []
+    killed, there = [], {*Path("/proc").glob("[0-9]*")} if whom != "server" else set()
 
     def kill():
         while not killed:
-            for place in Path("/proc").glob("[0-9]*"):
+            for place in {*Path("/proc").glob("[0-9]*")} - there:
                 with contextlib.suppress(OSError, ValueError):
                     parent, grandparent = ancestors(place)[:2]
                     kind = "server" if parent == os.getpid() else "beginner"
