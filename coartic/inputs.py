@@ -108,7 +108,8 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     an ``int``, no whole one."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
-    if not isinstance(value, kind) or isinstance(value, bool) or not least <= value <= most:
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    if not is_number or not least <= float(value) <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{'_' if isinstance(most, int) else 'g'}}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
 import threading
 from collections.abc import Iterator
@@ -53,16 +54,67 @@ def one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def begin_worker() -> None:
+def begin_worker(folder: str | None = None) -> None:
     """Leave Ctrl-C to the parent, and end this process, whatever it does, when the parent has
-    ended. The server that it was forked from lives as long as any worker."""
+    ended. The server that it was forked from lives as long as any worker.
+
+    With ``folder``, the process leads a group of its own: the group ends with it, and the folder
+    with the group.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    if hasattr(signal, "pthread_sigmask"):  # see undisturbed
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+    if folder is not None and hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
+    threading.Thread(target=end_with_parent, args=(folder,), daemon=True).start()
 
 
-def end_with_parent() -> None:
+def end_with_parent(folder: str | None) -> None:
     """Wait for the end of the process that this one works for."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+            end_group(os.getpid())
         os._exit(1)
+
+
+def end_group(pid: int) -> None:
+    """End a worker that leads a group, and all processes in it."""
+    with contextlib.suppress(OSError):
+        if hasattr(os, "killpg"):
+            os.killpg(pid, signal.SIGKILL)
+        else:
+            os.kill(pid, signal.SIGTERM)
+
+
+ENDING = {
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+}
+"""Signals by which people and systems end a program."""
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Signals that this process handles wait until the block is done; so do those of a process
+    that begins meanwhile, for good."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handled = {number: signal.getsignal(number) for number in ENDING}
+    handled = {number: handler for number, handler in handled.items() if callable(handler)}
+    can_block = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, handled) if can_block else None
+    for number in handled:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in handled.items():
+            signal.signal(number, handler)
+        if before is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if came:
+            signal.raise_signal(came[0])

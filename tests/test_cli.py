@@ -1,6 +1,7 @@
 """The command line as a user meets it."""
 
 import os
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -127,6 +128,73 @@ def test_reproduce(coartic, tmp_path):
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
     assert "is not a run id" in error
+
+
+INTERRUPTED = """
+import os, signal, subprocess, sys, threading, time
+from pathlib import Path
+from coartic import interruption
+from coartic.__main__ import main
+
+moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+sys.argv[1:] = sys.argv[4:]
+
+def interrupt(*_):
+    for _ in range(times):
+        os.kill(os.getpid(), number)
+        time.sleep(0.05)
+
+if moment.isdigit():  # milliseconds after it has begun to look for signals
+    threading.Timer(int(moment) / 1000, interrupt).start()
+elif moment == "callback":  # where compiled code has called Python, which cannot raise
+    import ctypes
+    call = ctypes.CFUNCTYPE(None)(interrupt)
+    run = interruption.catch_signals
+    interruption.catch_signals = lambda: (run(), call(), time.sleep(9))
+    import coartic.__main__
+    coartic.__main__.catch_signals = interruption.catch_signals
+elif moment == "stuck":  # where nothing can be raised at all
+    interruption.GRACE_S = 0.5
+    import coartic.cli
+    def stay():
+        threading.Timer(0.1, interrupt).start()
+        while True:
+            try:
+                time.sleep(9)
+            except BaseException:
+                pass
+    coartic.cli.main = stay
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(
+    ("moment", "name", "times"),
+    [
+        *((str(ms), "SIGINT", times) for ms in (1, 300, 1500) for times in (1, 2, 3)),
+        ("800", "SIGTERM", 1),
+        ("2500", "SIGTERM", 2),
+        ("1800", "SIGHUP", 1),
+        ("callback", "SIGINT", 1),
+        ("stuck", "SIGINT", 3),
+        ("stuck", "SIGTERM", 1),
+    ],
+)
+def test_an_interrupted_command_ends_with_a_sentence(tmp_path, moment, name, times):
+    """Of a suite that would take minutes, whatever it is doing."""
+    (tmp_path / "temporary").mkdir()
+    number = getattr(signal, name)
+    command = ("run", "paper", "--runs", "500", "--trials", "30000", "--jobs", "2", "--out", "out")
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, moment, str(int(number)), str(times), *command],
+        capture_output=True, text=True, check=False, cwd=tmp_path, start_new_session=True,
+        env=os.environ | {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == (130 if name == "SIGINT" else 143), done.stderr
+    assert done.stderr.count("Interrupted.") == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert not list((tmp_path / "temporary").iterdir())
 
 
 def test_list(coartic):

@@ -245,7 +245,8 @@ def both_vectors(mode):
     model = MotionModel(max_iterations=150)
     ours = gymnasium.make_vec(TWO, num_envs=5, autoreset_mode=mode, model=model)
     theirs = gymnasium.make_vec(
-        TWO, num_envs=5, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, model=model
+        TWO, num_envs=5, model=model,
+        vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode},
     )  # fmt: skip
     return ours, theirs
 
@@ -292,7 +293,8 @@ def test_what_a_reset_of_the_vector_takes():
     assert info["_hands"].tolist() == [True, False, True]
     first, second, third = vector.render()
     assert first.shape == (400, 600, 3)
-    assert (first == third).all() and (first != second).any()
+    assert (first == third).all()
+    assert (first != second).any()
     with pytest.raises(ValueError, match="2 seeds for 3 environments"):
         vector.reset(seed=[1, 2])
     with pytest.raises(gymnasium.error.Error, match="[Ss]eed"):

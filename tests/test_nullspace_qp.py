@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from coartic import PAPER, Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade, state_cascade
 from coartic.baselines.nullspace_qp import FACES, METHODS, Aim, Controller, NextGoal, NullspaceQP
-from coartic.method import MethodError, Session
+from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
 from tests.support.strategies import tiny_task
 
@@ -184,10 +184,10 @@ def test_the_other_hand_goes_where_the_nearest_cannot():
 
 def test_tasks_that_do_not_suit_are_refused():
     (preshaping,) = (method for method in METHODS if method.name.endswith("preshaping"))
-    right = tiny_task().model_copy(update={"hands": ("right",)})
+    right = outline_of(tiny_task().model_copy(update={"hands": ("right",)}))
     assert NextGoal().why_not(right) is None
     assert "no other arm" in preshaping().why_not(right)
-    many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
+    many = outline_of(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
     assert "hand sequences" in NextGoal().why_not(many)
     assert NextGoal(NextGoal.Parameters(hands="nearest")).why_not(many) is None
 

@@ -10,7 +10,7 @@ from coartic import (
     execute,
     load_task,
 )
-from coartic.benchmarks.scoring import MOST_STEPS, execute_all
+from coartic.runs.run import MOST_STEPS, execute_all
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task
