@@ -273,7 +273,7 @@ def test_docstrings_say_what_goes_in_and_what_comes_out(name):
     ("wrong", "error", "words"),
     [
         *(({"seeds": [v]}, ValueError, "seed is") for v in (-1, 1.5, "1", None, True, [1], 2**128)),
-        *(({"seeds": v}, TypeError, "seeds is .*; it must be a list") for v in ("1", b"1", 3, None)),
+        *(({"seeds": v}, TypeError, "seeds is .*; it must be") for v in ("1", b"1", 3, None)),
         *(({"trials": v}, ValueError, "trials is") for v in (0, 1.5, "5", None, True, 10**12)),
         *(({"jobs": v}, ValueError, "jobs is") for v in (0, -2, 1.5, -1.0, "2", None, True, 10**9)),
         *(({"model": v}, TypeError, "must be a MotionModel") for v in (None, "PAPER", {})),

@@ -10,8 +10,8 @@ from coartic import (
     execute,
     load_task,
 )
-from coartic.runs.run import MOST_STEPS, execute_all
 from coartic.motion.solution import other_arm_travel
+from coartic.runs.run import MOST_STEPS, execute_all
 from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task
 
