@@ -49,6 +49,7 @@ LIMITS = {  # iterations of the corrective process, spread of the targets
     "uneven": (120, 4.0),
     "penalty": (300, 0.3),
 }
+SCALE = 32.0  # of actions: no target is outside of the box
 NONE_FAILS = ("two-armed-2", "penalty")
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 
@@ -162,7 +163,7 @@ def by_objective(task, model, cases, many=False):
 
 def by_environment(task, model, cases):
     gym = pytest.importorskip("coartic.gym")
-    env = gym.TaskEnv(task, model=model, scale=0.7)
+    env = gym.TaskEnv(task, model=model, scale=SCALE)
     for number, case in enumerate(cases):
         if number % 2 and len(task.hands) == 1:  # the other arm moves
             yield None
@@ -187,7 +188,7 @@ def by_vector_environment(task, model, cases):
     gym = pytest.importorskip("coartic.gym")
     goals, count = len(task.goals), len(cases)
     around = task.q0 + np.random.default_rng(0).normal(0, 0.1, (goals, task.robot.dof))
-    envs = gym.TaskVectorEnv(count, task, around=around, scale=0.7, model=model)
+    envs = gym.TaskVectorEnv(count, task, around=around, scale=SCALE, model=model)
     envs.reset()
     arms, total, found = envs.arms, np.zeros(count), [None] * count
     for goal in range(goals):
@@ -197,7 +198,7 @@ def by_vector_environment(task, model, cases):
             if len(task.hands) == 2:
                 actions[n, 0] = {"left": -1, "right": 1}[movement.hand]
             if movement.target is not None:
-                away = (movement.target - around[goal])[arms.free] / 0.7
+                away = (movement.target - around[goal])[arms.free] / SCALE
                 actions[n, -len(arms.free) :] = away
         _, rewards, ended, _, infos = envs.step(actions)
         total += rewards

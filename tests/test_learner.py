@@ -285,7 +285,7 @@ def test_errors():
         learn(load_task("ascending"), "EC5", seed=0)
     with pytest.raises(NotApplicableError, match="has no left hand"):
         learn(load_task("ascending"), "EC3", seed=0)
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="trials is 0"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
         ("epsilon", 1.5), ("noise_sd", float("nan")), ("noise_sd", -1.0), ("noise_sd", 1e20),

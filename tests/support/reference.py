@@ -66,7 +66,9 @@ def move(
         radius=radius,
     )
     kind = "path" if len(waypoints) else "corrective"
-    movement = verify.MoveRow(0, 1, hand, kind, 0, np.array(target), list(waypoints))
+    movement = verify.MoveRow(
+        0, 1, hand, kind, verify.MOST_TICKS, np.array(target), list(waypoints)
+    )
     end, ticks, hit = verify.make(rules, np.array(q, dtype=np.float64), movement)
     return MoveResult(end, ticks, hit, ticks + 1)
 
