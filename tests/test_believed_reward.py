@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coartic import CONDITIONS, Movement, execute, learn_many, load_task
-from coartic.baselines.believed_reward import METHODS, BelievedReward, cheapest
+from coartic.baselines.believed_reward import METHODS, BelievedReward, cheapest, with_belief
 from coartic.baselines.cma_es import Bandit
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.errors import SolutionError
@@ -15,7 +15,8 @@ from coartic.method import Information, Session
 from coartic.motion.penalty import penalties
 from coartic.robot import Robot
 from tests.support import reference
-from tests.support.strategies import tiny_task
+from tests.support.strategies import solve, tiny_task
+from tests.test_learner import assert_equals_reference
 from tests.test_penalty import TERMS, with_penalty
 
 SMALL = tiny_task(
@@ -48,6 +49,17 @@ def test_who_is_told_the_truth_plans_best(terms):
         assert execute(task, searched.solution).reward <= rewards[2] + 3
 
 
+def test_a_belief_is_a_share_of_each_term():
+    task = with_penalty(SMALL, **TERMS["all"])
+    half = {"joints": 15.0, "region": 20.0, "distinct": 25.0}
+    believed = with_belief(task, 0.5)
+    assert believed.penalty == task.penalty.model_copy(update=half)
+    assert with_belief(task, 0.0) == SMALL
+    result, execution, _ = solve(BelievedReward, task, belief=0.5, **QUICK)
+    assert result.details["believed_reward"] == execute(believed, result.solution).reward
+    assert result.details["believed_reward"] > execution.reward
+
+
 def test_who_is_told_that_ticks_count_plans_as_without_a_penalty():
     for terms in TERMS:
         believer = plan_of(terms, 0.0)
@@ -61,10 +73,14 @@ def test_programmes_and_graphs_count_the_penalty_as_the_score_does(terms):
     search = BelievedReward.Parameters(**QUICK)
     plans = cheapest(Session(task, 0, BelievedReward.told, trusted=True), task, search, [])
     seen = [(plan.cost, i.hands, plan.configurations) for i, plan in plans.ranked]
-    graph = PostureGraph.sample(task, 30, np.random.default_rng(0), penalty=task.penalty)
-    seen += [(each.cost.min(), *graph.chain_of(each)) for each in graph.sequences(None, None)]
-    assert len(seen) > 5
-    for cost, hands, configurations in seen:
+    seen = [(task, *each) for each in seen]
+    for of_graph in (task, with_penalty("two-armed-2", **TERMS[terms])):
+        penalty, rng = of_graph.penalty, np.random.default_rng(0)
+        graph = PostureGraph.sample(of_graph, 30, rng, penalty=penalty)
+        for each in graph.sequences(None, None):
+            seen.append((of_graph, each.cost.min(), *graph.chain_of(each)))
+    assert len(seen) > 20
+    for task, cost, hands, configurations in seen:
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
         length = np.sqrt((steps**2).sum(axis=1)).sum()
         lost = penalties(task, [hands], configurations[None]).sum()
@@ -101,14 +117,8 @@ def test_the_learner_from_a_plan_equals_the_slow_one(away):
             zip(["right", "left", "right", "right"], hits.configurations, strict=True), 1
         )
     ]
-    (fast,) = learn_many(task, condition, seeds=[3], trials=5, start=start)
-    slow = reference.learn(task, condition, seed=3, trials=5, start=start)
-    np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
-    assert fast.first_hands == "RLRR"
-    assert fast.counters.movement_ticks == slow.movement_ticks
-    for goal, before, chosen in np.ndindex(fast.values.shape):
-        pair = ((goal, (*("left", "right"), None)[before]), ("left", "right")[chosen])
-        assert fast.values[goal, before, chosen] == slow.values.get(pair, -np.inf)
+    assert_equals_reference(task, condition, trials=5, seed=3, start=start)
+    assert learn_many(task, condition, seeds=[3], trials=1, start=start)[0].first_hands == "RLRR"
 
 
 def test_a_plan_that_breaks_the_rules_is_refused():

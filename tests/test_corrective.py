@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coartic import PAPER, MotionModel, Robot, correct
+from coartic import PAPER, MotionModel, Robot, correct, execute, load_task
+from coartic.baselines.corrective_alone import EverySequence
+from coartic.method import Session
 from coartic.motion.compiled import entry, joint_chain, joint_lever
 from coartic.motion.movement import Goal, largest_square
 from coartic.robot import HANDS
 from tests.support import reference
-from tests.support.strategies import UNEVEN, configurations
+from tests.support.strategies import TIED, UNEVEN, configurations
 
 ROBOT = Robot()
 
@@ -82,6 +84,20 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     )  # fmt: skip
     assert fast.iterations == iterations
     np.testing.assert_array_equal(fast.q, slow)
+
+
+@pytest.mark.parametrize(
+    ("task", "budget", "hands", "trials"),
+    [
+        (load_task("two-armed-1"), None, "LRLR", 16),
+        (load_task("two-armed-1"), 3, "LLLR", 3),  # -760, -672, -715
+        (TIED, None, "RRL", 8),
+    ],
+)
+def test_every_hand_sequence_alone(task, budget, hands, trials):
+    session = Session(task, 0, EverySequence.told, trial_budget=budget)
+    assert execute(task, EverySequence().solve(session).solution).hands == hands
+    assert session.meter.trials == trials
 
 
 def test_stationary_point_ends_the_descent():

@@ -31,12 +31,7 @@ from tests.support.strategies import PAPER_CELLS, sample, tiny_task, uneven_task
 
 PENALTY = {"joints": 30.0, "region": 40.0, "distinct": 50.0}
 TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
-    "uneven": uneven_task(
-        [1.0],
-        [0.5, -0.5, 0.2, 1.0],
-        goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
-        initial_hands="RLR",
-    ),
+    "uneven": uneven_task(),
     "penalty": parse_task(
         load_task("two-armed-1").model_dump(mode="json") | {"penalty": PENALTY}, "test"
     ),
@@ -320,6 +315,7 @@ OTHERS = [
     MotionModel(max_iterations=100),
     MotionModel(max_iterations=300, corrective_arrival=True, arrival_tolerance=0.09),
     MotionModel(max_iterations=300, whole_last_step=True),
+    MotionModel(max_iterations=300, first_step=True),
 ]
 
 
@@ -431,22 +427,20 @@ def test_corrective_process_alone(name, printed):
     assert sorted(rewards.values())[-2] < max(rewards.values())
 
 
-def test_rows_are_the_printed_points():
-    """q + k m (target - q)/distance, the last one short, then the next movement's start."""
-    task = tiny_task(goals=[[5.5, 0.1], [5.5, 0.1]])
-    target = np.array([1.005, *[0.0] * 9])
-    path = trajectory(task, [Movement(goal, "right", "planned", target) for goal in (1, 2)])
-    np.testing.assert_allclose(path.configurations[:, 0], [*np.arange(91) * 0.01, 0.9])
-    assert list(path.hits) == [90, 91]
+def test_rows_of_a_trajectory_by_hand():
+    """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
+    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
+    ahead = [Movement(n, "right", "planned", q_at(x)) for n, x in ((2, 0.06), (3, 0.08))]
+    path = trajectory(task, [Movement(1, "right", "corrective"), *ahead])
+    np.testing.assert_allclose(path.configurations[:, 0], np.array([0, 1, 2, 3, 3, 4, 5]) / 100)
     np.testing.assert_allclose(path.hand_path("right")[:, 0], path.configurations[:, 0] + 4.5)
-    assert [len(path.subtask(goal)) for goal in (1, 2)] == [91, 2]
-
-
-def test_goals_hit_at_the_start():
-    task = tiny_task(goals=[[4.5, 0.1], [5.5, 0.1]])
-    path = trajectory(task, [Movement(goal, "right", "corrective") for goal in (1, 2)])
-    assert path.hits[0] == 0
-    np.testing.assert_array_equal(path.configurations[0], task.q0)
+    assert path.hits.tolist() == [0, 3, 6]
+    assert [len(path.subtask(goal)) for goal in (1, 2, 3)] == [1, 4, 4]
     only = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
     idle = trajectory(only, [Movement(1, "right", "corrective")])
-    assert (idle.configurations.shape, list(idle.hits)) == ((0, 10), [0])
+    assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])
+
+
+def q_at(x):
+    """Arms straight along +x, the base at (x, 0)."""
+    return np.array([x, *[0.0] * 9])

@@ -41,6 +41,7 @@ def test_what_the_learner_sees_and_what_can_be_seen():
     plain, full = (gymnasium.make(TWO, observe=what) for what in ("learner", "posture"))
     seen, _ = plain.reset(seed=3)
     assert seen.tolist() == [1, 0, 0, 0, 0, 0]
+    assert not plain.observation_space.low.any()
     full.reset()
     left = np.full(plain.action_space.shape, -0.1)
     seen, _, _, _, info = plain.step(left)
@@ -58,10 +59,11 @@ def test_given_hands_leave_idle_arms_where_they_are():
     """As the objective does, whose points have no entries for them."""
     cost = coartic.objective("two-armed-1", "LRLR")
     env = gymnasium.make(TWO, hands="LRLR", around="LRLR").unwrapped
-    for away in (0.02, -0.03):
+    of_goal = np.argwhere(cost.joints)[:, 0]  # for each entry of a point
+    for away in (np.full(4, 0.02), np.array([-0.1, 0.1, 0.3, -0.3])):
         env.reset()
-        steps = [env.step(np.full(9, away)) for _ in range(4)]
-        assert sum(reward for _, reward, *_ in steps) == -cost(cost.x0 + away)
+        steps = [env.step(np.full(9, size)) for size in away]
+        assert sum(reward for _, reward, *_ in steps) == -cost(cost.x0 + away[of_goal])
         assert steps[-1][4]["hands"] == "LRLR"
     with pytest.raises(ValueError, match="do not fit"):
         gymnasium.make(TWO, hands="LR")
@@ -86,8 +88,9 @@ def test_the_action_of_no_target():
 def test_trials_that_fail_and_actions_that_are_none():
     env = gymnasium.make("coartic/Ascending-v0", model=MotionModel(max_iterations=2))
     env.reset()
-    _, reward, ended, _, info = env.step(np.zeros(6))
+    seen, reward, ended, _, info = env.step(np.zeros(6))
     assert (reward, ended, info["is_success"]) == (-FAILED, True, False)
+    assert seen.tolist() == [1, 0, 0, 0, 0]  # still at the first goal
     env.reset()
     with pytest.raises(ValueError, match="not finite"):
         env.step(np.array([np.nan, 0, 0, 0, 0, 0]))

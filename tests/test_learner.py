@@ -22,7 +22,9 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.learner.method import METHODS
 from coartic.method import Information, Session
+from coartic.motion.lanes import LANES
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
 from tests.support import reference
@@ -34,10 +36,13 @@ def _tenths(values):
     return [values[part == number] for number in range(10)]
 
 
-def assert_equals_reference(task, condition, trials, seed=11):
-    model = MotionModel(max_iterations=400)  # failures soon enough for the slow side
-    fast = learn(task, condition, seed=seed, trials=trials, model=model)
-    slow = reference.learn(task, condition, seed=seed, trials=trials, model=model)
+SOON_FAILED = MotionModel(max_iterations=400)  # soon enough for the slow side
+
+
+def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED, start=()):
+    options = {"trials": trials, "model": model, "start": start}
+    (fast,) = learn_many(task, condition, seeds=[seed], jobs=1, **options)
+    slow = reference.learn(task, condition, seed=seed, **options)
     np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
     counters = fast.counters
     assert counters.movement_ticks == slow.movement_ticks
@@ -89,12 +94,30 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition):
         assert bettered(slow) >= 5
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_variants_equal_the_slow_learner_trial_by_trial(variant):
-    task = load_task("ascending" if variant.startswith("EC1") else "two-armed-1")
-    slow = assert_equals_reference(task, VARIANTS[variant], trials=4)
-    assert slow.corrections > len(task.goals) or not VARIANTS[variant].corrects
-    assert slow.completed.all() == VARIANTS[variant].corrects
+CREDIT = [
+    {}, {"discount": 0.5}, {"discount": 1.0}, {"discount": 0.3, "first_trial": "forgotten"},
+    {"discount": 0.9, "state": "goal", "ties": "previous"},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("condition", "seed"),
+    [
+        *((condition, 11) for condition in VARIANTS.values()),
+        *((replace(VARIANTS["EC4-subtask"], noise_sd=0.03, **each), 162) for each in CREDIT),
+        # One hand is always the closest: it draws no number to break a tie with itself.
+        (ExplorationCondition("EC1-one", ("right",), True, False, "closest", epsilon=0.5), 11),
+    ],
+)
+def test_variants_equal_the_slow_learner_trial_by_trial(condition, seed):
+    task = load_task("ascending" if condition.id.startswith("EC1") else "two-armed-1")
+    slow = assert_equals_reference(task, condition, trials=5, seed=seed)
+    assert slow.corrections > len(task.goals) or not condition.corrects
+    assert slow.completed.all() == condition.corrects
+    if seed == 162:
+        assert bettered(slow) >= 2
+        slow = assert_equals_reference(failing_task(), replace(condition, epsilon=0.5), trials=12)
+        assert set(slow.completed) == {True, False}
 
 
 @pytest.mark.parametrize(
@@ -103,13 +126,7 @@ def test_variants_equal_the_slow_learner_trial_by_trial(variant):
 )
 def test_conditions_are_data(chosen, other, hands):
     """Every combination of the condition's fields, on an uneven robot on a rail."""
-    task = uneven_task(
-        [1.0],
-        [0.5, -0.5, 0.2, 1.0],
-        locked_base=["x"],
-        goals=[[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]],
-        initial_hands="RLR",
-    )
+    task = uneven_task(locked_base=["x"])
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
     slow = assert_equals_reference(task, condition, 8 if hands == "random" else 6, seed=0)
     assert slow.corrections > len(task.goals)
@@ -215,34 +232,27 @@ def test_what_a_policy_spends_is_counted():
     assert session.meter.movement_ticks > 16 * 532
     assert session.meter.corrections == 64
     assert session.meter.jacobians == session.meter.corrective_iterations > 0
+    failing = failing_task().model_copy(update={"initial_hands": "best-of-all"})
+    session = Session(failing, 0, told)
+    assert session.find_initial_hands() == "R"
+    assert (session.meter.trials, session.meter.failed_trials) == (2, 1)
     named = Session(load_task("two-armed-1"), 0, told)
     assert (named.find_initial_hands(), named.meter.trials) == ("RRRR", 0)
 
 
 @pytest.mark.parametrize(
-    "model",
+    ("name", "value"),
     [
-        MotionModel(step=0.0),
-        MotionModel(step=-0.01),
-        MotionModel(step=float("nan")),
-        MotionModel(step=1e-20),
-        MotionModel(gain=0.0),
-        MotionModel(arrival_tolerance=-1.0),
-        MotionModel(correction_tolerance=0.2),
-        MotionModel(max_iterations=-1),
+        *(("step", step) for step in (0.0, -0.01, math.nan, 1e-20)), ("gain", 0.0),
+        ("arrival_tolerance", -1.0), ("correction_tolerance", 0.1), ("max_iterations", -1),
     ],
-)
-def test_models_no_movement_can_be_made_with(model):
+)  # fmt: skip
+def test_models_no_movement_can_be_made_with(name, value):
+    model = MotionModel(**{name: value})
     with pytest.raises(ValueError, match="model\\."):
         learn(load_task("ascending"), "EC1", seed=0, trials=1, model=model)
     with pytest.raises(ValueError, match="model\\."):
         execute(load_task("ascending"), [], model=model)
-
-
-def test_fewer_trials_are_a_prefix():
-    task = load_task("ascending")
-    long, short = (learn(task, "EC1", seed=5, trials=n) for n in (500, 200))
-    np.testing.assert_array_equal(long.rewards[:200], short.rewards)
 
 
 def failing_task():
@@ -280,11 +290,22 @@ def test_run_without_any_completed_trial():
         run.execute()
 
 
+def test_a_replay_that_misses_a_goal_is_no_solution():
+    condition = replace(VARIANTS["EC4-uncorrected"], learned="replay")
+    run = learn(load_task("two-armed-1"), condition, seed=0, trials=40)
+    assert run.completed.any()
+    assert (run.status, run.learned, run.reward, run.hands) == ("infeasible", (), None, None)
+    assert "the replay of what was learned did not hit" in run.reason
+
+
 def test_errors():
     with pytest.raises(CoarticError, match="unknown exploration condition 'EC5'; did you mean"):
         learn(load_task("ascending"), "EC5", seed=0)
     with pytest.raises(NotApplicableError, match="has no left hand"):
         learn(load_task("ascending"), "EC3", seed=0)
+    both = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"})
+    with pytest.raises(NotApplicableError, match="only the right hand, .* starts with LRLR"):
+        learn(both, "EC1", seed=0)
     with pytest.raises(ValueError, match="trials is 0"):
         learn(load_task("ascending"), "EC1", seed=0, trials=0)
     for field, value in [
@@ -316,10 +337,17 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
             make_trials(task, "RRRR", np.full((1, 4, 10), np.nan))
 
 
-def test_one_hand_is_always_the_closest():
-    """It draws no number to break a tie with itself."""
-    condition = ExplorationCondition("one", ("right",), True, False, "closest", epsilon=0.5)
-    assert_equals_reference(load_task("ascending"), condition, trials=6)
+def test_methods_of_the_learner():
+    """Who looks for the closest hand is told where things are; long runs go in small batches."""
+    told = {method.name for method in METHODS if Information.GOALS in method.told}
+    assert told == {"dual-process/EC2"}
+    method, parameters = METHODS[0], METHODS[0].Parameters
+    sizes = [method(parameters(trials=n)).most_together() for n in (1000, 10**6, 10**7)]
+    assert sizes == [LANES, 4, 1]
+    for budget, trials in ((50, 20), (10, 10)):
+        session = Session(load_task("ascending"), 0, method.told, trial_budget=budget, trusted=True)
+        method(parameters(trials=20)).solve(session)
+        assert session.meter.trials == trials
 
 
 @pytest.mark.parametrize("discount", [0.0, 0.5, 1.0])
@@ -337,48 +365,6 @@ def test_a_subtask_is_credited_with_its_return(discount):
     assert sum(rewards) == run.rewards[0] == -319
     overall = learn(task, "EC1", seed=0, trials=1)
     assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {},
-        {"discount": 0.5},
-        {"discount": 1.0},
-        {"discount": 0.9, "state": "goal", "ties": "previous"},
-        {"discount": 0.3, "first_trial": "forgotten"},
-    ],
-)
-def test_credit_of_subtasks_equals_the_slow_learner(fields):
-    condition = replace(VARIANTS["EC4-subtask"], noise_sd=0.03, **fields)
-    slow = assert_equals_reference(load_task("two-armed-1"), condition, trials=5, seed=162)
-    assert bettered(slow) >= 2
-    slow = assert_equals_reference(failing_task(), replace(condition, epsilon=0.5), trials=12)
-    assert set(slow.completed) == {True, False}
-
-
-def test_a_subtask_learned_alone_does_not_know_what_follows():
-    """Two tasks begin with the same goal: what is learned of it is the same, bit for bit, as long
-    as its own reward alone is credited."""
-    start = {"left": [0.0] * 4, "right": [0.9, -0.8, 0.7, 0.5]}
-    tasks = [
-        tiny_task(goals=[[5.0, 1.0], [5.5, y]], initial_hands="RR", start=start)
-        for y in (2.5, -1.5)
-    ]
-
-    def learned(condition):
-        """Targets of goal 1, after a trial and after many, for either successor."""
-        trials = (1, 1500)
-        runs = [[learn(t, condition, seed=3, trials=n) for n in trials] for t in tasks]
-        return np.array([[run.targets[0, 2, 1] for run in pair] for pair in runs])
-
-    alone = VARIANTS["EC1-subtask"]
-    (first, last), (_, other) = learned(alone)
-    np.testing.assert_array_equal(last, other)
-    assert np.linalg.norm(last - first) > 0.05  # something was learned
-    for condition in (replace(alone, discount=1.0), CONDITIONS["EC1"]):
-        (_, last), (_, other) = learned(condition)
-        assert np.linalg.norm(last - other) > 0.1
 
 
 def test_without_corrective_process_a_missed_goal_ends_the_trial():

@@ -4,15 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from coartic import PAPER, MotionModel, Robot, move
 from coartic.motion.compiled import entry
 from coartic.motion.movement import clear_steps, follow
 from coartic.robot import HANDS
 from tests.support import reference
-from tests.support.strategies import UNEVEN, configurations
+from tests.support.strategies import UNEVEN
 
 ROBOT = Robot()
 
@@ -28,12 +26,12 @@ def assert_equals_every_step(robot, q, target, hand, goal, radius, stops=True, m
     return fast
 
 
-def random_movements(rng, robot, hand, count):
+def random_movements(rng, robot, hand, count, largest):
     """Movements, each with a goal that is anywhere, near its path, or near its end.
 
     Shapes (count, dof), (count, dof), (count, 2).
     """
-    q = rng.uniform(-3, 3, (count, robot.dof))
+    q = rng.uniform(-largest, largest, (count, robot.dof))
     target = q + rng.normal(size=q.shape) * rng.choice([0.01, 0.1, 0.5], (count, 1))
     place = rng.random((count, 1))
     point = np.where(place < 0.7, q + place * (target - q), target)
@@ -42,48 +40,33 @@ def random_movements(rng, robot, hand, count):
     return q, target, goals
 
 
-@pytest.mark.parametrize(("robot", "count"), [(ROBOT, 1_000), (UNEVEN, 500)])
+@pytest.mark.parametrize("robot", [ROBOT, UNEVEN])
+@pytest.mark.parametrize("largest", [3.0, 9e4])
 @pytest.mark.parametrize("hand", HANDS)
-def test_equals_every_step_many_times(robot, count, hand):
+def test_equals_every_step_many_times(robot, largest, hand):
     rng = np.random.default_rng(15)
-    drawn = random_movements(rng, robot, hand, count)
+    drawn = random_movements(rng, robot, hand, 1_000, largest)
     models = [MotionModel(step=step) for step in (0.01, 0.003, 0.1)]
-    others = rng.integers(3, size=count), rng.random(count) < 0.5
+    others = rng.integers(3, size=1_000), rng.random(1_000) < 0.5
     for q, target, goal, model, stops in zip(*drawn, *others, strict=True):
         assert_equals_every_step(robot, q, target, hand, goal, 0.1, stops, models[model])
 
 
-@settings(max_examples=60)
-@given(
-    q=configurations(ROBOT),
-    target=configurations(ROBOT),
-    hand=st.sampled_from(HANDS),
-    fraction=st.floats(0, 1),
-    offset=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
-    scale=st.floats(1e-4, 0.3),
-    radius=st.floats(0.011, 0.5),
-    stop_on_arrival=st.booleans(),
+@pytest.mark.parametrize("stops", [False, True])
+@pytest.mark.parametrize(
+    ("angle", "at_end", "offset", "radius"),
+    [
+        (2.5, False, (0.0, 0.25), 0.25),
+        (1.5, True, (0.0, 0.25), 0.25),
+        (0.0, False, (1.0, 0.0), 0.1),
+    ],
 )
-@example(  # the goal's rim runs exactly through the start
-    q=np.full(10, 2.5), target=np.zeros(10), hand="left", fraction=0.0, offset=(0.0, 0.25),
-    scale=0.25, radius=0.25, stop_on_arrival=False,
-)  # fmt: skip
-@example(  # ... and through the end
-    q=np.full(10, 1.5), target=np.zeros(10), hand="left", fraction=1.0, offset=(0.0, 0.25),
-    scale=0.25, radius=0.25, stop_on_arrival=False,
-)  # fmt: skip
-@example(
-    q=np.zeros(10), target=np.zeros(10), hand="right", fraction=0.0, offset=(1.0, 0.0),
-    scale=1.0, radius=0.1, stop_on_arrival=True,
-)  # fmt: skip
-def test_equals_the_loop_for_any_movement(
-    q, target, hand, fraction, offset, scale, radius, stop_on_arrival
-):
-    target = q + scale * (target - q)
-    point = q + fraction * (target - q)
-    goal = tuple(ROBOT.forward_kinematics(point, hand) + offset)
-    arguments = (ROBOT, q, target, hand, goal, radius)
-    assert_equals_every_step(*arguments, stop_on_arrival)
+def test_equals_every_step_where_the_rim_runs_through_an_end(angle, at_end, offset, radius, stops):
+    """Through the start of a movement, through its end, and where there is no way to go."""
+    q = np.full(10, angle)
+    target = 0.75 * q
+    goal = ROBOT.forward_kinematics(target if at_end else q, "left") + offset
+    assert_equals_every_step(ROBOT, q, target, "left", goal, radius, stops)
 
 
 def test_grazing_a_goal():
@@ -153,16 +136,6 @@ def test_the_bound_clears_nearly_all_it_may():
     for u, c in ((0.01, 0.0), (0.0, 1e-4), (-0.01, 1e-4), (0.01, 1e-4)):
         exact = 0.5 / u if c == 0.0 else (np.sqrt(u * u + 2 * c * 0.5) - u) / c
         assert _cleared(1.0, 0.5, u, 0.0, c) == pytest.approx(exact, rel=2e-5)
-
-
-def test_equals_every_step_at_the_largest_figures():
-    rng = np.random.default_rng(17)
-    for _ in range(2000):
-        q = rng.uniform(-9e4, 9e4, 10)
-        target = q + rng.normal(size=10) * 0.2
-        point = q + rng.random() * (target - q)
-        goal = ROBOT.forward_kinematics(point, "left") + rng.normal(size=2) * 0.1
-        assert_equals_every_step(ROBOT, q, target, "left", goal, 0.1)
 
 
 @pytest.mark.parametrize(("angle", "radius", "step"), [(1e5, 1e-4, 1e-6), (1e5, 1e-2, 1e-4)])

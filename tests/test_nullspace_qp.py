@@ -8,21 +8,23 @@ from scipy.optimize import minimize
 
 from coartic import PAPER, Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade, state_cascade
-from coartic.baselines.nullspace_qp import FACES, METHODS, Aim, Controller, NextGoal, NullspaceQP
+from coartic.baselines.nullspace_qp import (
+    FACES,
+    METHODS,
+    Aim,
+    Controller,
+    KeepVelocity,
+    NextGoal,
+    NullspaceQP,
+    Preshaping,
+)
 from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
-from tests.support.strategies import tiny_task
+from tests.support.strategies import TIED, solve, tiny_task
 
 ROBOT = Robot()
 ANGLES = 2 * np.pi * np.arange(FACES) / FACES
 NORMALS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
-
-
-def solve(method, task, **parameters):
-    method = method(method.Parameters(**parameters))
-    session = Session(task, 0, method.told, trusted=True)
-    result = method.solve(session)
-    return result, execute(task, result.solution), session
 
 
 def problems(count, seed, far=0.5, preferred=0.3):
@@ -128,12 +130,32 @@ def test_solutions_keep_the_rules(method, name):
     assert session.meter.solver_iterations > 0
 
 
-def test_subgoals_of_lower_priority_coarticulate():
-    """Figures of the module's text, at its defaults."""
-    task = load_task("ascending")
-    _, none, _ = solve(NullspaceQP, task)
-    _, concurrent, _ = solve(NextGoal, task)
-    assert (none.reward, concurrent.reward) == (-318, -293)
+def test_secondary_objectives_pay():
+    """Subgoals of lower priority coarticulate; with velocity kept, rates change less at once."""
+    task, rewards, jolts = load_task("ascending"), [], []
+    for method in (NullspaceQP, KeepVelocity, NextGoal):
+        result, execution, _ = solve(method, task)
+        path = np.vstack([task.q0, *(movement.waypoints for movement in result.solution)])
+        rewards.append(execution.reward)
+        jolts.append(np.linalg.norm(np.diff(path, n=2, axis=0), axis=1).max())
+    assert rewards == [-318, -318, -293]
+    assert jolts[1] < 0.7 * jolts[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "goal", "aims"),
+    [
+        (KeepVelocity, 1, [("left", 1)]),
+        (NextGoal, 0, [("right", 0), ("left", 1), ("left", 2)]),
+        (NextGoal, 3, [("right", 3), ("left", 4)]),
+        (Preshaping, 0, [("right", 0), ("left", 1, True)]),
+        (Preshaping, 1, [("left", 1), ("right", 3, True)]),
+        (Preshaping, 4, [("left", 4)]),
+    ],
+)
+def test_goals_that_are_prepared_for(method, goal, aims):
+    hands = ("right", "left", "left", "right", "left")
+    assert method().aims(hands, goal) == tuple(Aim(*aim) for aim in aims)
 
 
 def test_a_goal_behind_a_straight_arm_is_reached():
@@ -171,10 +193,13 @@ def test_every_sequence_keeps_the_best(method):
     assert len(set(rewards.values())) > 1
     assert result.details["sequences"] == 4
     assert result.details["simulated_movements"] < 2 * 4
+    assert solve(method, TIED)[1].hands == "RRL"
 
 
-def test_the_other_hand_goes_where_the_nearest_cannot():
-    """The left one is nearer and ends 0.39 short of the disc."""
+def test_the_nearest_hand_goes_or_the_other_where_it_cannot():
+    """At last the left one is nearer and ends 0.39 short of the disc."""
+    task = tiny_task(goals=[[5.0, 1.0], [2.5, 0.8]])
+    assert solve(NullspaceQP, task, hands="nearest", period=20)[1].hands == "RL"
     task = tiny_task(goals=[[3.9, 1.0]], initial_hands="R").model_copy(
         update={"locked_base": ("x", "y")}
     )
@@ -183,10 +208,9 @@ def test_the_other_hand_goes_where_the_nearest_cannot():
 
 
 def test_tasks_that_do_not_suit_are_refused():
-    (preshaping,) = (method for method in METHODS if method.name.endswith("preshaping"))
     right = outline_of(tiny_task().model_copy(update={"hands": ("right",)}))
     assert NextGoal().why_not(right) is None
-    assert "no other arm" in preshaping().why_not(right)
+    assert "no other arm" in Preshaping().why_not(right)
     many = outline_of(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
     assert "hand sequences" in NextGoal().why_not(many)
     assert NextGoal(NextGoal.Parameters(hands="nearest")).why_not(many) is None
@@ -202,6 +226,14 @@ def test_preshaping_moves_the_other_arm_towards_its_goal():
         controller(task).leg(None, aims) for aims in ((aim,), (aim, Aim("left", 1, arm_only=True)))
     )
     assert miss(preshaped.q, task, "left", 1) < 0.7 * miss(alone.q, task, "left", 1)
+    # Of the postures at the first goal only the left arm differs.
+    alone, preshaped = (
+        controller(task).find_postures(task.q0, aims, {})[0]
+        for aims in ((aim,), (aim, Aim("left", 1, arm_only=True)))
+    )
+    differs = np.abs(preshaped - alone) > 2e-3
+    assert {*np.flatnonzero(differs)} <= {2, 3, 4, 5}
+    assert differs[2]
 
 
 def test_inertia_keeps_the_rates_of_the_step_before():
@@ -210,9 +242,9 @@ def test_inertia_keeps_the_rates_of_the_step_before():
     last, posture = np.zeros(ROBOT.dof), q + 0.4 * np.eye(ROBOT.dof)[3]
     last[left] = [0.1, 0.0, 0.2, -0.3]
     for inertia in (0.0, 0.5):
-        rates = controller(task, inertia=inertia).next_rates(
-            q, Aim("right", 0), posture, last, 0.05
-        )
+        control = controller(task, inertia=inertia)
+        rates = control.next_rates(q, Aim("right", 0), posture, last, 0.05)
+        assert control.solves == 2  # programmes, one a level
         wanted = (1 - inertia) * np.eye(4)[1] + inertia * last[left]
         wanted /= max(1.0, np.linalg.norm(wanted))
         np.testing.assert_allclose(rates[left], wanted, atol=1e-3)

@@ -1,22 +1,32 @@
 """The optimum: what is shipped holds, and can be found again."""
 
+import itertools
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 import renew_optima
 
-from coartic import PAPER, builtin_tasks, execute, load_task
+from coartic import PAPER, builtin_tasks, correct, execute, load_task
 from coartic.analysis import optima
 from coartic.analysis.optima import ShippedOptimum, entries, essence
-from coartic.baselines.optimum import METHODS, BranchAndBound, DynamicProgramming, Multistart
+from coartic.baselines.optimum import (
+    METHODS,
+    BranchAndBound,
+    DynamicProgramming,
+    Multistart,
+    with_locks,
+)
+from coartic.baselines.shortest_paths import fewer
+from coartic.baselines.whole_ticks import TickPlan
 from coartic.benchmarks.suites import Cell
-from coartic.method import Session
+from coartic.method import MethodError, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed
+from tests.support.strategies import changed, solve, tiny_task
 from tests.support.suites import KNOWN, run_and_write
 
 SOLVED = [entry for entry in entries() if entry.reward is not None]
@@ -76,22 +86,61 @@ def test_the_optimum_of_every_task_is_proven_or_bounded(name):
 )
 def test_searches_find_what_is_shipped(method, parameters):
     task = load_task("descending")
-    session = Session(task, 0, method.told, trusted=True)
-    result = method(method.Parameters(**parameters)).solve(session)
-    assert execute(task, result.solution).reward == -304
+    result, execution, session = solve(method, task, **parameters)
+    assert execution.reward == -304
     assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
     assert session.meter.solver_iterations > 30
     if method is BranchAndBound:
-        assert result.details["proven_optimal"] is True
+        assert (result.details["proven_optimal"], result.details["ticks_left"]) == (True, 0)
         assert result.bound == -304
+
+
+def test_searches_keep_the_other_arm_still():
+    goals = [[2.6, 1.0], [-1.6, 1.0]]
+    start = {"base": [0.0, 0.0], "left": [2.0, 0.5, 0.5, 0.0], "right": [0.5] * 4}
+    task, few = tiny_task(goals=goals, start=start), {"nodes": 40, "graphs": 1, "chains": 1}
+    travels = []
+    for other_arm in ("free", "still"):
+        _, execution, _ = solve(DynamicProgramming, task, other_arm=other_arm, **few)
+        hands = hands_of(execution.hands)
+        travels.append(other_arm_travel(task, hands, execution.configurations))
+    assert travels[0] > travels[1] == 0.0
+
+
+def test_random_starts_begin_with_the_corrective_process():
+    task = load_task("two-armed-2")
+    session = Session(task, 0, Multistart.told, trusted=True)
+    found = Multistart(Multistart.Parameters(starts=2)).starts(session, task)
+    (hands, first), (_, second) = itertools.islice(found, 2)
+    q, iterations = task.q0, 0
+    for hand, goal, reached in zip(hands, task.goals, first, strict=True):
+        correction = correct(task.robot, q, hand, goal)
+        np.testing.assert_array_equal(reached, correction.q)
+        q, iterations = correction.q, iterations + correction.iterations
+    assert session.meter.jacobians == iterations == session.meter.forward_kinematics - 4
+    assert (second != first).all()
+
+
+def test_the_base_is_locked_beside_the_task():
+    task = tiny_task(locked_base=["x"], goals=[[4.5, 0.1]], initial_hands="R")
+    assert with_locks(task, "task") == task
+    assert with_locks(task, "y").locked_base == ("x", "y")
+    with pytest.raises(MethodError, match="out of reach") as caught:
+        with_locks(load_task("ascending"), "xy")
+    assert caught.value.outcome == "infeasible"
+
+
+def test_of_as_many_ticks_fewer_corrections_are_better():
+    ranked = [SimpleNamespace(ticks=t, corrections=c) for t, c in ((5, 2), (6, 0), (6, 1))]
+    for one, other in itertools.product(range(3), repeat=2):
+        assert fewer(ranked[one], ranked[other]) == (one < other)
+    assert TickPlan((3, 0, 2), np.empty((3, 10))).ticks == 4 + 0 + 3
 
 
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")
-    method = DynamicProgramming(DynamicProgramming.Parameters(nodes=60, graphs=1, chains=1))
-    session = Session(task, 0, method.told, trusted=True)
-    execution = execute(task, method.solve(session).solution)
+    _, execution, _ = solve(DynamicProgramming, task, nodes=60, graphs=1, chains=1)
     assert execution.hands == "RL"
     assert execution.ticks_by_goal()[1] == 0
     assert execution.corrections == 0

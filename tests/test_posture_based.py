@@ -9,19 +9,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from coartic import execute, load_task
-from coartic.baselines.posture_based import OneGoal, TwoGoals
+from coartic import load_task
+from coartic.baselines.posture_based import OneGoal, PosturePlanner, TwoGoals
 from coartic.method import MethodError, Session
-from tests.support.strategies import tiny_task, uneven_task
+from tests.support.strategies import solve, tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
 STEP = 0.01  # m
 QUICK = {"stored": 20, "rounds": 5}
-
-
-def solve(task, method, seed=0, **parameters):
-    session = Session(task, seed, method.told, trusted=True)
-    return method(method.Parameters(**parameters)).solve(session), session
 
 
 def shortest(task, hands, starts=5):
@@ -91,7 +86,7 @@ def uneven(**changes):
     ids=["free", "behind", "rail", "fixed", "uneven"],
 )
 def test_a_dense_store_gives_the_nearest_posture(task, hand):
-    result, _ = solve(task, OneGoal, stored=1000, rounds=100)
+    result, *_ = solve(OneGoal, task, stored=1000, rounds=100)
     (movement,) = result.solution
     assert movement.hand == hand
     travelled = float(np.linalg.norm(movement.target - task.q0))
@@ -102,7 +97,7 @@ def test_a_dense_store_gives_the_nearest_posture(task, hand):
 def test_two_goals_give_the_shortest_way_through_both(free):
     """With one hand, and with the best of all sequences."""
     task = bent(goals=[[5.0, 1.0], [4.0, 2.5]], hands=free)
-    result, _ = solve(task, TwoGoals, rounds=100, hands="every")
+    result, *_ = solve(TwoGoals, task, rounds=100, hands="every")
     # The second posture is planned anew from where the first movement ends.
     first, second = (movement.target for movement in result.solution)
     travelled = math.dist(task.q0, first) + math.dist(first, second)
@@ -137,23 +132,23 @@ def ticks(angle):
 def test_looking_ahead_takes_the_other_hand_where_that_pays():
     left, right = math.radians(60 + 45), math.radians(120 - 40)
     task = one_link(left, right)
-    one, _ = solve(task, OneGoal)
+    one, *_ = solve(OneGoal, task)
     assert [movement.hand for movement in one.solution] == ["right", "right"]
-    two, _ = solve(task, TwoGoals)
+    two, execution, _ = solve(TwoGoals, task)
     assert [movement.hand for movement in two.solution] == ["left", "right"]
     assert two.details["expected_ticks"] == [ticks(math.radians(45)), ticks(right)]
     reached = right + (ticks(math.radians(40)) - 1) * STEP
     assert one.details["expected_ticks"] == [ticks(math.radians(40)), ticks(reached)]
     # Trying every sequence finds the same without looking ahead.
-    every, _ = solve(task, OneGoal, hands="every")
+    every, *_ = solve(OneGoal, task, hands="every")
     assert every.details == two.details
-    assert -sum(two.details["expected_ticks"]) == execute(task, two.solution).reward
+    assert -sum(two.details["expected_ticks"]) == execution.reward
 
 
 def test_a_free_arm_is_preshaped():
     a, b = 1.2, 0.9
     task = one_link(math.radians(60) + a, b)
-    result, _ = solve(task, TwoGoals, other_arm="free", rounds=100)
+    result, *_ = solve(TwoGoals, task, other_arm="free", rounds=100)
     first, second = result.solution
     assert (first.hand, second.hand) == ("left", "right")
     # Both joints at once, along the diagonal: the other hand is there when this one is.
@@ -161,9 +156,28 @@ def test_a_free_arm_is_preshaped():
     diagonal = math.hypot(a - inside, b - inside)
     assert math.dist(task.q0, first.target) == pytest.approx(diagonal, abs=0.02)
     assert math.dist(first.target, second.target) < 0.03
-    still, _ = solve(task, TwoGoals)
+    still, *_ = solve(TwoGoals, task)
     assert still.solution[0].target[3] == task.q0[3]
     assert sum(still.details["expected_ticks"]) > sum(result.details["expected_ticks"]) + 40
+
+
+def test_another_round_of_generation_never_costs_more():
+    task = bent(goals=[[5.0, 1.0]], initial_hands="R", hands=["right"])
+    for seed in range(12):
+        one, two = (solve(OneGoal, task, seed, stored=20, rounds=rounds)[0] for rounds in (1, 2))
+        lengths = [math.dist(task.q0, each.solution[0].target) for each in (one, two)]
+        assert lengths[1] <= lengths[0]
+
+
+def test_the_way_on_is_that_of_the_base_and_the_next_hand():
+    """By the right arm 1.0 and on by the left one 0.5, or by the base 0.7 and on by 0.86."""
+    task = bent(goals=[[5.0, 1.0], [4.0, 2.5]])
+    session = Session(task, 0, TwoGoals.told, trusted=True)
+    planner = PosturePlanner(session, TwoGoals.Parameters(), 2)
+    q, unit = task.q0, np.eye(10)
+    first, second = np.stack([q + 1.0 * unit[6], q + 0.7 * unit[0]]), q + 0.5 * unit[2]
+    chosen = planner.most_promising(q, ("right", "left"), [first, second[None]])
+    np.testing.assert_array_equal(chosen, [first[0], first[0] + second - q])
 
 
 @pytest.mark.parametrize("method", [OneGoal, TwoGoals], ids=["one goal", "two goals"])
@@ -171,8 +185,8 @@ def test_a_plan_beside_others_is_the_plan_alone(method):
     """The first of all sequences is the best here, and draws what it draws alone."""
     goals = [[-3.5, 0.5], [-4.5, 1.5], [-4.0, 2.5]]
     task = bent(goals=goals, locked_base=["y"], initial_hands="LLL")
-    alone, single = solve(task.model_copy(update={"hands": ("left",)}), method, **QUICK)
-    beside, every = solve(task, method, hands="every", **QUICK)
+    alone, _, single = solve(method, task.model_copy(update={"hands": ("left",)}), **QUICK)
+    beside, _, every = solve(method, task, hands="every", **QUICK)
     assert beside.details == alone.details
     for movement, other in zip(beside.solution, alone.solution, strict=True):
         assert movement.hand == other.hand == "left"
@@ -183,7 +197,7 @@ def test_a_plan_beside_others_is_the_plan_alone(method):
 
 def test_without_diffusion_the_base_takes_the_hand_there():
     task = bent(goals=[[5.0, 1.0]], initial_hands="R", hands=["right"])
-    result, session = solve(task, OneGoal, stored=0, rounds=0)
+    result, _, session = solve(OneGoal, task, stored=0, rounds=0)
     (movement,) = result.solution
     hand = task.robot.forward_kinematics(task.q0, "right")
     expected = np.array(task.q0)
@@ -213,7 +227,7 @@ def test_every_evaluation_is_counted(locked):
             jacobian = task.robot.jacobian(q, "right") * movable
             q += jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-3 * np.eye(2), miss)
             steps += 1
-        result, session = solve(task, OneGoal, stored=0, rounds=0)
+        result, _, session = solve(OneGoal, task, stored=0, rounds=0)
         np.testing.assert_allclose(result.solution[0].target, q, rtol=0, atol=1e-9)
         simulated = math.ceil(math.dist(q, task.q0) / STEP) + 1
         assert session.meter.jacobians == steps
@@ -242,8 +256,7 @@ def test_what_is_planned_is_what_happens(goals, locked, method, seed):
         goals = [(x / 3, y) for x, y in goals]
     task = bent(goals=[list(goal) for goal in goals], initial_hands="best-of-all")
     task = task.model_copy(update={"locked_base": tuple(locked)})
-    result, _ = solve(task, method, seed, **QUICK)
-    execution = execute(task, result.solution)  # refuses a locked base that moves
+    result, execution, _ = solve(method, task, seed, **QUICK)  # refuses a locked base that moves
     assert execution.completed
     assert execution.corrections == 0
     assert list(execution.ticks_by_goal()) == result.details["expected_ticks"]
@@ -260,13 +273,13 @@ def test_a_goal_out_of_reach_is_infeasible():
     far = task.model_copy(update={"goals": (task.goals[0], (2.0, 0.1))})
     for method, hands in itertools.product((OneGoal, TwoGoals), ("chosen", "every")):
         with pytest.raises(MethodError, match=r"^goal 2: no correction of any of \d+") as error:
-            solve(far, method, hands=hands, **QUICK)
+            solve(method, far, hands=hands, **QUICK)
         assert error.value.outcome == "infeasible"
     # Out of reach for the left hand, not for the right one.
     left = task.model_copy(update={"hands": ("left",)})
     with pytest.raises(MethodError, match="goal 2: .* puts the left hand within 0.09 of it"):
-        solve(left, OneGoal, **QUICK)
-    assert solve(task, OneGoal, **QUICK)[0].solution[1].hand == "right"
+        solve(OneGoal, left, **QUICK)
+    assert solve(OneGoal, task, **QUICK)[0].solution[1].hand == "right"
 
 
 @pytest.mark.parametrize(
@@ -276,6 +289,6 @@ def test_a_goal_out_of_reach_is_infeasible():
 def test_shipped_tasks(name, one_goal, two_goals):
     """One goal does as well as the corrective process, two as well as the learner."""
     task = load_task(name)
-    rewards = [execute(task, solve(task, m)[0].solution).reward for m in (OneGoal, TwoGoals)]
+    rewards = [solve(method, task)[1].reward for method in (OneGoal, TwoGoals)]
     assert rewards[0] >= one_goal
     assert rewards[1] >= two_goals

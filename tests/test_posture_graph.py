@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from coartic import load_task
-from coartic.baselines.posture_graph import PostureGraph, move_other_arm, sample_postures
+from coartic.baselines.posture_graph import (
+    PostureGraph,
+    cheapest_chains,
+    move_other_arm,
+    sample_postures,
+)
+from coartic.method import Information, Session
+from coartic.motion.costs import joint_costs
 from tests.support.strategies import changed
 
 TASKS = {
@@ -17,7 +24,7 @@ TASKS = {
 }
 
 
-def cheapest(graph, hands):
+def cheapest(graph, hands, costs):
     """Every combination of nodes, one by one."""
     task, best = graph.task, np.inf
     layers = [graph.layers[goal, hand] for goal, hand in enumerate(hands)]
@@ -27,27 +34,31 @@ def cheapest(graph, hands):
             q = before.copy()
             q[:2], joints = node[:2], task.robot.joints(hand)
             q[joints] = node[joints]
-            length += np.linalg.norm(q - before)
+            length += np.linalg.norm(costs * (q - before))
             before = q
         best = min(best, length)
     return best
 
 
-def length_of(task, configurations):
-    steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
+def length_of(task, configurations, costs=1.0):
+    steps = costs * np.diff(np.vstack([task.q0, configurations]), axis=0)
     return np.linalg.norm(steps, axis=1).sum()
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_chains_are_the_cheapest(name):
+@pytest.mark.parametrize("costly", ["none", "base"])
+def test_chains_are_the_cheapest(name, costly):
     task = TASKS[name]
-    graph = PostureGraph.sample(task, 5, np.random.default_rng(3))
+    costs = joint_costs(task.robot, costly, 3.0)
+    graph = PostureGraph.sample(task, 5, np.random.default_rng(3), costs)
     chains = list(graph.chains())
     assert len(chains) == len(task.hands) ** len(task.goals)
     assert len(dict(chains)) == len(chains)
     for hands, configurations in chains:
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
-        assert length_of(task, configurations) == pytest.approx(cheapest(graph, hands))
+        assert length_of(task, configurations, costs) == pytest.approx(
+            cheapest(graph, hands, costs)
+        )
         for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}
             assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
@@ -86,6 +97,22 @@ def test_a_free_arm_is_spread_over_its_way():
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
     assert np.array_equal(spread[[0, 3]][:, left], chain[[0, 3]][:, left])
     assert np.array_equal(spread[:, :2], chain[:, :2])
+
+
+@pytest.mark.parametrize(
+    ("name", "graphs", "chains", "spread", "count"),
+    [
+        ("two-armed-1", 1, 16, False, 16),
+        ("two-armed-1", 1, 17, False, 32),
+        ("two-armed-1", 3, 1, True, 96),
+        ("ascending", 1, 5, True, 5),
+    ],
+)
+def test_graphs_are_sampled_until_there_are_as_many_and_chains(name, graphs, chains, spread, count):
+    session = Session(TASKS[name], 0, Information, trusted=True)
+    options = {"nodes": 12, "graphs": graphs, "chains": chains, "spread": spread}
+    found = cheapest_chains(session, TASKS[name], np.random.default_rng(8), **options)
+    assert len([*found]) == count
 
 
 def test_a_goal_without_a_posture_is_named():

@@ -165,9 +165,10 @@ def examples():
     yield coartic.learn(TASK, "EC3", seed=2**62, trials=20)
     yield coartic.learn(TASK, "EC3", seed=0, trials=2, model=failing)
     yield coartic.learn(load_task("ascending"), "EC1", seed=0, trials=3000)
-    for task in (TASK, big):
-        yield coartic.correct(task.robot, task.q0, "right", (1.0, 1.0), model=failing)
-        yield coartic.move(task.robot, task.q0, task.q0, "right", (1.0, 1.0), 0.1)
+    yield coartic.correct(TASK.robot, TASK.q0, "right", (1.0, 1.0), model=failing)
+    yield coartic.move(TASK.robot, TASK.q0, TASK.q0, "right", (1.0, 1.0), 0.1)
+    yield coartic.Correction(q, False, 10**9)
+    yield coartic.MoveResult(q, 10**9, True, 10**9)
     yield coartic.objective(TASK, HANDS)
     yield from (getattr(coartic, name) for name in coartic.__all__)
 

@@ -5,11 +5,10 @@ import json
 from dataclasses import replace
 from typing import get_args
 
-import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from coartic import Movement, learn, trajectory
+from coartic import learn
 from coartic.analysis.verify import stored_task
 from coartic.errors import CoarticError
 from coartic.learner.conditions import (
@@ -22,18 +21,18 @@ from coartic.learner.conditions import (
 )
 from coartic.learner.method import DualProcessParameters
 from coartic.model import PAPER, stored_model
-from coartic.motion.movement import follow
-from coartic.robot import HANDS, Robot
+from coartic.robot import HANDS
 from coartic.tasks.catalogue import load_task
 from coartic.tasks.readings import (
+    ChosenReading,
     condition_under,
     load_reading,
     load_readings,
     model_under,
     readings,
 )
-from tests.support import reference
 from tests.support.strategies import tiny_task, uneven_task
+from tests.test_learner import assert_equals_reference
 
 APPLIED = {"model": [PAPER], "condition": list(CONDITIONS.values())}
 by_id = pytest.mark.parametrize("reading", readings(), ids=lambda reading: reading.id)
@@ -77,6 +76,16 @@ def test_what_cannot_be_loaded_is_said(texts, says):
         load_readings(texts)
 
 
+def test_what_the_text_says_if_it_is_taken_at_its_word():
+    said = [
+        str(ChosenReading(r, choice)) for r in readings() for choice in r.choices if choice.printed
+    ]
+    assert said == [
+        "corrective-arrival=true", "equal-distance=random", "first-trial=learns",
+        "state=previous-hand",
+    ]  # fmt: skip
+
+
 def test_the_default_choice_is_no_reading():
     assert [str(each) for each in load_readings(["ties=left", "state=goal"])] == ["state=goal"]
 
@@ -95,10 +104,8 @@ def test_the_learner_is_the_slow_one_under_every_reading(text):
         model = model._replace(correction_tolerance=0.099, arrival_tolerance=0.04)
     task, plain = load_task("two-armed-1"), CONDITIONS["EC2" if text in SELDOM_OF_EC3 else "EC3"]
     condition = replace(plain, **fields)
+    assert_equals_reference(task, condition, 5, seed=42, model=model)
     fast = learn(task, condition, seed=42, trials=5, model=model)
-    slow = reference.learn(task, condition, seed=42, trials=5, model=model)
-    np.testing.assert_array_equal(fast.completed, slow.completed)
-    np.testing.assert_array_equal(fast.rewards[fast.completed], slow.rewards[slow.completed])
     default = learn(task, plain, seed=42, trials=5)
     differs = fast.rewards.tolist() != default.rewards.tolist() or fast.reward != default.reward
     assert differs or text in SELDOM
@@ -139,13 +146,7 @@ def test_the_learner_is_the_slow_one_whatever_is_read_together():
     failed = 0
     for seed, fields in enumerate(TOGETHER):
         condition = replace(FORGETFUL, noise_sd=0.02, **fields)
-        fast = learn(task, condition, seed=seed, trials=3)
-        slow = reference.learn(task, condition, seed=seed, trials=3)
-        np.testing.assert_array_equal(fast.rewards.data, slow.rewards)
-        np.testing.assert_array_equal(fast.completed, slow.completed)
-        assert fast.counters.corrections == slow.corrections
-        assert np.isfinite(fast.values).sum() == len(slow.values)
-        failed += fast.counters.failed_trials
+        failed += (~assert_equals_reference(task, condition, 3, seed=seed).completed).sum()
     assert failed > 20
 
 
@@ -154,41 +155,6 @@ def test_a_learned_replay_is_the_replay():
     run = learn(task, replace(CONDITIONS["EC1"], learned="replay"), seed=3, trials=25)
     assert run.reward == run.replay_reward != max(run.rewards)
     assert run.execute().reward == run.reward
-
-
-def test_rows_of_a_trajectory_start_where_the_robot_does():
-    """Two lines of 3 and 2 steps and a goal hit where the robot stands, counted by hand."""
-    task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")
-    ahead = [np.array([x, *[0.0] * 9]) for x in (0.06, 0.08)]
-    path = trajectory(
-        task,
-        [
-            Movement(1, "right", "corrective"),
-            Movement(2, "right", "planned", ahead[0]),
-            Movement(3, "right", "planned", ahead[1]),
-        ],
-    )
-    np.testing.assert_allclose(100 * path.configurations[:, 0], [0, 1, 2, 3, 3, 4, 5], atol=1e-12)
-    np.testing.assert_allclose(path.subtask(1)[:, 0], [0.0])
-
-
-@pytest.mark.parametrize("first_step", [False, True])
-@pytest.mark.parametrize("whole_last_step", [False, True])
-def test_a_path_of_one_line_is_the_movement_under_the_same_readings(first_step, whole_last_step):
-    model = PAPER._replace(first_step=first_step, whole_last_step=whole_last_step)
-    rng, hits = np.random.default_rng(5), 0
-    for _ in range(30):
-        q, target = rng.uniform(-1, 1, (2, 10))
-        near = target if rng.random() < 0.5 else q
-        goal = tuple(Robot().forward_kinematics(near, "left") + rng.uniform(-0.11, 0.11, 2))
-        path = follow(Robot(), q, target[None], "left", goal, 0.1, model=model)
-        line = reference.move(
-            Robot(), q, target, "left", goal, 0.1, stop_on_arrival=False, model=model
-        )
-        assert (path.ticks, path.hit) == (line.ticks, line.hit)
-        np.testing.assert_allclose(path.q, line.q, atol=1e-12)
-        hits += path.hit
-    assert 10 < hits < 30
 
 
 def test_what_version_1_stored_is_read_unless_its_reading_is_gone():

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from coartic import PAPER, Robot, execute, load_task
+from coartic import PAPER, Robot, load_task
 from coartic.baselines.optimum import DynamicProgramming
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.method import Session
 from coartic.motion.costs import joint_costs, segment_lengths
 from coartic.motion.ticks import trajectory
-from tests.support.strategies import tiny_task
+from tests.support.strategies import solve, tiny_task
 from tests.support.suites import KNOWN
 
 FEW = {"graphs": 1, "chains": 1}
@@ -25,9 +24,7 @@ INSTANCES = ["one-armed/v1/d001", "two-armed/v1/d006", THREE_GOALS]
 
 def solved(task, method=RecedingHorizon, **parameters):
     """Result and execution of a method on a task."""
-    session = Session(task, 0, method.told, trusted=True)
-    result = method(method.Parameters(**{**FEW, **parameters})).solve(session)
-    return result, execute(task, result.solution)
+    return solve(method, task, **{**FEW, **parameters})[:2]
 
 
 @cache
@@ -48,6 +45,8 @@ def test_with_all_goals_in_view_it_is_the_search_for_the_optimum(name):
     reference, best = solved(task, DynamicProgramming, nodes=nodes)
     assert execution.reward == best.reward
     assert result.details["windows"] == 1
+    assert result.details["solves"] == reference.details["solves"]
+    assert result.details["failed_solves"] == 0
     # The plan with the fewest ticks, which need not be the very shortest.
     shortest = reference.details["path_length"]
     assert shortest - 1e-8 <= result.details["path_length"] < shortest + PAPER.step
@@ -108,13 +107,20 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
     rewards = {horizon: [] for horizon in (0, 1, 9)}
     for name in INSTANCES:
         for horizon, of_horizon in rewards.items():
-            execution = planned(name, horizon=horizon)[1]
+            result, execution = planned(name, horizon=horizon)
             of_horizon.append(execution.reward)
             assert execution.corrections == 0
+            rounded = execution.ticks - result.details["path_length"] / PAPER.step
+            assert 0 < rounded <= 2 * len(execution.hands)
     gaps = [np.mean(np.divide(rewards[horizon], rewards[9]) - 1) for horizon in (0, 1)]
     assert gaps[0] > gaps[1] > 0
     # By luck of rounding it may be a tick better.
     assert all(np.array(rewards[9]) >= np.array(rewards[0]) - 1)
+
+
+def test_the_shortest_starts_are_polished():
+    """Of one graph's chains one has the best hands already."""
+    assert planned("two-armed-2", horizon=3, starts=1)[1].hands == "RLRR"
 
 
 def test_with_hands_given_only_postures_look_ahead():

@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from coartic import (
-    PAPER,
-    CoarticError,
-    Movement,
-    execute,
-    load_task,
-)
-from coartic.motion.solution import other_arm_travel
+from coartic import PAPER, CoarticError, Movement, execute
 from coartic.runs.run import MOST_STEPS, execute_all
-from coartic.tasks.task import hands_of
 from tests.support.strategies import tiny_task
 
 
@@ -71,10 +63,6 @@ def test_paths():
     assert again.reward == execution.reward
     short = Movement(1, "right", "path", waypoints=waypoints[:5])
     assert execute(task, [short, onward]).corrections == 1
-    with pytest.raises(CoarticError, match="a path needs waypoints"):
-        execute(task, [Movement(1, "right", "path", np.array(posture(1.0))), onward])
-    with pytest.raises(CoarticError, match="is not finite"):
-        execute(task, [Movement(1, "right", "path", waypoints=waypoints * np.nan), onward])
 
 
 def test_a_planned_movement_is_always_made():
@@ -83,6 +71,13 @@ def test_a_planned_movement_is_always_made():
     corrective = execute(task, [Movement(1, "right", "corrective")])
     assert corrective.reward == 0
     assert corrective.hands == "R"
+    stay = Movement(1, "right", "path", waypoints=np.array([posture(0.0)]))
+    for model in (PAPER, PAPER._replace(first_step=True)):  # there is no step to make
+        assert execute(task, [stay], model=model).reward == -1
+        assert execute(task, planned(posture(0.0)), model=model).reward == -1
+
+
+WAY = np.zeros((1, 10))
 
 
 @pytest.mark.parametrize(
@@ -97,6 +92,11 @@ def test_a_planned_movement_is_always_made():
         (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
         ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
+        ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
+        ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
+        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "target is its last waypoint"),
+        ([Movement(1, "right", "planned", WAY[0], waypoints=WAY)], "movement has no waypoints"),
+        ([Movement(1, "right", "path", waypoints=WAY + 1)], "the target moves a locked base"),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):
@@ -108,16 +108,7 @@ def test_solutions_that_break_the_rules(movements, words):
     assert words in str(caught.value)
 
 
-def test_travel_of_the_other_arm_is_summed_in_order():
-    """As Python's own floats are: a library's dot product rounds as the processor likes."""
-    task, rng = load_task("two-armed-1"), np.random.default_rng(0)
-    hands = hands_of("LRRL")
-    reached = task.q0 + rng.normal(0, 1, (4, task.robot.dof))
-    expected, before = 0.0, task.q0.tolist()
-    for hand, q in zip(hands, reached.tolist(), strict=True):
-        joints = task.robot.joints("left" if hand == "right" else "right")
-        square = 0.0
-        for a, b in zip(q[joints], before[joints], strict=True):
-            square += (a - b) ** 2
-        expected, before = expected + square**0.5, q
-    assert other_arm_travel(task, hands, reached) == expected
+def test_a_goal_is_hit_by_one_hand():
+    both = [Movement(1, hand, "planned", np.zeros(10)) for hand in ("left", "right")]
+    with pytest.raises(CoarticError, match="goal 1: two hands for one goal"):
+        execute(tiny_task(), both)

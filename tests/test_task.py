@@ -10,9 +10,9 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.tasks.task import parse_task
+from coartic.tasks.task import check_task, parse_task
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import tiny_task
+from tests.support.strategies import TIED, tiny_task
 
 
 def write(tmp_path, text):
@@ -57,6 +57,16 @@ def test_goals_that_are_within_reach_are_accepted():
     tiny_task(goals=[[1e3, 1e3], [0.0, 0.0]])
 
 
+def test_reach_of_the_corrective_process():
+    """Right hand: up to 4 from (0.5, 0.1). A rim may be within reach, 0.01 of the centre not."""
+    task = tiny_task(locked_base=["x", "y"], goals=[[4.0, 0.1], [4.55, 0.1]])
+    with pytest.raises(TaskError, match=r"goals\[1\] \(4.55, 0.1\) .*: 0.04 too far"):
+        check_task(task)
+    check_task(tiny_task(locked_base=["x", "y"], goals=[[4.0, 0.1], [4.505, 0.1]]))
+    with pytest.raises(TaskError, match="the right hand that initial_hands 'R' gives it: 0.6 too"):
+        tiny_task(locked_base=["x", "y"], goals=[[-4.2, 0.1]], initial_hands="R")
+
+
 def test_inner_reach():
     """An arm of links 3 and 1 cannot reach within 2 of its shoulder."""
     robot = {"right_links": [3.0, 1.0]}
@@ -82,6 +92,7 @@ def test_initial_hand_policies():
     task = parse_task(content, "x")
     assert initial_hands(task) == "LRLR"
     assert initial_hands(task, ("right",)) == "RRRR"
+    assert initial_hands(TIED) == "RRL"
     assert corrective_trial(task, "LRLR").reward == -532
 
 

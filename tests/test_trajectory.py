@@ -2,24 +2,21 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import casadi
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from coartic import Robot, Task, corrective_trial, execute, load_task
+from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import PostureGraph
-from coartic.baselines.trajectory_optimisation import METHODS, path_movements
-from coartic.baselines.trajectory_problem import (
-    Instance,
-    segment_cost,
-    spline,
-    trajectory_problem,
-)
+from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
+from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
-from tests.support.strategies import changed
+from coartic.motion.solution import other_arm_travel
+from tests.support.strategies import changed, solve
 
 ORDERS = {"acceleration": 2, "jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
@@ -157,6 +154,15 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost, free_times):
     assert total == pytest.approx(plan.cost, rel=0.03)
 
 
+def test_the_cheapest_plan_that_converged_is_kept():
+    plans = [SimpleNamespace(cost=c, converged=c > 1, spent={"hessians": 1}) for c in (3, 2, 1, 4)]
+    session = Session(small_task(), 0, ())
+    for given, kept in ((plans, plans[1]), ([plans[2], plans[2]], plans[2])):
+        problem = SimpleNamespace(solve=lambda _, plan, **options: plan)
+        assert cheapest_plan(session, problem, None, given) is kept
+    assert session.meter.hessians == 6
+
+
 def test_given_lengths_are_kept():
     task = load_task("ascending")
     instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
@@ -193,7 +199,41 @@ def test_whole_ticks_are_what_is_executed():
         assert execution.corrections == 0
         assert execution.ticks <= rounded.ticks
         assert rounding.least(plan) <= rounded.ticks <= rounding.least(plan) + 1
-        assert min(p.ticks for p in rounding.every(plan)) <= rounded.ticks
+        assert other_arm_travel(task, sequence, execution.configurations) == 0.0
+        exact = plan.lengths(task.q0)[:-1] / PAPER.step
+        choices = itertools.product(*[(math.floor(steps), math.ceil(steps)) for steps in exact])
+        every = list(rounding.every(plan))
+        assert min(each.ticks for each in every) <= rounded.ticks
+        nearest_first = sorted(choices, key=lambda steps: np.abs(steps - exact).sum())
+        assert [each.steps[:-1] for each in every] == nearest_first
+
+
+def test_goals_that_one_posture_hits_are_merged_in_every_way():
+    task = small_task(goals=((2.6, 1.0), (2.65, 1.05), (2.6, 1.1)), initial_hands="RRR")
+    instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
+    problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
+    plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
+    rounding = Rounding(Session(task, 0, ()), problem, instance)
+    plans = dict(rounding.plans(plan, task, lambda ticks: True))
+    assert list(plans) == [(), (1,), (2,), (1, 2)]
+    for merged, merger in plans.items():
+        np.testing.assert_allclose(merger.lengths(task.q0)[list(merged)], 0.0, atol=1e-9)
+
+
+def test_joints_and_rates_that_are_held():
+    """Base, one joint of the left arm, two of the right one; held before or after a goal."""
+    task = small_task(locked_base=("y",))
+    problem = trajectory_problem(task.robot, task.hands, 2, "acceleration")
+    free, still = (Instance.of(task, ("right", "left"), still=s, radius=0.1) for s in (False, True))
+    assert free.held.tolist() == [[False, True, False, False, False]] * 2
+    assert still.held.tolist() == [
+        [False, True, True, False, False], [False, True, False, True, True],
+    ]  # fmt: skip
+    rest, passing = [0.0] * 5, [np.inf, 0.0, np.inf, np.inf, np.inf]
+    assert problem.rate_bound(free, None).tolist() == [*rest, *passing, *rest]
+    assert problem.rate_bound(still, None).tolist() == [*rest, np.inf, *rest[1:], *rest]
+    alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
+    assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
@@ -202,10 +242,8 @@ def test_plans_need_no_correction_and_keep_still_what_is_to_be_still(method, nam
     task = load_task(name)
     if name == "two-armed-2":
         task = changed(name, goals=task.goals[:3], initial_hands="RRR")
-    session = Session(task, 0, method.told, trusted=True)
     few = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 2}
-    result = method(method.Parameters(other_arm=other_arm, **few)).solve(session)
-    execution = execute(task, result.solution)
+    result, execution, session = solve(method, task, other_arm=other_arm, **few)
     costs = result.details["costs"]
     assert execution.hands == min(costs, key=costs.get)
     assert execution.corrections == 0
@@ -225,7 +263,7 @@ def test_goals_out_of_reach_are_infeasible():
     goals = [[6, 0.1], [6, 90]]
     task = changed("ascending", goals=goals, locked_base=["y"], initial_hands="RR")
     with pytest.raises(MethodError, match="goal 2: no posture was found") as failure:
-        method().solve(Session(task, 0, method.told, trusted=True))
+        solve(method, task)
     assert failure.value.outcome == "infeasible"
 
 
@@ -253,10 +291,8 @@ def test_of_too_many_hand_sequences_a_beam_is_planned():
     (method,) = (m for m in METHODS if m.name.endswith("path-length"))
     costs = {}
     for most in (3, 8, 64):
-        parameters = method.Parameters(
-            nodes=40, graphs=1, chains=1, noisy_starts=0, most_sequences=most
-        )
-        result = method(parameters).solve(Session(task, 0, method.told, trusted=True))
+        few = {"nodes": 40, "graphs": 1, "chains": 1, "noisy_starts": 0}
+        result, *_ = solve(method, task, most_sequences=most, **few)
         costs[most] = result.details["costs"]
     assert len(costs[3]) == 3
     assert len(costs[8]) == 8

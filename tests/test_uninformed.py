@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines import cma_es, random_search
 from coartic.baselines.uninformed import Practice, UninformedParameters
-from coartic.method import Meter, MethodError, Session
+from coartic.method import BudgetError, Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
 
@@ -91,8 +91,9 @@ def test_trials_counted_kept_and_made_again(method, name):
     assert again.reward == max(completed)
     assert session.rewards.index(again.reward) == result.details["best_trial"]
     assert -sum(completed) == session.meter.movement_ticks  # none failed
-    limited, _ = solve(method, task, budget=23, trials=301)
-    assert limited.meter.trials == 23
+    for budget, trials in ((23, 301), (301, 23)):
+        limited, _ = solve(method, task, budget=budget, trials=trials)
+        assert limited.meter.trials == 23
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
@@ -222,6 +223,9 @@ class HalfOfAPlain:
 
     left = 10**6
 
+    def __init__(self):
+        self.sizes = []
+
     def explored(self, hands):
         return np.ones((1, 3), dtype=bool)
 
@@ -229,6 +233,7 @@ class HalfOfAPlain:
         return SimpleNamespace(rewards=np.array([-300.0]), reached=np.zeros((1, 1, 3)))
 
     def by_targets(self, hands, masks, values):
+        self.sizes.append(len(values))
         self.failed = values[:, 0] > 0.5
         rewards = -100.0 * ((values - 1.0) ** 2).sum(axis=1)
         return SimpleNamespace(rewards=np.where(self.failed, -np.inf, rewards))
@@ -245,6 +250,23 @@ def test_failed_trials_rank_last():
         failed.append(practice.failed.mean())
     assert -26.0 < strategy.reward <= -25.0
     assert 0.0 < np.mean(failed) < 0.7
+    for _ in range(400):
+        strategy.generation()
+    assert [*dict.fromkeys(practice.sizes)][:3] == [7, 14, 28]  # it begins anew with twice as many
+
+
+def test_guesses_fill_the_box():
+    asked = []
+
+    def many(points):
+        asked.append(points)
+        raise BudgetError
+
+    box = np.array([[0.0, 1.0], [-2.0, 2.0]])
+    cost = SimpleNamespace(bounds=box, dim=2, many=many)
+    with pytest.raises(BudgetError):
+        random_search.Guesses().optimise(cost, np.random.default_rng(0))
+    np.testing.assert_allclose([asked[0].min(axis=0), asked[0].max(axis=0)], box.T, atol=0.05)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

@@ -4,7 +4,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from coartic import Robot, corrective_trial, hand_sequences, load_task, parse_task
+from coartic import Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
+from coartic.method import Session
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -36,13 +37,23 @@ def tiny_task(**changes):
     return parse_task({key: value for key, value in content.items() if value is not None}, "tiny")
 
 
-def uneven_task(left, right, base=(0.0, 0.0), **changes):
-    """As :func:`tiny_task`, for an uneven robot, whose arms start with these joints (rad)."""
+def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **changes):
+    """As :func:`tiny_task`, for an uneven robot, whose arms start with these joints (rad); with
+    three goals for both hands unless others are given."""
+    if "goals" not in changes:
+        changes["goals"], changes["initial_hands"] = [[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]], "RLR"
     keys = ("left_links", "right_links", "left_shoulder")
-    start = {"base": list(base), "left": left, "right": right}
+    start = {"base": list(base), "left": list(left), "right": list(right)}
     return tiny_task(
         robot={key: list(getattr(UNEVEN, key)) for key in keys}, start=start, **changes
     )
+
+
+TIED = tiny_task(
+    goals=[[4.0, 0.1], [4.9, 0.1], [3.1, 0.1]], radius=0.6, initial_hands="best-of-all"
+)
+"""At the start both hands are in goal 1, the right one in goal 2 and the left one in goal 3: of LRL
+and RRL, which need no movement, RRL has fewer changes of hand."""
 
 
 def changed(like, **update):
@@ -63,3 +74,10 @@ def sample(task, count, noise=0.3, seed=0):
     targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
     free = [axis not in task.locked_base for axis in "xy"] + [True] * (task.robot.dof - 2)
     return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)
+
+
+def solve(method, task, seed=0, **parameters):
+    """What a method of this project finds, the execution of it, and the session."""
+    session = Session(task, seed, method.told, trusted=True)
+    result = method(method.Parameters(**parameters)).solve(session)
+    return result, execute(task, result.solution), session
