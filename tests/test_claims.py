@@ -17,8 +17,7 @@ from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Fi
 from coartic.analysis.claims.rules import all_of, higher, in_every_family, some_of
 from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.signatures.context import context_dependence, dependence_below
-from coartic.analysis.signatures.subtasks import ROUNDING, isolated_reach, served
+from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
@@ -138,20 +137,14 @@ def test_half_of_the_goals_are_too_few():
 
 def test_claims_that_say_nothing_of_the_model_are_not_counted(judged):
     entries = judged(
-        (found(True, 0.001), {}), (found(True, 0.2), {}), (found(True), {"uncounted": "flawed"})
-    )
-    numbers = {"supported": 1, "not supported": 0, "undecided": 1, "depends on the goals": 0}
-    assert judge.counts(entries) == numbers
-
-
-def test_verdicts_in_words(judged):
-    entries = judged(
         (found(True, 0.001), {"short": "it is so"}),
         (found(True, 0.001), {"short": "flawed", "uncounted": "flawed"}),
         (found(False, 0.999), {}),
         (found(True, 0.2), {"short": "it may be so"}),
         (None, {}),
     )
+    numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
+    assert judge.counts(entries) == numbers
     central = {"supported": ["it is so"], "undecided": ["it may be so"]}
     assert sentences.central_claims(entries) == central
     others = sentences.counts_of_others(entries)
@@ -282,6 +275,12 @@ def on_2(condition, rewards, hands):
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
         ("proficiency-rises", on_1("EC2", HIGH) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "not supported"),
+        ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
+         + on_2("EC1", WORSE, "RRRR") + on_2("EC3", BETTER, "RRRR"), "supported"),
+        ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
+         + on_2("EC1", BETTER, "RRRR") + on_2("EC3", WORSE, "RRRR"), "not supported"),
+        ("rlrr-better", on_2("EC3", BETTER + WORSE, MIXED), "supported"),
+        ("rlrr-better", on_2("EC3", WORSE + BETTER, MIXED), "not supported"),
         ("ec2-rrlr-better", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
         ("ec2-rrlr-better", on_1("EC2", LOW, "RRRR"), "undecided"),
         # Better than all runs of EC2 together, but not than those with RRLR.
@@ -292,10 +291,12 @@ def on_2(condition, rewards, hands):
         ("ec3-alternates", on_1("EC3", TWENTY, lrlr(18)), "undecided"),
         ("ec3-alternates", on_1("EC3", TWENTY, lrlr(12)), "undecided"),
         ("ec3-alternates", on_1("EC3", TWENTY, lrlr(11)), "not supported"),
+        ("ec4-keeps-lrlr", on_1("EC4", TWENTY, lrlr(19)), "supported"),
         ("ec2-unreliable", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
         ("ec2-unreliable", on_1("EC2", MIDDLE * 3, "RRLR"), "not supported"),
         ("ec2-unreliable", on_1("EC2", MIDDLE, "RRLR"), "undecided"),
         # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
+        ("ec2-sequences", on_1("EC2", MIDDLE * 5, ["RRLR", "LRLR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR", "RRRR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE, ["RLRR"] + ["RRRR"] * 7), "undecided"),
@@ -355,6 +356,7 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert finding.evidence.startswith("Ticks by which it is so: t, who: 5.0 [")
     assert finding.evidence.count("t, who: 5.0 [") == 1
     assert "; t, who against 3.7 [" in finding.evidence
+    assert "(who), a difference of 1.3 [" in finding.evidence
     one_of = some_of([higher(second, first), higher(first, second)])
     least = bootstrap_test(first.numbers, second.numbers)
     assert one_of.holds
@@ -511,7 +513,7 @@ EVERY = {"ascending": {"RRR": -319}, "descending": {"RRR": -333}, **SEQUENCES}
 )
 def test_a_failed_trial_or_sequence_is_found(failed, sequences, verdict):
     """On one-armed tasks, which says nothing of the others."""
-    rows = [row | {"failed_trials": failed * (k == 5)} for k, row in enumerate(seven([9, 10, 11]))]
+    rows = [row | {"failed_trials": failed * (k == 1)} for k, row in enumerate(seven([9, 10, 11]))]
     study = planted_study(rows, sequences)
     assert verdict_of("corrective-ensures-one-armed", study).verdict == verdict
     assert verdict_of("corrective-ensures-two-armed", study).verdict == "supported"
@@ -796,17 +798,6 @@ def test_the_reward_for_the_whole_makes_the_difference(rewards, first, verdict):
     assert judged.verdict == verdict, judged.evidence
 
 
-def test_little_dependence_on_context():
-    """Two samples of one distribution are less than a pooled SD apart; two SDs are not."""
-    rng = np.random.default_rng(2)
-    same, other = rng.normal(size=(2, 20, 10))
-    assert dependence_below(same, other, 1.0, np.random.default_rng(0)) < 0.001
-    shifted = other + 2.0
-    assert context_dependence(same, shifted) > 1
-    assert dependence_below(same, shifted, 1.0, np.random.default_rng(0)) > 0.9
-    assert np.isnan(dependence_below(same[:1], other, 1.0, rng))
-
-
 @pytest.mark.parametrize(
     ("xs", "runs", "verdict"),
     [
@@ -840,32 +831,19 @@ def study(tmp_path_factory):
 def test_the_register_on_runs(study):
     entries = {entry.claim.id: entry for entry in judge.judgements(study)}
     assert list(entries) == [claim.id for claim in CLAIMS.values() if not claim.on_random_tasks]
-    # Few runs, yet these are never in doubt.
-    for name in ("first-movement-sacrificed", "ec3-beats-exhaustive"):
-        assert entries[name].verdict != "not supported"
     sacrificed = entries["first-movement-sacrificed"]
     assert "(random guesses)" in sacrificed.finding.evidence
     assert len(sacrificed.run_ids) == 24
-    assert set(sacrificed.run_ids) <= set(study.runs.run_id)
-    # What was not run is not judged.
-    for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):
+    for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
         assert entries[name].verdict == "undecided"
         assert "this folder has no runs of" in entries[name].finding.evidence
-    table = TABLES["claims"](study)
-    assert table.verdict.tolist() == [entry.verdict for entry in entries.values()]
-
-
-def test_independent_claims_rest_on_printed_tasks(study):
-    """The others rest on a task whose goals were chosen for results like theirs."""
+    assert TABLES["claims"](study).verdict.tolist() == [each.verdict for each in entries.values()]
+    # Claims on printed tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
-    reconstructed = {name for name, task in study.tasks.items() if task.reconstructed}
-    assert reconstructed == {T1, T2}
-    seen = 0
-    for entry in judge.judgements(study):
-        tasks = {task_of[run] for run in entry.run_ids}
-        seen += bool(tasks)
-        assert not tasks or bool(tasks & reconstructed) == entry.claim.fitted, entry.claim.id
-    assert seen > 20
+    read = {name: {task_of[run] for run in each.run_ids} for name, each in entries.items()}
+    assert sum(map(bool, read.values())) > 20
+    for name, tasks in read.items():
+        assert not tasks or bool(tasks & {T1, T2}) == CLAIMS[name].fitted, name
 
 
 @pytest.mark.parametrize(
@@ -898,21 +876,6 @@ def test_the_papers_own_p_values():
     assert f"EC3-RLRR-above-RRRR p = {p:.2g} (" in judged.evidence
     assert f"{p:.2g}" == "0.053"
     assert not judged.entry.claim.fitted
-
-
-def test_what_a_posture_serves():
-    """The corrective process itself gains nothing; half the way ahead, half the way is left."""
-    assert served(hit_early(T2, 0.0)) == pytest.approx(np.zeros((3, 2)))
-    path = hit_early(T2, 0.5)
-    task, q = path.task, path.execution.configurations
-    alone = corrective_trial(task, "RRRR").configurations[0]
-    left = isolated_reach(task, q[0], 2, "right")[0]
-    gain = isolated_reach(task, alone, 2, "right")[0] - left
-    assert gain > 0.4 * left
-    assert served(path)[0] == pytest.approx([0, gain])
-    # What the other arm does is not the chosen one's.
-    q[0, task.robot.joints("left")] += 0.3
-    assert served(path)[0, 1] == gain
 
 
 def test_every_sentence_is_accounted_for():

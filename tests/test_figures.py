@@ -68,7 +68,7 @@ def test_learning_curves_against_a_loop(study):
             assert row.best_low == pytest.approx(best[0] + 0.75 * (best[1] - best[0]))
             assert row.best_high == pytest.approx(best[3] - 0.75 * (best[3] - best[2]))
             spread += row.best_low < row.best_high
-            last = np.concatenate([run[max(row.trial - window, 0) : row.trial] for run in runs])
+            last = np.concatenate([run[max(row.trial - 100, 0) : row.trial] for run in runs])
             assert row.trials == pytest.approx(np.nanmean(last))
     assert spread > 100
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -12,13 +11,15 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from coartic import load_task
+from coartic import corrective_trial, load_task
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.topics.human import findings, measures
 from coartic.analysis.topics.human.findings import FINDINGS, bootstrap
 from coartic.analysis.topics.human.measures import MEASURES, MODELS, Model, mean_of_rows
-from tests.support.made_up import row, study_of
+from coartic.runs.plan import label_of
+from tests.support.made_up import MadeUp, made, row, study_of
+from tests.support.strategies import tiny_task
 from tests.support.suites import run_and_write, suite_of
 
 ABOVE = [{"above": 1}]
@@ -124,7 +125,7 @@ def test_models_picked_from_trials_agree_only_beyond_random_guesses(
     assert rows.over_guesses.isna().sum() == len(rows) - 1
 
 
-def test_where_the_learner_could_differ_from_planners(monkeypatch):
+def test_where_the_learner_could_differ_from_planners():
     verdicts = {
         "differs": {"learner": "disagrees", "one goal ahead": "agrees", "least jerk": "agrees"},
         "a-like": {"learner": "agrees", "one goal ahead": "agrees", "no goal ahead": "disagrees"},
@@ -142,34 +143,15 @@ def test_where_the_learner_could_differ_from_planners(monkeypatch):
     assert possible == ["differs", "a-like", "split"]
     assert apart == ["differs"]
     assert look_ahead == ["a-like"]
-    monkeypatch.setattr(findings, "verdicts", lambda study: cells)
-    assert findings.finding_of_human(None) == (
-        f"Of {len(FINDINGS)} findings about people, the paper's learner agrees with 2, disagrees "
-        "with 2 and is undecided on 1. It could differ from planners that look ahead on 3, where "
-        "it and at least one of them are decided, and differs from all that are on differs. "
-        "Planners that look ahead differ from those that do not on a like."
-    )
 
 
-@pytest.mark.parametrize("finding", FINDINGS.values(), ids=FINDINGS)
-def test_a_finding_can_be_cited_and_judged(finding):
-    for field in "statement population quote place authors title source read predicts".split():
-        assert finding[field]
-    assert re.fullmatch(r"10\.\d{4,}/\S+", finding["doi"])
-    assert 1900 < finding["year"] < 2100
-    assert len(finding["quote"].split()) <= 40
-    assert finding["where"] in ("moved goals", "tasks, one arm", "tasks, two arms", "long tasks")
-    for test in finding["tests"]:
-        assert test["measure"] in MEASURES
-        assert len(test.keys() & {"above", "below"}) == 1
-        assert test.keys() <= {"measure", "above", "below", "disagree"}
-    named = findings.by_model(finding.get("silent", {}) | finding.get("built_in", {}))
-    assert named.keys() <= MODELS.keys()
-
-
-def test_every_measure_serves_a_finding():
-    used = {test["measure"] for finding in FINDINGS.values() for test in finding["tests"]}
-    assert used == set(MEASURES)
+def test_findings_and_measures_are_of_one_another():
+    tests = [test for finding in FINDINGS.values() for test in finding["tests"]]
+    assert {test["measure"] for test in tests} == set(MEASURES)
+    assert all(len(test.keys() & {"above", "below"}) == 1 for test in tests)
+    for finding in FINDINGS.values():
+        named = findings.by_model(finding.get("silent", {}) | finding.get("built_in", {}))
+        assert named.keys() <= MODELS.keys()
 
 
 def test_rank_correlation_is_kendalls():
@@ -192,8 +174,8 @@ def test_statistics_of_all_tasks():
 
 def test_horizon_that_is_enough():
     """Within 1 % of all goals in view, on tasks with six goals or more."""
-    tasks = [load_task(f"{family}/v1/i000") for family in ("long", "one-armed")]
-    assert [len(task.goals) >= 6 for task in tasks] == [True, False]
+    tasks = [load_task(name) for name in ("long/v1/i003", "one-armed/v1/i005")]
+    assert [len(task.goals) for task in tasks] == [6, 5]
     rows = [
         row("receding-horizon", -ticks, task=task.name, variant=f"horizon={h}",
             parameters=json.dumps({"horizon": h}))
@@ -258,6 +240,112 @@ def test_bow_of_paths_with_one_corner():
 def test_the_hand_turns_at_goals():
     run = walk((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (3, 3), (4, 4))
     assert measures.turn_at_goals(run) == pytest.approx((math.pi / 2 + math.pi / 4) / 2)
+
+
+def planted(*cells):
+    """A study of runs by task, method and parameters."""
+    rows, runs = [], {}
+    for task, method, parameters, of_cell in cells:
+        variant = ", ".join(f"{name}={value}" for name, value in parameters.items())
+        asked = {"task": task.name, "variant": variant, "parameters": json.dumps(parameters)}
+        rows.append(row(method, -100, **asked))
+        runs[task.name, label_of(method, variant)] = SimpleNamespace(task=task, runs=of_cell)
+    tasks = {task.name: task for task, *_ in cells}
+    study = study_of(pd.DataFrame(rows), list(tasks.values()), suite="human")
+    return MadeUp(study, trajectories=made(runs))
+
+
+ALONE = load_task("ascending")
+
+
+def moved_goal(by):
+    first, second, third = ALONE.goals
+    goals = first, (second[0], second[1] + by), third
+    return ALONE.model_copy(update={"name": f"ascending.goal2_0_{by}", "goals": goals})
+
+
+def test_turns_are_saved_against_the_corrective_process():
+    """Turns of a quarter and an eighth, which one of two runs has too."""
+    corners = walk((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (3, 3), (4, 4))
+    straight = walk(*((x, 0) for x in range(7)))
+    study = planted(
+        (ALONE, "corrective-alone/given", {}, (corners,)),
+        (ALONE, "trajectory-optimisation/path-length", {}, (corners, straight)),
+    )
+    saved = measures.turn_saved(study, MODELS["shortest path"])
+    assert saved == pytest.approx({"ascending": 3 * math.pi / 16})
+
+
+def test_slopes_that_chance_turns_are_negative_and_what_preparing_saves():
+    """Postures of two runs follow the next goal by 0.3 in opposite directions."""
+    cells = [
+        (moved_goal(by), "receding-horizon", {"horizon": 1}, tuple(
+            SimpleNamespace(execution=SimpleNamespace(configurations=[np.array([slope * by])]))
+            for slope in (0.3, -0.3)
+        ))
+        for by in (-1.0, 0.0, 1.0)
+    ]  # fmt: skip
+    alone = (ALONE, "receding-horizon", {"horizon": 0}, (SimpleNamespace(ticks=120),))
+    study = planted(*cells, alone)
+    model = MODELS["one goal ahead"]
+    assert measures.slope_norms(study, model, 1) == {"ascending": -0.3}
+    assert measures.norms_and_benefits(study, model) == {"ascending": [-0.3, 20.0]}
+
+
+def test_paths_before_two_places_of_a_goal():
+    """Stopping, paths to goal 1 lie 0.2 apart between the outer places; passing, twice that."""
+    cells = [
+        (moved_goal(by), "trajectory-optimisation/jerk", {"timing": "free", "stop": stop},
+         (walk((0, apart * by), (1, apart * by), (2, apart * by)),))
+        for stop, apart in ((1, 0.1), (0, 0.2))
+        for by in (-1.0, 0.0, 1.0)
+    ]  # fmt: skip
+    by_task = measures.apart_by_stop(planted(*cells), MODELS["least jerk"])
+    assert by_task["ascending"] == pytest.approx([0.2, 0.4])
+
+
+def test_the_first_movement_is_longer_than_alone():
+    """Where the other hand hits goal 2: by 7 ticks and by 1."""
+    task = load_task("two-armed-1")
+    runs = [
+        SimpleNamespace(
+            task=task,
+            hands=[{"L": "left", "R": "right"}[hand] for hand in hands],
+            execution=SimpleNamespace(
+                ticks_by_goal=lambda hands=hands, more=more: (
+                    corrective_trial(task, hands[0] * 4).ticks_by_goal()[0] + more, 0, 0, 0
+                )
+            ),
+        )
+        for hands, more in (("RLRL", 7), ("LRLR", 1), ("RRLL", 99))
+    ]  # fmt: skip
+    study = planted((task, "receding-horizon", {"horizon": 1}, runs))
+    assert measures.excess_of_first(study, MODELS["one goal ahead"]) == {"two-armed-1": 4.0}
+
+
+@pytest.mark.parametrize(("hands", "repeats"), [("RRL", 1.0), ("LRL", 0.0)])
+def test_near_ties(hands, repeats):
+    """A body that is its own mirror image: goal 2 lies on its axis, goal 3 beside a hand."""
+    start = {"base": [0.0, 0.0], "left": [math.pi - 0.5, 0, 0, 0], "right": [0.5, 0, 0, 0]}
+    goals = [[3.0, 3.0], [0.0, 4.5], [4.0, 2.5]]
+    task = tiny_task(goals=goals, initial_hands="RLR", start=start)
+    ends = [task.robot.forward_kinematics(task.q0, hand) for hand in ("left", "right")]
+    assert ends[0] == pytest.approx(ends[1] * [-1, 1])
+    run = SimpleNamespace(
+        task=task,
+        hands=[{"L": "left", "R": "right"}[hand] for hand in hands],
+        execution=SimpleNamespace(configurations=[task.q0] * 3),
+    )
+    assert list(measures.near_ties(run)) == [2]
+    of_30, of_29 = (
+        measures.near_tie_repeats(
+            planted((task, "receding-horizon", {"horizon": 1}, (run,) * count)),
+            MODELS["one goal ahead"],
+        )["tiny"]
+        for count in (30, 29)
+    )
+    assert of_30.tolist() == [[repeats]] * 30
+    assert np.isnan(of_29).all()  # fewer than thirty
 
 
 @pytest.fixture(scope="module")

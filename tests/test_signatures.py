@@ -12,14 +12,15 @@ import pytest
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context, subtasks
-from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.between import NOWHERE, TwoContexts
 from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
 from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.topics.coarticulation import placebo, sentences, tables
+from coartic.analysis.statistics.estimates import wilson
+from coartic.analysis.topics.coarticulation import placebo, sentences, tables, values
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -130,8 +131,22 @@ def test_drawn_tests_count_what_was_seen():
     assert context.beyond_p(near, far, rng(), resamples=19) == 1.0
     assert math.isnan(context.beyond_p((far[0][:1], far[1]), near, rng()))
     assert context.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
-    assert context.dependence_below(*far, 1.0, rng(), resamples=9) == 1.0
     assert math.isnan(context.dependence_below(near[0][:1], near[1], 1.0, rng()))
+
+
+def test_dependence_below_a_bound_by_brute_force():
+    """Every bootstrap sample of three runs and of two, counted one by one."""
+    first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
+    reached = [
+        distance_of_means(a, b) >= 2.0 * math.sqrt((((a - a.mean(0)) ** 2).sum()
+                                                    + ((b - b.mean(0)) ** 2).sum()) / 3)
+        for a in itertools.product(first, repeat=3)
+        for b in itertools.product(second, repeat=2)
+        for a, b in [(np.array(a), np.array(b))]
+    ]  # fmt: skip
+    p = context.dependence_below(first, second, 2.0, rng())
+    assert 0.1 < p < 0.9
+    assert p == pytest.approx(np.mean(reached), abs=0.02)
 
 
 def test_slopes_count_where_they_exceed_the_placebos():
@@ -157,7 +172,8 @@ def test_pairs_of_contexts():
     assert context_pairs(tasks) == [("ascending", "descending", 1)]
     moved = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
     other = tiny_task(goals=[[5.0, 1.0], [5.0, 2.0], [5.0, 3.5]], initial_hands="RRR")
-    assert context_pairs({"a": moved, "b": other, "c": moved}) == [
+    apart = tiny_task(goals=[[5.0, 1.5], [5.0, 2.0], [5.0, 3.0]], initial_hands="RRR")
+    assert context_pairs({"a": moved, "b": other, "c": moved, "d": apart}) == [
         ("a", "b", 2),
         ("b", "c", 2),
     ]
@@ -268,6 +284,29 @@ def test_isolated_reaches_are_the_corrective_process():
     assert subtasks.isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert subtasks.isolated_reach(unreachable, unreachable.q0, 3, "right") is None
+    stays = SimpleNamespace(configurations=np.tile(unreachable.q0, (3, 1)))
+    path = SimpleNamespace(task=unreachable, hands=("right",) * 3, execution=stays)
+    assert subtasks.ticks_slower(path)[2] == math.inf
+
+
+def test_what_a_posture_serves():
+    """The corrective process itself gains nothing; half the way ahead, half the way is left."""
+    task = as_released("two-armed-2")
+    initial = trajectory(task, corrective_trial(task, "RRRR").movements)
+    assert subtasks.served(initial) == pytest.approx(np.zeros((3, 2)))
+    alone = initial.execution.configurations
+    q = alone.copy()
+    q[:-1] += 0.5 * np.diff(alone, axis=0)
+    ticks = np.add(initial.execution.ticks_by_goal(), [7, 0, 0, 0])
+    execution = SimpleNamespace(configurations=q, ticks_by_goal=lambda: ticks)
+    path = SimpleNamespace(task=task, hands=initial.hands, execution=execution)
+    left = subtasks.isolated_reach(task, q[0], 2, "right")[0]
+    gain = subtasks.isolated_reach(task, alone[0], 2, "right")[0] - left
+    assert gain > 0.4 * left
+    assert subtasks.served(path)[0] == pytest.approx([7, gain])
+    # What the other arm does is not the chosen one's.
+    q[0, task.robot.joints("left")] += 0.3
+    assert subtasks.served(path)[0, 1] == gain
 
 
 def test_other_hands_are_no_sacrifice():
@@ -308,6 +347,8 @@ def test_choice_in_isolation():
     agrees = REGISTER["hand as in isolation"].measure(Trajectories(task, "", "", tuple(paths)))
     assert agrees[:, 0].tolist() == [True, False]
     assert agrees[0, 1]
+    shares = values.over_runs(REGISTER["hand as in isolation"], np.arange(10) < 7, NOWHERE)
+    assert (shares.estimate, shares.n) == (wilson(7, 10), 10)
     assert SIGNS["hand"].of_run(np.array([[0.0, 1.0, 1.0]])) == 0.5  # not of the last goal
     assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
 
@@ -494,8 +535,16 @@ def test_frame_of_two_contexts():
     ]
     # A row has a value, or says why it has none.
     assert (frame.value.notna() | (frame.why_not != "")).all()
-    p_holm = tables.contexts(study_with(*cells)).p_holm[f"ascending {EC1} goal 1 right"]
-    assert p_holm == one(EC1, "context dependence").p
+    shown = tables.contexts(study_with(*cells)).loc[f"ascending {EC1} goal 1 right"]
+    assert shown.p_holm == one(EC1, "context dependence").p
+    for column, signature in (
+        ("distance", "context distance"),
+        ("dependence", "context dependence"),
+        ("equivalent", "motor-equivalent part"),
+        ("other", "non-motor-equivalent part"),
+        ("lead", "lead time"),
+    ):
+        assert shown[column] == one(EC1, signature).value
 
 
 def test_frame_of_a_family():
@@ -519,9 +568,10 @@ def test_frame_of_a_family():
         assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
         assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
     assert slopes.value[1, "right", "base_y"] > 0.001
-    assert (
-        slopes["where"][3, "right", "base_y"] == "goal 3, carry-over of goal 2, right hand, base_y"
-    )
+    assert slopes["where"].xs("base_y", level="joint").tolist() == [
+        "goal 1, anticipatory of goal 2, right hand, base_y",
+        "goal 3, carry-over of goal 2, right hand, base_y",
+    ]
     assert frame[frame.signature == "context distance"].why_not.str.contains("locus slopes").all()
     steepest = tables.slopes(study_with(*cells))
     assert steepest.kind.tolist() == ["anticipatory", "carry-over"]
@@ -568,6 +618,28 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
         assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
 
 
+@pytest.mark.parametrize("apart", [0.0, 0.5])
+def test_a_method_that_draws_nothing_needs_no_test(apart):
+    """One run a context, and no placebo."""
+    cells = [
+        posed(load_task(name), "trajectory-optimisation/jerk", [posture(x)])
+        for name, x in (("ascending", 0.0), ("descending", apart))
+    ]
+    study = study_with(*cells)
+    study.runs["trials"] = 0
+    found = placebo.difference(study)
+    assert (found.selects, found.differ, found.seen) == (False, apart > 0, apart > 0)
+
+
+def test_p_values_are_corrected_over_the_contexts_of_a_method():
+    rows = [
+        (name, {"method": name[0], "p_holm": p})
+        for name, p in (("a1", 0.01), ("b1", 0.04), ("a2", 0.03))
+    ]
+    adjusted = {name: row["p_holm"] for name, row in tables.adjust_p(rows)}
+    assert adjusted == pytest.approx({"a1": 0.02, "b1": 0.04, "a2": 0.03})
+
+
 def test_slopes_beside_the_placebo():
     """The learner follows a moved goal by 0.9 of its way, the placebo by 0.2."""
     tasks, cells = family_of([1.5, 2.0, 2.5]), []
@@ -603,3 +675,6 @@ def test_signs_beside_the_placebo():
     assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
     assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
     assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))
+    shown = tables.signatures(study).loc[f"ascending {EC1}"]
+    assert (shown.first_p, shown["first"]) == (p, np.mean(slower[EC1]))
+    assert math.isnan(shown.preshaping_p)  # there is no other arm
