@@ -54,8 +54,7 @@ def test_the_typical_run_is_nearest_the_median(study):
 
 
 def test_learning_curves_against_a_loop(study):
-    window = 7
-    data = learning_curves(study, window)
+    data = learning_curves(study, 100)
     rewards = dict(study.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):

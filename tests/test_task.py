@@ -41,7 +41,7 @@ def test_several_mistakes_each_get_a_line(tmp_path):
 def test_files_that_are_not_there_or_not_text(tmp_path):
     with pytest.raises(TaskError, match="cannot be read: No such file"):
         load_task(tmp_path / "absent.toml")
-    with pytest.raises(TaskError, match="cannot be read: Is a directory"):
+    with pytest.raises(TaskError, match="it is a folder, not a file"):
         load_task(tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(TaskError, match="not a text file in UTF-8"):
