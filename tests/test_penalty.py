@@ -89,7 +89,7 @@ def test_environments_pay_at_the_goal_that_costs():
     gym = pytest.importorskip("coartic.gym")
     task = with_penalty("two-armed-1", **TERMS["all"])
     execution = learn(task, "EC4", seed=0, trials=300).execute()
-    env = gym.TaskEnv(task)
+    env = gym.TaskEnv(task, scale=8.0)
     env.reset()
     first = {m.goal: m for m in reversed(execution.movements)}
     rewards = [
