@@ -43,7 +43,15 @@ from coartic.errors import CoarticError
 from coartic.interruption import at_end
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
-from coartic.threads import begin_worker, end_group, one_thread_each, threads_for, undisturbed
+from coartic.threads import (
+    begin_worker,
+    end_group,
+    environment,
+    one_thread_each,
+    set_environment,
+    threads_for,
+    undisturbed,
+)
 
 _POLL_S = 1.0  # between looks at limits
 _AHEAD = 2**13  # bytes of a job that a worker has while it is at another: a pipe holds more
@@ -105,7 +113,7 @@ class Local:
             shutil.rmtree(folder, ignore_errors=True)
 
         with (
-            tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True) as folder,
+            new_folder() if foreign else contextlib.nullcontext("") as folder,
             one_thread_each(),
             at_end(clear),
         ):
@@ -113,7 +121,7 @@ class Local:
                 while waiting or crew:
                     while waiting and len(crew) < workers:
                         with undisturbed():  # or nobody would end it
-                            crew.append(Worker(folder, foreign, workers, tasks))
+                            crew.append(Worker(folder, workers, tasks))
                         crew[-1].give(waiting)
                     # While a worker compiles the learner: what it hands over is executed here.
                     with contextlib.suppress(Exception):  # workers say the same
@@ -180,9 +188,7 @@ class Local:
 class Worker:
     """A worker process: the jobs that it has, in its order, and what it says of them."""
 
-    def __init__(
-        self, folder: str, foreign: bool, workers: int, tasks: list[tuple[Task, bool]]
-    ) -> None:
+    def __init__(self, folder: str, workers: int, tasks: list[tuple[Task, bool]]) -> None:
         context = worker_context()
         theirs, self._orders = context.Pipe(duplex=False)
         self._answers, answers = context.Pipe(duplex=False)
@@ -195,8 +201,10 @@ class Worker:
         self.jobs: deque[Numbered] = deque()
         self.began_s: float | None = None
         """When it began the first of them."""
+        variables = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
         self._process = context.Process(
-            target=perform_jobs, args=(theirs, answers, prints, folder, foreign, workers)
+            target=perform_jobs,
+            args=(theirs, answers, prints, folder, workers, variables),
         )
         with contextlib.suppress(OSError, EOFError):  # no process, which is seen below
             start_process(self._process)
@@ -294,15 +302,26 @@ class Worker:
             end.close()
 
 
+def new_folder() -> tempfile.TemporaryDirectory[str]:
+    """Of workers, which may write into it while it is removed."""
+    return tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True)
+
+
 def owner_of(job: Job) -> str:
     """Whose workers perform a job: this project's methods share theirs."""
     return "" if job.method.is_ours else f"{job.method.name} {job.method.code}"
 
 
 def perform_jobs(
-    orders: Any, answers: Any, prints: Any, folder: str, foreign: bool, workers: int
+    orders: Any,
+    answers: Any,
+    prints: Any,
+    folder: str,
+    workers: int,
+    variables: dict[str, str | None],
 ) -> None:
-    """What a worker process does."""
+    """What a worker process does; in a folder of its own below ``folder``, unless that is empty."""
+    set_environment(variables)
     if os.name == "posix":
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(prints.fileno(), 1)
@@ -310,7 +329,7 @@ def perform_jobs(
     begin_worker(folder)
     bound_memory(workers)
     prepare(orders.recv())
-    if foreign:
+    if folder:
         tempfile.tempdir = os.environ["TMPDIR"] = tempfile.mkdtemp(dir=folder)
         os.chdir(tempfile.tempdir)
     worker = os.getpid()
@@ -394,8 +413,11 @@ def start_process(process: Any) -> None:
     if _START == "forkserver":
         from multiprocessing import forkserver, resource_tracker
 
-        resource_tracker.ensure_running()  # first: it lets signals through again
-        with undisturbed():
-            forkserver.ensure_running()
+        # They would look for modules in the working folder first, whoever has filled it.
+        safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        with environment(safe):
+            resource_tracker.ensure_running()  # first: it lets signals through again
+            with undisturbed():
+                forkserver.ensure_running()
     with undisturbed():
         process.start()

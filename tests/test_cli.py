@@ -197,6 +197,21 @@ def test_an_interrupted_command_ends_with_a_sentence(tmp_path, moment, name, tim
     assert not list((tmp_path / "temporary").iterdir())
 
 
+def test_modules_in_the_working_folder_are_not_imported(tmp_path):
+    """By no process of a command that is installed, whatever a stranger has put there."""
+    program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
+    program.parent.mkdir()
+    gift.mkdir()
+    program.write_text("from coartic.__main__ import main\nmain()")
+    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
+        (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
+    command = [sys.executable, program, *map(str, SMALL), "--jobs", "2", "--out", "out"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=gift, env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run").exists()
+
+
 def test_list(coartic):
     assert coartic("list")[0] == 0
     for name in ("two-armed-1", "comparison", "long", "dual-process/EC4", "EC4"):
