@@ -7,7 +7,7 @@ from coartic import load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.trials import hand_codes, make_trials, movements_of
 from coartic.optimisers import TOLD
-from tests.support.strategies import sample
+from tests.support.strategies import sample, tiny_task
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
 
@@ -82,6 +82,22 @@ def test_one_hand_sequence_stands_for_all():
         np.testing.assert_array_equal(same, other)
     with pytest.raises(ValueError, match="2 hand sequences for 3 trials"):
         make_trials(task, ["RLRL", "RRRR"], targets)
+
+
+def test_a_locked_base_stays_where_it_starts():
+    start = {"base": [0.0, 0.5], "left": [0.0] * 4, "right": [0.0] * 4}
+    task = tiny_task(locked_base=["y"], start=start)
+    targets = np.tile(task.q0, (1, 2, 1))
+    assert make_trials(task, "RR", targets).completed.all()
+    with pytest.raises(ValueError, match="moves the base in y"):
+        make_trials(task, "RR", 0.0 * targets)
+
+
+def test_a_counter_holds_so_many_in_all():
+    session = Session(load_task("ascending"), 0, TOLD)
+    session.spend(hessians=2**62)
+    with pytest.raises(ValueError, match="counts to"):
+        session.spend(hessians=2**62)
 
 
 def test_what_was_given_is_left_alone():
