@@ -145,7 +145,10 @@ def interrupt(*_):
         time.sleep(0.05)
 
 if moment.isdigit():  # milliseconds after it has begun to look for signals
-    threading.Timer(int(moment) / 1000, interrupt).start()
+    import coartic.__main__
+    begin = coartic.__main__.catch_signals
+    timer = threading.Timer(int(moment) / 1000, interrupt)
+    coartic.__main__.catch_signals = lambda: (begin(), timer.start())
 elif moment == "callback":  # where compiled code has called Python, which cannot raise
     import ctypes
     call = ctypes.CFUNCTYPE(None)(interrupt)
