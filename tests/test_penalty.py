@@ -133,4 +133,4 @@ def test_a_suite_has_variants_of_tasks_and_its_folder_can_be_checked(tmp_path):
         db.execute("UPDATE settings SET definition = replace(definition, '100.0', '200.0')")
     wrong = [words for words in checker.check_runs(folder).wrong if words.startswith("Run ")]
     assert len(wrong) == 3  # those of one of three tasks
-    assert all("its task" in sentence for sentence in wrong)
+    assert all("reward is " in sentence for sentence in wrong)

@@ -758,7 +758,7 @@ def explain_errors(folder: Path) -> Iterator[None]:
 
 def is_locked(error: sqlite3.OperationalError) -> bool:
     """Whether another program has the file for itself."""
-    return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+    return "locked" in str(error)
 
 
 def to_json(content: Any, *, sort_keys: bool = False) -> str:
