@@ -139,7 +139,7 @@ def certify(
     search = ProofSearch(task, ticks, still, model.step)
     search.begin()
     least = 0
-    if too_many_sequences(task, len(task.hands)) is None:
+    if too_many_sequences(task.name, len(task.goals), len(task.hands)) is None:
         sequences = itertools.product(task.hands, repeat=len(task.goals))
         least = ticks_for_distance(task, model.step, sequences)
     while search.heap and search.solved < most_nodes and least < ticks:

@@ -31,11 +31,10 @@ import numpy as np
 from pydantic import Field
 
 from coartic.baselines.uninformed import Practice, UninformedParameters
-from coartic.method import Method, Result, Session
+from coartic.method import Method, Outline, Result, Session
 from coartic.motion.initial import too_many_sequences
 from coartic.optimisers import TOLD, sequences_of
 from coartic.robot import Array
-from coartic.tasks.task import Task
 
 
 class BanditParameters(UninformedParameters):
@@ -115,9 +114,9 @@ class CMAES(Method):
     told = TOLD
     Parameters = UninformedParameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to try one by one, if there are."""
-        return too_many_sequences(task, len(task.hands))
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Search until the trials are used up; the solution is the best trial's."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 
-from coartic import Execution, Task
-from coartic.method import Information, Method, MethodError, Result, Session
+from coartic import Execution
+from coartic.method import Information, Method, MethodError, Outline, Result, Session
 from coartic.motion.initial import changes_of_hand, corrective_movements, too_many_sequences
 from coartic.tasks.task import letters_of
 
@@ -46,9 +46,9 @@ class EverySequence(Method):
     told = GivenHands.told
     stochastic = False
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to try one by one, if there are."""
-        return too_many_sequences(task, len(task.hands))
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""

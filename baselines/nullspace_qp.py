@@ -65,7 +65,7 @@ from pydantic import Field
 from coartic import Movement, Task
 from coartic.baselines.cascade import solve_cascade, state_cascade
 from coartic.baselines.posture_graph import HandSequence
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.initial import changes_of_hand, too_many_sequences
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
@@ -317,10 +317,10 @@ class NullspaceQP(Method):
     """Share of the rates of the step before in those preferred now."""
     quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 20}
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to simulate, if there are."""
         every = self.parameters.hands == "every"
-        return too_many_sequences(task, len(task.hands)) if every else None
+        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """``goal`` (0-based), and the goals that are prepared for on the way there."""
@@ -435,7 +435,7 @@ class Preshaping(NullspaceQP):
     told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
     secondary = ("preshaping: the other arm's posture at the goal it hits next",)
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there is nothing to preshape, or the reason of the others."""
         if len(task.hands) < 2:
             return f"task {task.name!r} has one hand; there is no other arm to preshape"

@@ -22,7 +22,7 @@ from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
 from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.corrective import correct
 from coartic.motion.initial import hand_sequences, too_many_sequences
 from coartic.robot import Array
@@ -183,9 +183,9 @@ class Multistart(Optimum):
     Parameters = MultistartParameters
     quick: ClassVar[dict[str, Any]] = {"starts": 2}
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many hand sequences to plan one by one, if there are."""
-        return too_many_sequences(task, len(task.hands))
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""

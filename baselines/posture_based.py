@@ -33,9 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic import Movement, Task
+from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.compiled import chain_by, entry, joint_lever
 from coartic.motion.initial import too_many_sequences
 from coartic.robot import BASE_DOF, Array, Hand
@@ -100,10 +100,10 @@ class PostureBased(Method):
     Parameters = PostureBasedParameters
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to plan one by one, if there are."""
         every = self.parameters.hands == "every"
-        return too_many_sequences(task, len(task.hands)) if every else None
+        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
 
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,7 +28,7 @@ class Dask:
         self.address, self.say = address, say
         self.workers = 1  # it may have any number: batches are as large as methods take them
 
-    def perform(self, jobs: Sequence[Job]) -> Iterator[tuple[int, list[Outcome]]]:
+    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[int, list[Outcome]], None, None]:
         """The number of each job with its outcomes, as they come; another worker takes over the
         jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, or it
         has no workers of this version."""

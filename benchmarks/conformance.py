@@ -54,7 +54,7 @@ def law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[Law]:
     """Every law of a method, in order, on the shipped tasks or on others."""
     trials = {"trials": CHECK_TRIALS} if "trials" in card.defaults else {}
-    parameters = trials | dict(card.load().quick)
+    parameters = trials | card.rules()["quick"]
 
     def applies(task: Task) -> bool:
         return card.why_not(task, parameters) is None
@@ -129,7 +129,7 @@ def parameters_law(card: MethodCard) -> Law:
         again = card.complete(parameters)
         if again != parameters:
             yield f"written as JSON and read back, they change: {parameters} became {again}"
-        config = card.load().Parameters.model_config
+        config = card.rules()["config"]
         if config.get("extra") != "forbid":
             yield "an unknown parameter is accepted; forbid extra keys"
         if config.get("frozen") is not True:
@@ -170,7 +170,10 @@ def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
     problems = [
         f"on {task}: {run.reason}"
         for task, run in runs.items()
-        if any(words in run.reason for words in ("does not declare", "own compiled"))
+        if any(
+            words in run.reason
+            for words in ("does not declare", "own compiled", "outside its session")
+        )
     ]
     if declared - used:
         problems.append(f"declared but never used: {', '.join(sorted(declared - used))}")

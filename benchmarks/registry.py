@@ -1,28 +1,30 @@
 """Methods by id: those of this project, of installed plug-ins, and of the user's files.
 
-Plug-ins and method files are imported, which runs them.
+Plug-ins are imported, which runs them; method files are imported by processes of their own.
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
-import re
 import sys
 import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from types import ModuleType
+
+from pydantic import TypeAdapter
 
 from coartic.benchmarks.code_identity import code_of
+from coartic.benchmarks.reader import Reader, cards_of_module
 from coartic.errors import CoarticError
 from coartic.inputs import check_file
 from coartic.learner.conditions import METHOD_PREFIX
-from coartic.method import Information, Method
-from coartic.runs.card import BUILT_IN, MethodCard, card_of, load_file, methods_in
+from coartic.method import Method
+from coartic.runs.card import BUILT_IN, READERS, MethodCard, card_of, methods_in
 from coartic.runs.plan import SEARCH
 from coartic.text import LONGEST_LINE, error_line, plain
 
@@ -45,6 +47,7 @@ MODULES = (
 
 
 Registry = Mapping[str, MethodCard]
+_CARDS = TypeAdapter(list[MethodCard])
 
 
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodCard]:
@@ -106,14 +109,14 @@ def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) ->
 
 
 def cards_of_file(path: Path) -> Iterator[MethodCard]:
-    """The methods of a file. Raises CoarticError where there is none that can be used."""
+    """The methods of a file, which a process of its own imports: what it does there changes
+    nothing here. Raises CoarticError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
-    try:
-        module = load_file(path)
-    except (Exception, SystemExit) as error:
-        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
-    yield from cards_of_module(module, methods_in(module), shown, str(path))
+    reader = Reader(path, shown)
+    for card in _CARDS.validate_python(reader("", "cards")):
+        READERS[str(path)] = reader
+        yield replace(card, origin=shown, where=str(path))
 
 
 def cards_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[MethodCard]:
@@ -129,54 +132,3 @@ def cards_of_plugin(point: metadata.EntryPoint, origin: str) -> Iterator[MethodC
         yield from cards_of_module(module, [target], origin, module.__name__)
     else:
         raise CoarticError(f"{target!r} is not a subclass of coartic.method.Method")
-
-
-def cards_of_module(
-    module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
-) -> Iterator[MethodCard]:
-    """Methods of a module with their code. Raises CoarticError where there is none."""
-    methods = list(methods)
-    for method in methods:
-        check_declaration(method, origin)
-        file = Path(inspect.getfile(module))
-        data = tuple(file.parent / name for name in method.files)
-        try:
-            code = code_of(file, data)
-        except OSError as error:
-            raise CoarticError(
-                f"{origin}: method {method.name!r} declares a file that cannot be read: "
-                f"{error.filename}"
-            ) from None
-        except (SyntaxError, ValueError) as error:
-            raise CoarticError(
-                f"{origin}: it imports what is no Python: {error_line(error)}"
-            ) from None
-        yield card_of(method, origin, where, code)
-    if not methods:
-        unfinished = [
-            f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
-            for value in vars(module).values()
-            if inspect.isclass(value) and issubclass(value, Method) and inspect.isabstract(value)
-            and value is not Method
-        ]  # fmt: skip
-        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
-        raise CoarticError(f"{origin}: defines no subclass of coartic.method.Method{why}")
-
-
-def check_declaration(method: type[Method], origin: str) -> None:
-    """Raises CoarticError where a method does not declare what every method does."""
-    where = f"{origin}: {method.__name__}"
-    for attribute in ("name", "title", "citation"):
-        text = getattr(method, attribute, None)
-        if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
-            raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    if not _NAME.fullmatch(method.name):
-        raise CoarticError(
-            f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
-        )
-    told = getattr(method, "told", None)
-    if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
-        raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
-
-
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

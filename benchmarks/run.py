@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
+from coartic.interruption import unbroken
 from coartic.runs.plan import Plan, RunKey
 from coartic.runs.store import Store, writing
 from coartic.text import counted
@@ -105,17 +107,19 @@ def perform(
         while batches:
             alone: list[Batch] = []
             jobs = [job_of(plan, batch) for batch in batches]
-            for number, outcomes in executor.perform(jobs):
-                runs = score(jobs[number], outcomes)
-                if len(runs) > 1:  # a run that failed may have failed because of the others
-                    again = [run.key for run in runs if run.status not in _SURE]
-                    alone += [Batch(batches[number].position, [key]) for key in again]
-                    runs = [run for run in runs if run.status in _SURE]
-                store.write(runs)
-                for run in runs:
-                    progress.done += 1
-                    progress.count(run.status)
-                    watch(progress, f"{run.setting.task.name} {run.setting.method}")
+            with closing(executor.perform(jobs)) as answers:  # workers end, whatever happens here
+                for number, outcomes in answers:
+                    runs = score(jobs[number], outcomes)
+                    if len(runs) > 1:  # a run that failed may have failed because of the others
+                        again = [run.key for run in runs if run.status not in _SURE]
+                        alone += [Batch(batches[number].position, [key]) for key in again]
+                        runs = [run for run in runs if run.status in _SURE]
+                    with unbroken:
+                        store.write(runs)
+                        for run in runs:
+                            progress.done += 1
+                            progress.count(run.status)
+                            watch(progress, f"{run.setting.task.name} {run.setting.method}")
             batches = alone
         wall_s = time.perf_counter() - clock
         return RunReport(folder, progress, wall_s, store.count() - plan.size)

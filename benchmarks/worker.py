@@ -1,7 +1,8 @@
 """What a worker process does: it lets a method solve a task, and states what came of it.
 
-It may run code that nobody here has read, so its word is no more than that: what it hands over as
-a solution is executed and scored in the parent process, where the method has never been.
+It may run code that nobody here has read, so its word is no more than that: it answers in plain
+data, and what it hands over as a solution is executed and scored in the parent process, where
+method files are not imported.
 """
 
 from __future__ import annotations
@@ -10,15 +11,17 @@ import json
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, Field, PlainValidator, TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.method import (
+    MOST_COUNT,
     BudgetError,
     Information,
     Meter,
@@ -26,7 +29,9 @@ from coartic.method import (
     Result,
     Session,
     UndeclaredError,
+    outline_of,
 )
+from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import SEARCH, RunKey, Setting
@@ -46,28 +51,54 @@ class Job:
     """CPU time of all its runs together."""
 
 
+def plain_movement(movement: Movement) -> Movement:
+    """A movement of plain numbers, texts and arrays."""
+    target, waypoints = movement.target, movement.waypoints
+    return Movement(
+        int(movement.goal),
+        str(movement.hand),  # type: ignore[arg-type]
+        str(movement.kind),  # type: ignore[arg-type]
+        None if target is None else np.array(target, dtype=np.float64),
+        waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
+    )
+
+
+def check_meter(meter: Meter) -> Meter:
+    """A meter itself; ValueError where it counts what cannot be."""
+    if all(0 <= getattr(meter, name) <= MOST_COUNT for name in Meter.COUNTS):
+        return meter
+    raise ValueError("its meter counts what cannot be")
+
+
+_Movement = Annotated[Movement, PlainValidator(lambda parts: plain_movement(Movement(*parts)))]
+_Reward = Annotated[int, Field(gt=-(2**31), lt=2**31)]
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a method states of one run."""
 
-    status: str
+    status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
     reason: str = ""
-    parts: dict[str, list[Movement]] = field(default_factory=dict)
+    parts: dict[str, list[_Movement]] = field(default_factory=dict)
     """Its solution, and of a learner first trial and replay."""
     bound: int | None = None
     details: dict[str, Any] = field(default_factory=dict)
     used: tuple[str, ...] = ()
-    meter: Meter | None = None
+    meter: Annotated[Meter, AfterValidator(check_meter)] | None = None
     """None where the worker died."""
-    rewards: list[int | None] = field(default_factory=list)
+    rewards: list[_Reward | None] = field(default_factory=list)
     times: Times = field(default_factory=Times)
     environment: dict[str, Any] | None = None
     """Where this is not that of the parent process."""
 
 
+_OUTCOMES = TypeAdapter(list[Outcome])
+
+
 def fail(
     job: Job,
-    status: str,
+    status: Literal["timeout", "crashed"],
     reason: str,
     wall_s: float | None = None,
     cpu_s: float | None = None,
@@ -76,6 +107,38 @@ def fail(
     runs = len(job.keys)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.keys]
+
+
+def plain_outcome(outcome: Outcome) -> dict[str, Any]:
+    """An outcome as plain data, whole."""
+    return vars(outcome) | {
+        "meter": outcome.meter and vars(outcome.meter),
+        "times": vars(outcome.times),
+        "parts": {
+            part: [
+                (m.goal, m.hand, m.kind, as_list(m.target), m.ticks, as_list(m.waypoints))
+                for m in movements
+            ]
+            for part, movements in outcome.parts.items()
+        },
+    }
+
+
+def as_list(array: Any) -> Any:
+    """An array as plain data, or None."""
+    return None if array is None else array.tolist()
+
+
+def outcomes_from(job: Job, text: bytes) -> list[Outcome]:
+    """The outcomes of a job from the JSON of :func:`plain_outcome`, or that it crashed."""
+    try:
+        outcomes = _OUTCOMES.validate_python(json.loads(text))
+        if len(outcomes) == len(job.keys):
+            return outcomes
+        why = f"{len(outcomes)} for {len(job.keys)} runs"
+    except (ValueError, TypeError, RecursionError) as error:
+        why = error_line(error)
+    return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
 
 def perform_job(job: Job) -> list[Outcome]:
@@ -89,14 +152,19 @@ def perform_job(job: Job) -> list[Outcome]:
             model=setting.model,
             trial_budget=setting.trial_budget,
             trusted=job.method.is_ours,
+            of_run=True,
         )
         for key in job.keys
     ]
     warm = setting.method in _seen
     _seen.add(setting.method)
-    wall, cpu = time.perf_counter(), time.process_time()
+    wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
         results = solve(job, sessions)
+        made = trials_outside() - made
+        if made and not job.method.is_ours:
+            words = f"the method made {made} trials outside its session, which are not counted"
+            raise UndeclaredError(f"{words}: by coartic.objective, learn or execute")
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -128,7 +196,7 @@ _seen: set[str] = set()
 def solve(job: Job, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
     """What the method returns in each session."""
     method = job.method.configure(job.setting.parameters)
-    reason_not = method.why_not(job.setting.task)
+    reason_not = method.why_not(outline_of(job.setting.task))
     if reason_not is not None:
         raise MethodError("infeasible", str(reason_not))
     if len(sessions) == 1:
@@ -193,17 +261,6 @@ def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
 
 
 def plain_details(details: Any) -> dict[str, Any]:
-    """As plain data."""
-    return dict(json.loads(json.dumps(details, allow_nan=False)))
-
-
-def plain_movement(movement: Movement) -> Movement:
-    """A movement of plain numbers, texts and arrays."""
-    target, waypoints = movement.target, movement.waypoints
-    return Movement(
-        int(movement.goal),
-        str(movement.hand),  # type: ignore[arg-type]
-        str(movement.kind),  # type: ignore[arg-type]
-        None if target is None else np.array(target, dtype=np.float64),
-        waypoints=None if waypoints is None else np.array(waypoints, dtype=np.float64),
-    )
+    """As plain data, which can be written down."""
+    text = json.dumps(details, allow_nan=False, ensure_ascii=False)
+    return dict(json.loads(text.encode()))

@@ -21,13 +21,12 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from coartic.gym import LETTERS, Arms
 from coartic.learner.learning import TRIALS
-from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
+from coartic.method import BudgetError, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.initial import too_many_sequences
 from coartic.motion.solution import Movement
 from coartic.motion.trials import Trials, movements_of
 from coartic.optimisers import TOLD, Objective
 from coartic.robot import Array
-from coartic.tasks.task import Task
 
 WORST = -100.0
 """Reward of a trial that fails or takes twice as long as the first one, or longer."""
@@ -182,9 +181,9 @@ class Agent(Method):
     told = TOLD
     Parameters = AgentParameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        return too_many_sequences(task, len(task.hands))
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Train until one trial is left, and make it with the policy without noise."""

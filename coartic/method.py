@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -24,10 +24,11 @@ from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands
+from coartic.motion.outside import inside
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.motion.trials import HandSequences, Trials, hand_codes, make_trials
 from coartic.robot import Array, Hand
-from coartic.tasks.task import Task
+from coartic.tasks.task import INITIAL_POLICIES, Task
 
 
 class Information(StrEnum):
@@ -160,6 +161,29 @@ class Result:
     """Reward that no solution exceeds, where proven; for searches of this project."""
 
 
+class Outline(NamedTuple):
+    """What a method is told of a task to say whether it applies."""
+
+    name: str
+    """Of the task, for the sentence."""
+    goals_count: int
+    dof: int
+    hands: tuple[Hand, ...]
+    """Hands the robot has."""
+    initial_hands: str
+    """Hand sequence, or policy, that the task names for a first solution."""
+
+    @property
+    def initial_is_policy(self) -> bool:
+        """Whether it is a policy."""
+        return self.initial_hands in INITIAL_POLICIES
+
+
+def outline_of(task: Task) -> Outline:
+    """The outline of a task."""
+    return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
+
+
 class TaskView:
     """What a method sees of its task. What has to be declared is noted as used."""
 
@@ -257,7 +281,8 @@ class Session(TaskView):
     The declaration is enforced and the calls are counted between honest parties: Python
     has no walls, and who reaches for underscored names finds a way around both.
     ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state what those spent.
+    kernels and state what those spent. Trials that a process makes elsewhere than in
+    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
     """
 
     def __init__(
@@ -269,12 +294,14 @@ class Session(TaskView):
         model: MotionModel = PAPER,
         trial_budget: int | None = None,
         trusted: bool = False,
+        of_run: bool = False,
     ) -> None:
         super().__init__(task, told)
         self.seed = seed
         self.rng = np.random.default_rng(seed)
         self.model = model
         self._trusted = trusted
+        self._of_run = of_run
         self._trial_budget = trial_budget
         self._meter = Meter()
         self._rewards: list[int | None] = []
@@ -327,7 +354,8 @@ class Session(TaskView):
         self.check_solution(solution)
         if self.trials_left == 0:
             raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
-        execution = execute(self._task, solution, model=self.model)
+        with inside(self._of_run):
+            execution = execute(self._task, solution, model=self.model)
         spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
         self._count_trials([execution.reward], *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
@@ -367,7 +395,8 @@ class Session(TaskView):
             if left <= 0:
                 raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
             codes, given = codes[:left], given[:left]
-        trials = make_trials(self._task, codes, given, model=self.model)
+        with inside(self._of_run):
+            trials = make_trials(self._task, codes, given, model=self.model)
         if until is not None:
             better = trials.rewards > np.asarray(until)[: len(given)]
             if better.any():
@@ -398,7 +427,8 @@ class Session(TaskView):
         completes the task, or there are too many.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
-        chosen, spent = search_initial_hands(self._task, hands, model=self.model)
+        with inside(self._of_run):
+            chosen, spent = search_initial_hands(self._task, hands, model=self.model)
         self._meter.add(**spent)
         return chosen
 
@@ -521,7 +551,7 @@ class Method(ABC):
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """Why the method does not apply to a task, or None where it does."""
         return None
 

@@ -23,6 +23,7 @@ from coartic.method import (
     Information,
     Method,
     MethodError,
+    Outline,
     Parameters,
     Result,
     Session,
@@ -221,7 +222,9 @@ def objective(
     the corrective process completes no sequence, or where there are too many to try.
     """
     chosen = as_task(task)
-    if hands is None and (reason := too_many_sequences(chosen, len(chosen.hands))):
+    goals = len(chosen.goals)
+    reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
+    if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
     session = Session(chosen, 0, TOLD, model=model)
     return Objective(session, hands, half_width=half_width)
@@ -246,9 +249,11 @@ class Optimiser(Method):
     told = TOLD
     Parameters = OptimiserParameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        return None if self.parameters.hands else too_many_sequences(task, len(task.hands))
+        if self.parameters.hands:
+            return None
+        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
 
 from coartic.inputs import check_limits
 
@@ -38,31 +40,80 @@ def threads_for(jobs: int) -> int:
     return os.cpu_count() or 1
 
 
-@contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
+def one_thread_each() -> AbstractContextManager[None]:
     """Workers that begin meanwhile have one thread for BLAS each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
+    return environment(ONE_THREAD)
+
+
+@contextlib.contextmanager
+def environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Processes that begin meanwhile have these variables."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        set_environment(before)
 
 
-def begin_worker() -> None:
+def set_environment(variables: Mapping[str, str | None]) -> None:
+    """Set variables; those that are None are removed."""
+    for name, value in variables.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
+
+
+def begin_worker(folder: str | None = None) -> None:
     """Leave Ctrl-C to the parent, and end this process, whatever it does, when the parent has
-    ended. The server that it was forked from lives as long as any worker."""
+    ended. The server that it was forked from lives as long as any worker.
+
+    With ``folder``, the process leads a group of its own: the group ends with it, and the folder
+    with the group.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    if hasattr(signal, "pthread_sigmask"):  # see blocked_signals
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+    if folder is not None and hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
+    threading.Thread(target=end_with_parent, args=(folder,), daemon=True).start()
 
 
-def end_with_parent() -> None:
+def end_with_parent(folder: str | None) -> None:
     """Wait for the end of the process that this one works for."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+            end_group(os.getpid())
         os._exit(1)
+
+
+def end_group(pid: int) -> None:
+    """End a worker that leads a group, and all processes in it."""
+    with contextlib.suppress(OSError):
+        if hasattr(os, "killpg"):
+            os.killpg(pid, signal.SIGKILL)
+        else:
+            os.kill(pid, signal.SIGTERM)
+
+
+ENDING = {
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+}
+"""Signals by which people and systems end a program."""
+
+
+@contextlib.contextmanager
+def blocked_signals() -> Iterator[None]:
+    """A process that begins meanwhile is not told to end: Ctrl-C tells all that a terminal has."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

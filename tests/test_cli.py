@@ -1,10 +1,12 @@
 """The command line as a user meets it."""
 
 import os
+import signal
 import sqlite3
 import subprocess
 import sys
-from contextlib import closing
+import time
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -127,6 +129,120 @@ def test_reproduce(coartic, tmp_path):
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
     assert "is not a run id" in error
+
+
+INTERRUPTED = """
+import os, signal, subprocess, sys, threading, time
+from pathlib import Path
+from coartic import interruption
+from coartic.__main__ import main
+
+moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+sys.argv[1:] = sys.argv[4:]
+
+def interrupt(*_):
+    for _ in range(times):
+        os.kill(os.getpid(), number)
+        time.sleep(0.05)
+
+if moment.isdigit():  # milliseconds after it has begun to look for signals
+    import coartic.__main__
+    begin = coartic.__main__.catch_signals
+    timer = threading.Timer(int(moment) / 1000, interrupt)
+    coartic.__main__.catch_signals = lambda: (begin(), timer.start())
+elif moment == "callback":  # where compiled code has called Python
+    import ctypes
+    call = ctypes.CFUNCTYPE(None)(interrupt)
+    run = interruption.catch_signals
+    interruption.catch_signals = lambda: (run(), call(), time.sleep(9))
+    import coartic.__main__
+    coartic.__main__.catch_signals = interruption.catch_signals
+elif moment == "stuck":
+    import coartic.cli
+    def stay():
+        threading.Timer(0.1, interrupt).start()
+        while True:
+            try:
+                time.sleep(9)
+            except BaseException:
+                pass
+    coartic.cli.main = stay
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(
+    ("moment", "name", "times"),
+    [
+        *((str(ms), "SIGINT", times) for ms in (1, 300, 1500) for times in (1, 2, 3)),
+        ("800", "SIGTERM", 1),
+        ("2500", "SIGTERM", 2),
+        ("1800", "SIGHUP", 1),
+        ("callback", "SIGINT", 1),
+        ("stuck", "SIGINT", 3),
+        ("stuck", "SIGTERM", 1),
+    ],
+)
+def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, name, times):
+    """Of a suite that would take minutes, whatever it is doing."""
+    tmp_path = tmp_path_factory.mktemp("it")  # a short name
+    (tmp_path / "temporary").mkdir()
+    number = getattr(signal, name)
+    command = ("run", "paper", "--runs", "500", "--trials", "30000", "--jobs", "2", "--out", "out")
+    done = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, moment, str(int(number)), str(times), *command],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
+    )  # fmt: skip
+    _, said = done.communicate(timeout=60)
+    assert done.returncode == (130 if name == "SIGINT" else 143), said
+    assert said.count("Interrupted.") == 1
+    assert len(said.splitlines()) == 1
+    assert not list((tmp_path / "temporary").iterdir())
+    ended_s = time.monotonic() + 5
+    while time.monotonic() < ended_s and processes_of_session(done.pid):
+        time.sleep(0.1)
+    assert not processes_of_session(done.pid)
+
+
+def test_a_temporary_folder_of_a_long_name(tmp_path):
+    """The system takes no socket of such a path."""
+    place = tmp_path / ("long" * 30)
+    place.mkdir()
+    command = [sys.executable, "-m", "coartic", *map(str, SMALL), "--jobs", "2", "--out", "out"]
+    environment = os.environ | {"TMPDIR": str(place), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert not list(place.iterdir())
+
+
+def processes_of_session(number):
+    """Which processes there are in a session, where the system tells."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, session = place.read_text().rpartition(") ")[2].split()[:4]
+            found += [place.parent.name] * (int(session) == number and state != "Z")
+    return found
+
+
+def test_modules_in_the_working_folder_are_not_imported(tmp_path):
+    """By no process of a command that is installed, whatever a stranger has put there."""
+    program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
+    program.parent.mkdir()
+    gift.mkdir()
+    program.write_text("from coartic.__main__ import main\nmain()")
+    for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
+        (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
+    command = [sys.executable, program, *map(str, SMALL), "--jobs", "2", "--out", "out"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=gift, env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run").exists()
 
 
 def test_list(coartic):

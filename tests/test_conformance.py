@@ -113,6 +113,17 @@ def test_what_a_session_shows_cannot_be_written(methods):
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
 
 
+@pytest.mark.parametrize("means", ["objective", "learn", "execute"])
+def test_trials_outside_the_session_are_noticed(methods, means):
+    """Those of an objective too, which has a session, but not the one of the run."""
+    card, task = methods["test/outsider"], load_task("ascending")
+    asked = Setting(task, card.name, card.code, card.told, {"means": means}, PAPER, None)
+    for _ in range(2):
+        (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
+        assert outcome.status == "crashed"
+        assert "trials outside its session" in outcome.reason
+
+
 CASES = [
     ("test/uncited", "declaration", "citation is empty"),
     ("test/loose", "parameters", "an unknown parameter is accepted"),
@@ -125,6 +136,7 @@ CASES = [
     ("test/overdeclares", "information", "declared but never used: Jacobian"),
     ("test/taker", "information", "hand_over is for this project's own compiled methods"),
     ("test/freeloader", "information", "used 'corrective process', which it does not declare"),
+    ("test/outsider", "information", "trials outside its session, which are not counted"),
     ("test/lucky", "determinism", "declared not to be stochastic, but another seed"),
     ("test/quits", "solution", "on ascending: crashed: SystemExit: 0"),
     ("test/unhelpful", "failure", "gives crashed ZeroDivisionError: no goal is that far"),

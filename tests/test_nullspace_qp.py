@@ -18,7 +18,7 @@ from coartic.baselines.nullspace_qp import (
     NullspaceQP,
     Preshaping,
 )
-from coartic.method import MethodError, Session
+from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
 from tests.support.strategies import TIED, solve, tiny_task
 
@@ -208,10 +208,10 @@ def test_the_nearest_hand_goes_or_the_other_where_it_cannot():
 
 
 def test_tasks_that_do_not_suit_are_refused():
-    right = tiny_task().model_copy(update={"hands": ("right",)})
+    right = outline_of(tiny_task().model_copy(update={"hands": ("right",)}))
     assert NextGoal().why_not(right) is None
     assert "no other arm" in Preshaping().why_not(right)
-    many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
+    many = outline_of(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
     assert "hand sequences" in NextGoal().why_not(many)
     assert NextGoal(NextGoal.Parameters(hands="nearest")).why_not(many) is None
 

@@ -3,15 +3,18 @@
 import json
 import re
 import shutil
+import signal
 import sys
 import tomllib
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from coartic import load_task
 from coartic.analysis.study import load
+from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
@@ -112,6 +115,39 @@ def test_what_counts_as_the_code_of_a_method(tmp_path, monkeypatch):
     codes = [code_of(tmp_path, **change) for change in changes]
     assert len({first, *codes}) == 5
     assert code_of(tmp_path) == first
+
+
+AT_IMPORT = {
+    "os.chdir('/')": "",
+    "import coartic.benchmarks.scoring as s; s.score = s.execute_many = None": "",
+    "import numpy; numpy.sqrt = None": "",
+    "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))": "",
+    "import signal; signal.signal(signal.SIGINT, signal.SIG_DFL)": "",
+    "print('x' * 10**6)": "",
+    "class Odd(BaseException): pass\nraise Odd('odd')": "cannot be imported: Odd: odd",
+    "raise KeyboardInterrupt": "cannot be imported: KeyboardInterrupt",
+    "sys.exit(0)": "cannot be imported: SystemExit: 0",
+    "os._exit(0)": "cannot be imported: its process ended with exit code 0",
+    "os.kill(os.getpid(), 9)": "cannot be imported: its process ended with exit code -9",
+    "def f(): f()\nf()": "cannot be imported: RecursionError",
+}
+
+
+@pytest.mark.parametrize("done", AT_IMPORT)
+def test_what_a_file_does_when_it_is_imported_is_no_matter_here(done, coartic, tmp_path):
+    def state():
+        opened = resource.getrlimit(resource.RLIMIT_NOFILE)
+        return Path.cwd(), np.sqrt, scoring.score, signal.getsignal(signal.SIGINT), opened
+
+    resource = pytest.importorskip("resource")
+    before = state()
+    (tmp_path / "mine.py").write_text(f"import os, sys\n{done}\n{TEXT}", encoding="utf-8")
+    code, text, error = coartic("list", "nearest-hand", "--method-file", tmp_path / "mine.py")
+    assert before == state()
+    assert code == (2 if AT_IMPORT[done] else 0)
+    assert AT_IMPORT[done] in error
+    assert len(error.splitlines()) == (1 if AT_IMPORT[done] else 0)
+    assert ("reluctance=0.0" in text) == (not AT_IMPORT[done])
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -1,8 +1,11 @@
 """Methods in worker processes: whatever one does, it harms no other, and its runs are kept."""
 
 import contextlib
+import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +29,13 @@ from coartic.motion.solution import Movement
 
 def corrected(session, hand="right"):
     return tuple(Movement(n, hand, "corrective") for n in range(1, session.goals_count + 1))
+
+class Runs:
+    def __reduce__(self):
+        return open, (__file__ + ".run", "w")
+
+class Hand(str):
+    __reduce_ex__ = lambda self, _: (open, (__file__ + ".run", "w"))
 
 class What(Parameters):
     what: str = "honest"
@@ -53,6 +63,18 @@ HANDLED = {
                "        return Result(corrected(session))", "ok", ""),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
+    "quits_well": ("os._exit(0)", "crashed", "exit code 0): it left no message"),
+    "forks": ("os.fork() or signal.pause(); return Result(corrected(session))", "ok", ""),
+    "forks_and_goes_on": ("os.fork(); return Result(corrected(session))", "ok", ""),
+    "closes": ("os.closerange(3, 99); return Result(corrected(session))", "crashed", "exit code"),
+    "is_a_pickle": ("session._rewards.append(Runs()); return Result(corrected(session))",
+                    "crashed", "Runs is not JSON serializable"),
+    "is_a_hand": ("return Result(corrected(session, Hand('right')))", "ok", ""),
+    "counts_wrong": ("session._meter.trials = 10**30; return Result(corrected(session))",
+                     "crashed", "counts what cannot be"),
+    "unwritten": ("return Result(corrected(session), {'x': chr(0xd800)})",
+                  "solver-failed", "cannot be kept"),
+    "raises_base": ("raise type('Odd', (BaseException,), {})('odd')", "crashed", "Odd: odd"),
     "is_killed": ("os.kill(os.getpid(), signal.SIGKILL)", "crashed", "killed by SIGKILL"),
     "breaks": ("raise SystemExit(0)", "crashed", "SystemExit: 0"),
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
@@ -97,9 +119,14 @@ def entries(folder, bodies):
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("pool")
+
+
+@pytest.fixture(scope="module")
+def runs(folder):
     """In the same workers, then others, then this project's."""
-    folder, task = tmp_path_factory.mktemp("pool"), load_task("ascending")
+    task = load_task("ascending")
     does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
     cells = [Cell(task, does, {"what": name}) for name in HANDLED]
     cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
@@ -117,7 +144,7 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.status == status, run.reason
     assert words in run.reason
     assert run.reason.isprintable()
-    died = name in ("exits", "is_killed")  # after it had waited for others, maybe
+    died = name in ("exits", "quits_well", "closes", "is_a_pickle", "counts_wrong", "is_killed")
     assert run.isna().wall_s == (died or "CPU" in words)
     assert run.isna().cpu_s == (died or "wall" in words)
     assert run.isna().reward if status != "ok" else run.reward == HONEST
@@ -138,6 +165,80 @@ def test_other_work_on_the_core_changes_no_outcome(tmp_path):
     study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=1.5)
     assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
     assert set(study.runs.reason[1:]) == {"CPU time limit of 1.5 s exceeded"}
+
+
+@pytest.mark.usefixtures("runs")
+def test_nothing_of_a_method_runs_in_the_parent(folder):
+    assert not list(folder.glob("*.run"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the test looks into /proc")
+@pytest.mark.usefixtures("runs")
+def test_what_a_method_forks_ends_with_it(folder):
+    places = []
+    for place in Path("/proc").glob("[0-9]*/cwd"):
+        with contextlib.suppress(OSError):
+            places.append(os.readlink(place))
+    assert not [place for place in places if "/coartic-" in place and "(deleted)" in place]
+
+
+PRINTS = """for _ in range(1000):
+            os.write(1, b'x' * 10**5)
+        os.write(2, b'\\nthe end')
+        os._exit(3)"""
+
+
+def test_what_a_worker_prints_is_bounded(tmp_path):
+    """100 MB are printed; the last words are kept, in no file and in little memory."""
+    resource = pytest.importorskip("resource")
+    task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", PRINTS)])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    study = run_and_write(tmp_path / "out", [Cell(task, does)], executor=Local(1), runs=1)
+    assert study.runs.reason[0].endswith("the end")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
+@pytest.mark.parametrize(("whom", "most"), [("worker", 1), ("server", 2), ("beginner", 0)])
+def test_what_is_killed_costs_its_runs_alone(tmp_path, whom, most):
+    """A worker at work, the server that forks them, a worker that begins; of eight runs."""
+    body = "time.sleep(0.2); return Result(corrected(session))"
+    task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", body)])
+    cells = [Cell(task, replace(does, stochastic=True))]
+    run_and_write(tmp_path / "before", cells, executor=Local(1), runs=1)  # the server is there
+    killed, there = [], {*Path("/proc").glob("[0-9]*")} if whom != "server" else set()
+
+    def kill():
+        while not killed:
+            for place in {*Path("/proc").glob("[0-9]*")} - there:
+                with contextlib.suppress(OSError, ValueError):
+                    parent, grandparent = ancestors(place)[:2]
+                    kind = "server" if parent == os.getpid() else "beginner"
+                    if kind == "beginner" and "/coartic-" in os.readlink(place / "cwd"):
+                        kind = "worker"
+                    is_ours = os.getpid() in (parent, grandparent)
+                    is_forked = "multiprocessing.forkserver" in (place / "cmdline").read_text()
+                    if is_ours and is_forked and kind == whom:
+                        os.kill(int(place.name), signal.SIGKILL)
+                        killed.append(place)
+                        break
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    runs = run_and_write(tmp_path / "out", cells, executor=Local(2), runs=8).runs
+    killer.join(5)
+    assert killed
+    assert set(runs.status) <= {"ok", "crashed"}
+    assert (runs.status == "crashed").sum() <= most
+
+
+def ancestors(place):
+    """Ids of the parent of a process, of its parent and so on."""
+    found = [int(place.name)]
+    while found[-1] > 1:
+        stat = Path(f"/proc/{found[-1]}/stat").read_text()
+        found.append(int(stat.rpartition(") ")[2].split()[1]))
+    return found[1:]
 
 
 def test_other_methods_notice_nothing(runs):

@@ -2,8 +2,10 @@
 
 import multiprocessing
 import random
+import shutil
 import sqlite3
 import sys
+import threading
 import time
 import warnings
 import zlib
@@ -20,7 +22,6 @@ from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
-from coartic.runs import store as store_module
 from coartic.runs.run import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
 from tests.support.strategies import tiny_task
@@ -187,18 +188,80 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     same_results(run_and_write(folder, **MANY), run_and_write(tmp_path / "whole", **MANY))
 
 
-def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path, monkeypatch):
-    connect = store_module.connect
-    monkeypatch.setattr(store_module, "connect", lambda where, _: connect(where, 0.01))
+def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
     plan = planned(ONE, **FEW)
-    busy = pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait")
-    with writing(tmp_path):
-        with busy:
-            perform(plan, tmp_path, executor=InProcess())
-        with busy:
-            load(tmp_path)
-    perform(plan, tmp_path, executor=InProcess())
+    busy = r"another `coartic run` is at work.*wait"
+
+    def watch(progress, _):
+        if progress.done == 9:  # before the last one is seen
+            with pytest.raises(CoarticError, match=busy):
+                perform(plan, tmp_path, executor=InProcess())
+            with pytest.raises(CoarticError, match="at work.* 9 of 9 runs are done; wait"):
+                load(tmp_path)
+
+    perform(plan, tmp_path, executor=InProcess(), watch=watch)
     same_results(load(tmp_path), undisturbed)
+
+
+@pytest.mark.filterwarnings("ignore:another program has .* open. waiting")
+@pytest.mark.parametrize("begin", ["BEGIN", "BEGIN EXCLUSIVE"])
+def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, begin):
+    """Also where its program keeps the file for a while, in the middle of a transaction."""
+    held = []
+
+    def read():
+        reader = sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)
+        reader.execute(begin)
+        held.append(reader.execute("SELECT count(*) FROM results").fetchall())
+        time.sleep(1.5)
+        held.append(reader.execute("SELECT count(*) FROM results").fetchall())
+        reader.close()
+
+    class Read(InProcess):
+        workers = 2
+
+        def perform(self, jobs):
+            for pair in super().perform(jobs):
+                program = threading.Thread(target=read)
+                program.start()
+                while len(held) % 2 == 0:
+                    time.sleep(0.01)
+                yield pair
+                program.join()
+
+    perform(planned(ONE, **FEW), tmp_path, executor=Read())
+    assert held == [[(0,)], [(0,)], [(8,)], [(8,)]]
+    assert [path.name for path in tmp_path.iterdir()] == [RUNS_FILE]
+    same_results(load(tmp_path), undisturbed)
+
+
+def replace_by_a_copy(folder):
+    shutil.copytree(folder, folder.with_name("copy"))
+    shutil.rmtree(folder)
+    folder.with_name("copy").rename(folder)
+
+
+@pytest.mark.parametrize(
+    "lose",
+    [
+        shutil.rmtree,
+        lambda folder: (folder / RUNS_FILE).unlink(),
+        lambda folder: folder.rename(folder.with_name("elsewhere")),
+        replace_by_a_copy,
+    ],
+)
+def test_a_folder_that_is_lost_during_a_run_is_saved_beside(undisturbed, tmp_path, lose):
+    class Two(InProcess):
+        workers = 2
+
+    def watch(progress, _):
+        if progress.done == 8:
+            lose(tmp_path / "out")
+
+    plan = planned(ONE, **FEW)
+    with pytest.raises(CoarticError, match="all 9 runs that are finished are saved in .*out-saved"):
+        perform(plan, tmp_path / "out", executor=Two(), watch=watch)
+    same_results(load(tmp_path / "out-saved-1"), undisturbed)
 
 
 class TooSlow(InProcess):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, Trajectory
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.files import check_output, write_output
+from coartic.interruption import temporary_folder
 
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -78,7 +78,7 @@ def write_film(
     mp4 = path.suffix.lower() == ".mp4"
     writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
     try:
-        with tempfile.TemporaryDirectory(prefix="coartic-") as folder:
+        with temporary_folder() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
                 for row in [*rows, *[rows[-1]] * held]:

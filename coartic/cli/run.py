@@ -76,6 +76,7 @@ def run(
     say(str(report))
     pairs = []
     if report.progress.done:  # else the answers are as they were, and take a while
+        import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
         from coartic.analysis.report.text import answers
         from coartic.analysis.study import load
 

@@ -6,10 +6,11 @@ import os
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, TextIO
 
+from coartic.interruption import explain
 from coartic.text import counted, one_line
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def say(*lines: str, stream: TextIO | None = None) -> None:
 
     Text comes to a terminal here, in :func:`show_frame` and in :class:`Display`.
     """
-    print("\n".join(map(one_line, lines)), file=stream)
+    print("\n".join(map(one_line, lines)), file=stream, flush=True)
 
 
 def complain(kind: str, text: str) -> None:
@@ -76,14 +77,9 @@ def show_frame(frame: pd.DataFrame) -> None:
     console().print(table)
 
 
-@contextmanager
-def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """Ctrl-C ends the process with a sentence, which is made when it comes."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        say(f"Interrupted. {sentence()}", stream=sys.stderr)
-        sys.exit(130)
+def interruptible(sentence: Callable[[], str]) -> AbstractContextManager[None]:
+    """What is said of the block where it is interrupted; made when that happens."""
+    return explain(lambda: one_line(sentence()))
 
 
 class Display:

@@ -23,6 +23,7 @@ from coartic.robot import HANDS, Hand
 from coartic.text import short_repr, unknown
 
 if TYPE_CHECKING:
+    from coartic.method import Outline
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
@@ -111,7 +112,7 @@ class ExplorationCondition:
             self, brief_value(self.id), *(repr(getattr(self, name)) for name in positional), **facts
         )
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Task | Outline) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:

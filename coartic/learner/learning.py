@@ -32,6 +32,7 @@ from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
 from coartic.motion.lanes import LANES, width_of
 from coartic.motion.movement import move
+from coartic.motion.outside import note_trials
 from coartic.motion.problem import problem_of
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
@@ -162,6 +163,7 @@ def learn_many(
     check_model(model, radius=task.radius)
     if start:
         movements_by_goal(task, start)  # or it says what is wrong with them
+    note_trials(trials * len(ordered))
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)

@@ -28,7 +28,16 @@ from coartic.learner.conditions import (
 )
 from coartic.learner.learning import TRIALS, learn_many
 from coartic.learner.run import CORRECTIONS, LearningRun
-from coartic.method import Information, Meter, Method, MethodError, Parameters, Result, Session
+from coartic.method import (
+    Information,
+    Meter,
+    Method,
+    MethodError,
+    Outline,
+    Parameters,
+    Result,
+    Session,
+)
 from coartic.motion.lanes import LANES
 from coartic.motion.solution import Movement
 from coartic.tasks.task import Task
@@ -79,7 +88,7 @@ class DualProcess(Method):
     )
     Parameters = DualProcessParameters
 
-    def why_not(self, task: Task) -> str | None:
+    def why_not(self, task: Outline) -> str | None:
         """Why the condition does not apply to a task, or None where it does."""
         return self.condition.why_not(task)
 

@@ -101,7 +101,7 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     task = as_task(task)
     allowed = task.hands if hands is None else hands_among(task, hands)
     ordered = [hand for hand in HANDS if hand in allowed]
-    reason = too_many_sequences(task, len(ordered))
+    reason = too_many_sequences(task.name, len(task.goals), len(ordered))
     if reason is not None:
         raise NotApplicableError(reason)
     return [letters_of(s) for s in itertools.product(ordered, repeat=len(task.goals))]
@@ -118,12 +118,12 @@ def hands_among(task: Task, hands: Iterable[Hand]) -> tuple[Hand, ...]:
     return chosen
 
 
-def too_many_sequences(task: Task, hands: int) -> str | None:
-    """Why the sequences of so many hands cannot all be tried, or None where they can."""
-    count = hands ** len(task.goals)
+def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
+    """Why the sequences of so many hands cannot all be tried on a task, or None where they can."""
+    count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
-    return f"task {task.name!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+    return f"task {task!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
 
 
 def changes_of_hand(sequence: str) -> int:

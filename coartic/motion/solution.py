@@ -19,6 +19,7 @@ from coartic.errors import SolutionError
 from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import check_goal, configuration, follow
+from coartic.motion.outside import note_trials
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, reach_in_turn
 from coartic.robot import HANDS, Array, Hand
@@ -186,6 +187,7 @@ def execute_many(
             runs.append(SolutionRun(task, solution))
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             runs.append(error)
+    note_trials(len(runs))
     going = [run for run in runs if isinstance(run, SolutionRun)]
     for number in range(1, len(task.goals) + 1):
         going = [run for run in going if not run.reason]

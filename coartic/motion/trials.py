@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
+from coartic.motion.outside import note_trials
 from coartic.motion.penalty import penalties
 from coartic.motion.reach import reach_in_turn
 from coartic.motion.solution import Movement
@@ -66,6 +67,7 @@ def make_trials(
     check_model(model, radius=task.radius)
     given = check_targets(task, targets)
     count = len(given)
+    note_trials(count)
     starts = np.empty((count, task.robot.dof))
     starts[:] = configuration(task.robot, task.q0)
     goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]

@@ -7,7 +7,7 @@ import importlib.util
 import inspect
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from coartic.errors import CoarticError
 from coartic.inputs import problems_inline
-from coartic.method import Method
+from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
 
@@ -67,31 +67,57 @@ class MethodCard:
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, defaults included, as plain data; CoarticError names those that are
         wrong."""
-        try:
-            typed = self.configure(parameters).parameters
-        except ValidationError as error:
-            names = list(self.defaults)
-            wrong, listed = problems_inline(error, names), ", ".join(names) or "none"
-            raise CoarticError(
-                f"method {self.name!r}: {wrong} (its parameters: {listed})"
-            ) from None
-        complete: dict[str, Any] = json.loads(json.dumps(typed.model_dump(mode="json")))
-        return complete
+        return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
         """Why the method with parameters does not apply to a task; None where it does.
 
         Raises CoarticError for wrong parameters.
         """
-        self.complete(parameters or {})
-        try:
-            reason = self.configure(parameters or {}).why_not(task)
-        except Exception as error:
-            raise CoarticError(
-                f"method {self.name!r} cannot say whether it applies to task {task.name!r}: "
-                f"{error_line(error)}"
-            ) from None
+        reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
+
+    def rules(self) -> dict[str, Any]:
+        """``quick`` parameters for a check, and the ``config`` of all its parameters: what is done
+        with unknown ones, and whether they can be changed."""
+        return dict(self._ask("rules"))
+
+    def _ask(self, question: str, *arguments: Any) -> Any:
+        """The answer of the method, or of the process that has read its file."""
+        if self.where in READERS:
+            return READERS[self.where](self.name, question, *arguments)
+        return answer(self.load(), question, *arguments)
+
+
+READERS: dict[str, Callable[..., Any]] = {}
+"""What answers for methods whose files this process does not import, by
+:attr:`MethodCard.where`."""
+
+
+def answer(method: type[Method], question: str, *arguments: Any) -> Any:
+    """What a method answers to :class:`MethodCard`, as plain data. Raises CoarticError."""
+    if question == "rules":
+        config = method.Parameters.model_config
+        wanted = {key: config.get(key) for key in ("extra", "frozen")}
+        return {"quick": dict(method.quick), "config": wanted}
+    parameters, *outline = arguments
+    try:
+        typed = method.Parameters(**parameters)
+    except ValidationError as error:
+        names = list(method.Parameters.model_fields)
+        wrong, listed = problems_inline(error, names), ", ".join(names) or "none"
+        words = f"method {method.name!r}: {wrong} (its parameters: {listed})"
+        raise CoarticError(words) from None
+    if question == "complete":
+        return json.loads(json.dumps(typed.model_dump(mode="json")))
+    task = Outline(*outline)._replace(hands=tuple(outline[3]))
+    try:
+        return method(typed).why_not(task)
+    except Exception as error:
+        raise CoarticError(
+            f"method {method.name!r} cannot say whether it applies to task {task.name!r}: "
+            f"{error_line(error)}"
+        ) from None
 
 
 def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodCard:

@@ -9,10 +9,13 @@ whatever interrupts it, a batch is there whole or not at all.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
 import sqlite3
+import time
+import warnings
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -32,7 +35,7 @@ from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import parse_task
-from coartic.text import one_line, plain
+from coartic.text import counted, one_line, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -161,6 +164,9 @@ class _Environment(_Stored):
     cores: int
 
 
+_WAIT_S = 1.0  # for another program, before more is done about it
+_LOCK_TRIES = 20
+
 _SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
 _METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
@@ -174,6 +180,7 @@ class Store:
         self.folder = folder
         self._db = connection
         self._reads = reads
+        self._file = identity(folder / RUNS_FILE)
 
     def __enter__(self) -> Store:
         return self
@@ -300,8 +307,12 @@ class Store:
     def write(self, runs: Iterable[Run]) -> None:
         """Keep finished runs together, all of them or none; they replace earlier ones.
 
-        Raises CoarticError where the disk does not take them, or the tables a run.
+        Raises CoarticError where the disk does not take them, or the tables a run. Raises it also
+        where the folder is no longer there, or another one: then they are saved beside it.
         """
+        lost = self._file != identity(self.folder / RUNS_FILE)
+        if lost:
+            self._move()
         with self._writing():
             for run in runs:
                 try:
@@ -310,6 +321,13 @@ class Store:
                     raise CoarticError(
                         f"run {run.key.id} of method {run.setting.method} cannot be stored: {error}"
                     ) from None
+
+        if lost:
+            raise CoarticError(
+                f"the results were removed, renamed or replaced while the suite ran; all "
+                f"{self.count()} runs that are finished are saved in {self.folder}: repeat the "
+                "command with this folder to go on"
+            )
 
     def run(self, prefix: str) -> Run:
         """The one run whose id begins so. Raises CoarticError where there is none, or several."""
@@ -379,6 +397,22 @@ class Store:
 
     # Inside.
 
+    def _move(self) -> None:
+        """Copy everything into a new folder beside the one that is lost, and go on there."""
+        names = (f"{self.folder.name}-saved-{number}" for number in itertools.count(1))
+        saved = next(f for f in map(self.folder.with_name, names) if not f.exists())
+        try:
+            saved.mkdir(parents=True)
+            with connect(str(saved / RUNS_FILE), _WAIT_S) as copy:
+                self._db.backup(copy)
+        except (OSError, sqlite3.Error) as error:
+            raise CoarticError(
+                f"{self.folder} was removed, renamed or replaced while the suite ran, and its "
+                f"runs cannot be saved in {saved}: {error}"
+            ) from None
+        self._db.close()
+        self.folder, self._db = saved, copy
+
     def _write_run(self, run: Run) -> None:
         """Put a run into the tables, in place of an earlier one of its id."""
         self._forget(run.key.id)
@@ -408,11 +442,30 @@ class Store:
     def _writing(self) -> Iterator[None]:
         """One transaction. Raises CoarticError where the disk does not take it."""
         try:
-            with self._db:
-                self._db.execute("BEGIN")
+            self._wait_for("BEGIN IMMEDIATE")
+            try:
                 yield
+                self._wait_for("COMMIT")
+            finally:
+                if self._db.in_transaction:
+                    self._db.rollback()
         except sqlite3.OperationalError as error:
             raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
+
+    def _wait_for(self, statement: str) -> None:
+        """Execute it as soon as other programs that have the file open let it."""
+        for tries in itertools.count():
+            try:
+                self._db.execute(statement)
+                return
+            except sqlite3.OperationalError as error:
+                if not is_locked(error):
+                    raise
+            if tries == 1:
+                warnings.warn(
+                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
+                    stacklevel=2,
+                )
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
         names = ", ".join(f'"{name}"' for name in row)
@@ -495,10 +548,21 @@ def open_store(folder: Path) -> Store:
     if not os.path.lexists(path):
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}")
     check_files(folder)
-    with explain_errors(folder), connect(f"{path.absolute().as_uri()}?mode=rw", 2.0) as connection:
+    with (
+        explain_errors(folder),
+        connect(f"{path.absolute().as_uri()}?mode=rw", 5 * _WAIT_S) as connection,
+    ):
         connection.execute("PRAGMA query_only = ON")
         if not has_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
+        with lock(folder, shared=True) as is_ours:
+            if not is_ours:
+                done = connection.execute(f"SELECT count(*) {_ASKED_FOR}").fetchone()[0]
+                asked = connection.execute("SELECT coalesce(sum(runs), 0) FROM cells").fetchone()[0]
+                raise CoarticError(
+                    f"another `coartic run` is at work in {folder}: {done} of "
+                    f"{counted(asked, 'run')} are done; wait for it"
+                )
     return Store(folder, connection, reads=True)
 
 
@@ -514,18 +578,63 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    check_files(folder)
-    with explain_errors(folder), connect(str(folder / RUNS_FILE), 0.0) as connection:
-        has_tables(connection, folder)  # or it is left as it is
-        # No write-ahead log: it is unsafe on network disks.
-        connection.execute("PRAGMA journal_mode = DELETE")
-        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-        connection.execute("BEGIN EXCLUSIVE")
-        connection.execute("COMMIT")
-        if not has_tables(connection, folder):
-            connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
-    with Store(folder, connection, reads=False) as store:
-        yield store
+    with lock(folder) as is_ours:
+        if not is_ours:
+            raise CoarticError(
+                f"another `coartic run` is at work in {folder}; wait for it, or choose another "
+                "folder"
+            )
+        check_files(folder)
+        with (
+            explain_errors(folder),
+            connect(str(folder / RUNS_FILE), _WAIT_S) as connection,
+        ):
+            has_tables(connection, folder)  # or it is left as it is
+            # No write-ahead log: it is unsafe on network disks, and a second file.
+            connection.execute("PRAGMA journal_mode = DELETE")
+            if not has_tables(connection, folder):
+                connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
+        with Store(folder, connection, reads=False) as store:
+            yield store
+
+
+@contextmanager
+def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
+    """Whether this process alone, or with others that share it, has a folder in this block: what
+    other programs read there is no matter. Where the system or the disk has no such locks, it has.
+    """
+    try:
+        import fcntl
+
+        opened = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield True
+        return
+    how = fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
+    try:
+        is_ours = False
+        for _ in range(1 if shared else _LOCK_TRIES):  # somebody may just be looking
+            try:
+                fcntl.flock(opened, how)
+            except BlockingIOError:
+                time.sleep(_WAIT_S / _LOCK_TRIES)
+                continue
+            except OSError:
+                pass
+            is_ours = True
+            break
+        yield is_ours
+    finally:
+        os.close(opened)
+
+
+def identity(path: Path) -> tuple[int, int] | None:
+    """Which file is at a path; None where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def check_place(folder: Path) -> None:
@@ -629,10 +738,9 @@ def explain_errors(folder: Path) -> Iterator[None]:
         said = one_line(str(error))
         raise CoarticError(said if str(folder) in said else f"{path}: {said}") from None
     except sqlite3.OperationalError as error:
-        if "locked" in str(error):
+        if is_locked(error):
             raise CoarticError(
-                f"another `coartic run` is at work in {folder}; wait for it, or choose another "
-                "folder"
+                f"another program has {folder / RUNS_FILE} open; close it there, or wait for it"
             ) from None
         if "readonly" in str(error):
             raise CoarticError(
@@ -646,6 +754,11 @@ def explain_errors(folder: Path) -> Iterator[None]:
             f"{path} is damaged ({plain(wrong, 200) or type(error).__name__}). Move it away and "
             "repeat the `coartic run` command, or restore a copy."
         ) from None
+
+
+def is_locked(error: sqlite3.OperationalError) -> bool:
+    """Whether another program has the file for itself."""
+    return "locked" in str(error)
 
 
 def to_json(content: Any, *, sort_keys: bool = False) -> str:

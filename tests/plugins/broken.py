@@ -5,6 +5,8 @@ import random
 
 from pydantic import ConfigDict
 
+import coartic
+from coartic import load_task
 from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
 
@@ -155,6 +157,25 @@ class Forger(Good):
         except ValueError as error:
             return Result(solution, {"said": str(error)})
         return Result(solution)
+
+
+class MeansParameters(Parameters):
+    means: str = "objective"
+
+
+class Outsider(Good):
+    name = "test/outsider"
+    Parameters = MeansParameters
+
+    def solve(self, session):
+        task = load_task("ascending")
+        if self.parameters.means == "objective":
+            coartic.objective(task, "RRR").many([[0.0] * 18] * 5)
+        elif self.parameters.means == "learn":
+            coartic.learn(task, "EC1", seed=0, trials=9)
+        else:
+            coartic.execute(task, by_correction(session, ["right"] * 3))
+        return Result(by_correction(session))
 
 
 class Lucky(Good):

@@ -1,0 +1,148 @@
+"""A process that imports a method file and answers questions about its methods in plain data.
+
+What a file does when it is imported (another working folder, patches, limits, an end) is no matter
+of the process that runs suites.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from coartic.benchmarks.code_identity import code_of
+from coartic.benchmarks.pool import start_process, worker_context
+from coartic.errors import CoarticError
+from coartic.method import Information, Method
+from coartic.runs.card import MethodCard, answer, card_of, load_file, methods_in
+from coartic.text import LONGEST_LINE, error_line, plain
+from coartic.threads import begin_worker
+
+_LIMIT_S = 300.0  # of an answer: libraries may take long to import
+_LONGEST_ANSWER = 2**24  # bytes
+
+
+class Reader:
+    """Asks a process that has imported a file; it ends with this one."""
+
+    def __init__(self, path: Path, shown: str) -> None:
+        context = worker_context()
+        self._shown = shown
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(
+            target=answer_questions, args=(theirs, str(path), shown), daemon=True
+        )
+        start_process(self._process)
+        theirs.close()
+
+    def __call__(self, method: str, question: str, *arguments: Any) -> Any:
+        """The answer of a method by its id. Raises CoarticError where it has none."""
+        try:
+            self._pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
+            if not self._pipe.poll(_LIMIT_S):
+                self._process.kill()
+                raise CoarticError(f"{self._shown}: gives no answer within {_LIMIT_S:g} s")
+            said = json.loads(self._pipe.recv_bytes(_LONGEST_ANSWER))
+        except (OSError, EOFError):
+            self._process.join(1.0)
+            how = f"its process ended with exit code {self._process.exitcode}"
+            raise CoarticError(f"{self._shown}: cannot be imported: {how}") from None
+        if "error" in said:
+            raise CoarticError(plain(str(said["error"])))
+        return said["answer"]
+
+
+def answer_questions(pipe: Any, path: str, shown: str) -> None:
+    """What the process does."""
+    if os.name == "posix":
+        nobody = os.open(os.devnull, os.O_RDWR)
+        for stream in range(3):
+            os.dup2(nobody, stream)
+    begin_worker()
+    methods: dict[str, type[Method]] = {}
+    while True:
+        try:
+            name, question, *arguments = json.loads(pipe.recv_bytes())
+        except EOFError:
+            return
+        try:
+            said: Any
+            if question == "cards":
+                said = []
+                module = import_file(Path(path), shown)
+                for card in cards_of_module(module, methods_in(module), shown, path):
+                    methods[card.name] = card.load()
+                    said.append(asdict(card))
+            else:
+                said = answer(methods[name], question, *arguments)
+            text = json.dumps({"answer": said})
+        except CoarticError as error:
+            text = json.dumps({"error": str(error)})
+        except BaseException as error:
+            text = json.dumps({"error": f"{shown}: cannot be used: {error_line(error)}"})
+        pipe.send_bytes(text.encode())
+
+
+def import_file(path: Path, shown: str) -> ModuleType:
+    """The module of a file. Raises CoarticError for whatever it raises."""
+    try:
+        return load_file(path)
+    except BaseException as error:
+        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
+
+
+def cards_of_module(
+    module: ModuleType, methods: Iterable[type[Method]], origin: str, where: str
+) -> Iterator[MethodCard]:
+    """Methods of a module with their code. Raises CoarticError where there is none."""
+    methods = list(methods)
+    for method in methods:
+        check_declaration(method, origin)
+        file = Path(inspect.getfile(module))
+        data = tuple(file.parent / name for name in method.files)
+        try:
+            code = code_of(file, data)
+        except OSError as error:
+            raise CoarticError(
+                f"{origin}: method {method.name!r} declares a file that cannot be read: "
+                f"{error.filename}"
+            ) from None
+        except (SyntaxError, ValueError) as error:
+            raise CoarticError(
+                f"{origin}: it imports what is no Python: {error_line(error)}"
+            ) from None
+        yield card_of(method, origin, where, code)
+    if not methods:
+        unfinished = [
+            f"{value.__name__} has no {', '.join(sorted(value.__abstractmethods__))}"
+            for value in vars(module).values()
+            if inspect.isclass(value) and issubclass(value, Method) and inspect.isabstract(value)
+            and value is not Method
+        ]  # fmt: skip
+        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
+        raise CoarticError(f"{origin}: defines no subclass of coartic.method.Method{why}")
+
+
+def check_declaration(method: type[Method], origin: str) -> None:
+    """Raises CoarticError where a method does not declare what every method does."""
+    where = f"{origin}: {method.__name__}"
+    for attribute in ("name", "title", "citation"):
+        text = getattr(method, attribute, None)
+        if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
+            raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+    if not _NAME.fullmatch(method.name):
+        raise CoarticError(
+            f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
+        )
+    told = getattr(method, "told", None)
+    if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):
+        raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
+
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
