@@ -39,12 +39,11 @@ from coartic.benchmarks.worker import (
     prepare,
 )
 from coartic.errors import CoarticError
-from coartic.interruption import at_end, temporary_folder, unbroken
+from coartic.interruption import at_end, blocked_signals, temporary_folder, unbroken
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
 from coartic.threads import (
     begin_worker,
-    blocked_signals,
     end_group,
     environment,
     one_thread_each,

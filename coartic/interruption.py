@@ -17,8 +17,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from coartic.threads import ENDING
-
+ENDING = {
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+}
+"""Signals by which people and systems end a program."""
 _PATIENCE_S = 2.0  # for what is unbroken
 _SHOW_CURSOR = "\x1b[?25h\n"  # a progress bar hides it
 _ending = threading.Event()
@@ -95,3 +97,16 @@ def explain(sentence: Callable[[], str]) -> Iterator[None]:
         yield
     finally:
         _sentences.remove(sentence)
+
+
+@contextmanager
+def blocked_signals() -> Iterator[None]:
+    """A process that begins meanwhile is not told to end: Ctrl-C tells all that a terminal has."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

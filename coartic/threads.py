@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 
 from coartic.inputs import check_limits
+from coartic.interruption import ENDING
 
 MOST_JOBS = 10_000
 ONE_THREAD = dict.fromkeys(
@@ -98,22 +99,3 @@ def end_group(pid: int) -> None:
             os.killpg(pid, signal.SIGKILL)
         else:
             os.kill(pid, signal.SIGTERM)
-
-
-ENDING = {
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-}
-"""Signals by which people and systems end a program."""
-
-
-@contextlib.contextmanager
-def blocked_signals() -> Iterator[None]:
-    """A process that begins meanwhile is not told to end: Ctrl-C tells all that a terminal has."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
