@@ -262,6 +262,9 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert not any("climbing" in name for name in ranked.index)
     assert ranked.better["mine width=0.2"] == 2
     assert [each.method for each in sentences.from_files(again)] == ["mine width=0.2"]
+    assert "as its author declares" in sentences.answer_nearest(again)
+    assert "as its author declares" in sentences.finding_of_ranking(again)
+    assert "declares" not in sentences.answer_nearest(seen)
 
 
 def test_trials_to_the_middle_of_the_way():

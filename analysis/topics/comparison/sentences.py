@@ -38,6 +38,11 @@ def gap_in_words(row: Any, *, interval: bool = False) -> str:
     return words.estimate(Estimate(row.gap, *ends), 1, " %")
 
 
+def as_declared(row: Any) -> str:
+    """That what a leader is told is its author's word, where the method is not built in."""
+    return "" if methods.is_built_in(row.method) else "; what it is told is as its author declares"
+
+
 def finding_of_ranking(study: Study) -> str:
     """Who comes nearest to the optimum, among methods that know as much of the reward."""
     by_trial, by_formula, others = leaders_by_group(study).values()
@@ -46,7 +51,7 @@ def finding_of_ranking(study: Study) -> str:
     sentences = nearest_by_trial(by_trial) if by_trial else []
     without = "best method that does not use the reward"
     if by_formula:
-        away = f"{gap_in_words(by_formula[0])} away"
+        away = f"{gap_in_words(by_formula[0])} away{as_declared(by_formula[0])}"
         beside = f", the {without} {gap_in_words(others[0])}" if others else ""
         sentences.append(
             f"The best planner that knows the reward as a formula ends {away}{beside}."
@@ -84,7 +89,7 @@ def nearest_by_trial(rows: list[Any]) -> list[str]:
         sure = "significantly" if second.p < LEVEL else "not significantly"
         beside = f", {sure} better than {second.name} ({words.p_value(second.p)})"
     away = gap_in_words(best, interval=True)
-    sentences = [f"{beginning}: {away} from the optimum{beside}."]
+    sentences = [f"{beginning}: {away} from the optimum{beside}{as_declared(best)}."]
     rank, learner = learner_among(rows)
     if rank > 1:
         away = gap_in_words(learner, interval=True)
@@ -111,7 +116,7 @@ def answer_nearest(study: Study) -> str:
         if by_trial
         else words.capital(best.name)
     )
-    text = f"{who}, {gap_in_words(best)} away."
+    text = f"{who}, {gap_in_words(best)} away{as_declared(best)}."
     rank, learner = learner_among(by_trial)
     if rank > 1:
         place = f"{ORDINALS[rank - 1]} of {len(by_trial)} algorithms"
