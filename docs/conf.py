@@ -26,7 +26,8 @@ html_show_sphinx = False
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline", "colon_fence"]
 
-# Pages with code are run whenever the site is built, so they show what came out.
+# Pages whose code is run whenever the site is built, so they show what came out.
+NOTEBOOKS = {"gallery", "tutorial"}
 nb_execution_mode = "force"
 nb_execution_timeout = 900  # a busy machine is slow
 nb_execution_raise_on_error = True
@@ -46,6 +47,25 @@ suppress_warnings = ["ref.python"]
 _OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((\.\./[^)#\s]+)(#[^)\s]*)?\)")
 _BAR = re.compile(r"(?<![`\\\w])\|(?=\S)|(?<=\S)\|(?![`\w])")
 
+_NOTEBOOK = (
+    "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n  display_name: Python 3\n---\n"
+)
+_FIRST_CELL = '''
+import os
+import subprocess
+from IPython.core.magic import register_cell_magic
+
+os.environ["COLUMNS"] = "80"
+
+@register_cell_magic
+def sh(line, cell):
+    """Show what a command prints in one piece; IPython shows chunks that end within words."""
+    done = subprocess.run(["sh", "-ec", cell], stdout=-1, stderr=subprocess.PIPE, text=True)
+    print(done.stdout, end="")
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+'''
+
 
 def setup(app):
     """Let the pages be read in the repository and on the site alike."""
@@ -62,9 +82,24 @@ def setup(app):
 
         source[0] = _OUTSIDE.sub(path_of, source[0])
 
+    def code(app, name, source):
+        """Turn blocks of code into cells of a notebook: a file to save, commands, or Python."""
+        if name not in NOTEBOOKS:
+            return
+        cell = "```{code-cell} ipython3\n"
+        text = re.sub(
+            r"```(?:toml|python)\n# (\S+\.(?:toml|py))\n", cell + r"%%writefile \1\n", source[0]
+        )
+        text = text.replace("```sh\n", cell + "%%sh\n").replace("```python\n", cell)
+        image = 'import IPython\nIPython.display.Image("\\1", width=360)'
+        picture = f"{cell}:tags: [remove-input]\n{image}\n```"
+        text = re.sub(r"<!-- picture (\S+) -->", picture, text)
+        source[0] = f"{_NOTEBOOK}{cell}:tags: [remove-cell]\n{_FIRST_CELL}```\n\n{text}"
+
     def bars(app, what, name, thing, options, lines):
         """Escape |x|, a size, which would be a substitution in reStructuredText."""
         lines[:] = [_BAR.sub(r"\|", line) for line in lines]
 
     app.connect("source-read", links)
+    app.connect("source-read", code)
     app.connect("autodoc-process-docstring", bars)
