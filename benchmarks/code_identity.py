@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from coartic.motion.compiled import model_files
+from coartic.motion.sources import model_files
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:

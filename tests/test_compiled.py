@@ -38,12 +38,12 @@ def lever(folder):
     from kernel import across
 
     dy = across(np.array([1.0, 6.5]), np.zeros(2))
-    return float(dy), sum(across.stats.cache_hits.values())
+    return float(dy), sum(across.dispatcher.stats.cache_hits.values())
 
 
 def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
     code = """if True:
-        import coartic.motion
+        import coartic.motion.compiler
         from numba.core import config
         config.reload_config()
         print(config.CACHE_DIR, config.DISABLE_JIT)"""
@@ -102,7 +102,7 @@ def reaches(folder, numbers):
     sys.path.insert(0, str(folder))
     from lanes import length, reach_of
 
-    return [reach_of(links) for links in numbers], sum(length.stats.cache_hits.values())
+    return [reach_of(links) for links in numbers], sum(length.dispatcher.stats.cache_hits.values())
 
 
 def test_machine_code_of_several_processes_goes_together(tmp_path):
