@@ -1,5 +1,6 @@
 """Compiled code is never older than the sources it comes from."""
 
+import logging
 import os
 import shutil
 import subprocess
@@ -112,3 +113,19 @@ def test_machine_code_of_several_processes_goes_together(tmp_path):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
     for numbers in ([1, 2], [2, 1]):
         assert apart(reaches, tmp_path, numbers) == (numbers, 2)
+
+
+def said(folder):
+    """What the package logs while the kernel is called."""
+    log, texts = logging.getLogger("coartic"), []
+    log.setLevel(logging.INFO)
+    log.addFilter(lambda record: texts.append(record.getMessage()))
+    lever(folder)
+    return texts
+
+
+def test_compiling_is_said_once(tmp_path):
+    write_kernel(tmp_path)
+    (text,) = apart(said, tmp_path)
+    assert "Compiling (once)" in text
+    assert apart(said, tmp_path) == []

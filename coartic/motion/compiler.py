@@ -16,12 +16,14 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 import shutil
 import sys
 import time
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
@@ -138,6 +140,12 @@ def for_any_number(dispatcher: Any) -> Any:
     return dispatcher
 
 
+@cache
+def say_so() -> None:
+    """Say, once a process, that it compiles; a program shows this if it logs what coartic says."""
+    logging.getLogger("coartic").info("Compiling (once): this takes up to a minute.")
+
+
 class MachineCode(FunctionCache):
     """Machine code on disk.
 
@@ -157,6 +165,8 @@ class MachineCode(FunctionCache):
             code = self.load(*wanted)  # somebody may have compiled it meanwhile
             if code is not None:
                 self.unlock()
+        if code is None:
+            say_so()
         return code
 
     def load(self, *wanted: Any) -> Any:
