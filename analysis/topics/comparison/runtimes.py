@@ -187,6 +187,8 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     too few runs.
     """
     values, weights, runs = pairs(times)
+    reached = np.isfinite(values)
+    values, weights, runs = values[reached], weights[reached], runs[reached]
 
     def budget(weights: Array) -> float:
         place = np.searchsorted(np.cumsum(weights), share - 1e-9)
