@@ -15,12 +15,13 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic import Execution, MotionModel, NotApplicableError, Task, hand_sequences, trajectory
+from coartic import Execution, MotionModel, NotApplicableError, Task, hand_sequences
 from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
+from coartic.motion.ticks import spell_out
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import PARTS, execute_all, movements_from
@@ -205,12 +206,16 @@ class Study:
                 movements_from(task, movements[run_id], waypoints.get(run_id)) for run_id in ids
             ]
             executions = execute_all(task, solutions, self.model)
+            runs = []
             for run_id, execution in zip(ids, executions, strict=True):
-                done = execution.ticks if isinstance(execution, Execution) else None
-                if done != movements[run_id].ticks.sum():
+                if (
+                    not isinstance(execution, Execution)
+                    or not execution.completed
+                    or execution.ticks != movements[run_id].ticks.sum()
+                ):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
-            runs = tuple(trajectory(task, solution, self.model) for solution in solutions)
-        return Trajectories(task, cell.method, cell.variant, runs, self.model)
+                runs.append(spell_out(task, execution, self.model))
+        return Trajectories(task, cell.method, cell.variant, tuple(runs), self.model)
 
     @cached_property
     def _trajectories(self) -> dict[CellKey, Trajectories]:

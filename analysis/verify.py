@@ -84,8 +84,8 @@ def cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     cosine, sine = np.where(k & 1, sine, cosine), np.where(k & 1, cosine, sine)
     cosine, sine = np.where((k + 1) & 2, -cosine, cosine), np.where(k & 2, -sine, sine)
     far = np.abs(angles) >= 1e5  # rad; three parts of π/2 are too few: the C library's
-    cosine[far] = [math.cos(angle) for angle in angles[far]]
-    sine[far] = [math.sin(angle) for angle in angles[far]]
+    if far.any():
+        cosine[far], sine[far] = np.transpose([(math.cos(a), math.sin(a)) for a in angles[far]])
     return cosine, sine
 
 
@@ -168,12 +168,12 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     _, goal, hand, kind, most, target, waypoints = movement
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, waypoints, model, most) if on_path else line(q, target, model, most)
-    x, y = hand_at(points, arm, on_path)
+    x, y = hand_at(np.column_stack([points, target]), arm, on_path)
+    x, y, end_x, end_y = x[:-1], y[:-1], x[-1], y[-1]
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
     stops = hits.copy()
     if kind in ("learned", "planned") or (kind == "corrective" and model.corrective_arrival):
-        end_x, end_y = hand_at(target[:, None], arm)
         dx, dy = end_x - x, end_y - y
         stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
     stops[-1] = True
@@ -189,7 +189,8 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
         to_goal, before = [movement for movement in movements if movement.goal == goal], q
-        _, _, hit = make(task, q, to_goal[0]._replace(kind="planned", target=q))  # where it stands
+        stand = to_goal[0]._replace(kind="planned", target=q)  # the others are made in any case
+        hit = to_goal[0].kind == "corrective" and make(task, q, stand)[2]
         for movement in to_goal:
             which, is_corrective = f"movement {movement.order}", movement.kind == "corrective"
             if hit and (is_corrective or movement is not to_goal[0]):
@@ -198,10 +199,8 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
                 need(is_none, f"{which} is made after goal {goal} is hit")
                 continue
             q, ticks, hit = make(task, q, movement)
-            more = "at least " * (ticks > movement.ticks)
-            need(
-                ticks == movement.ticks, f"{which} takes {more}{ticks} ticks, not {movement.ticks}"
-            )
+            words = f"{which} takes {'at least ' * (ticks > movement.ticks)}{ticks} ticks"
+            need(ticks == movement.ticks, f"{words}, not {movement.ticks}")
             reward, corrections = reward - ticks, corrections + is_corrective
         need(hit, f"goal {goal} is not hit")
         hands += to_goal[0].hand[0].upper()
@@ -375,8 +374,9 @@ def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
     size = 4 * min(row["trials"] or 0, MOST_TRIALS)
     unpacked = zlib.decompressobj().decompress(row["rewards"] or zlib.compress(b""), size + 1)
     need(len(unpacked) <= size, f"it has more rewards than {row['trials']} trials")
-    rewards = np.frombuffer(unpacked, "<i4").tolist()
-    content = [row["status"], row["proven_bound"], [r if r > -(2**31) else None for r in rewards]]
+    rewards = np.frombuffer(unpacked, "<i4").astype(object)
+    rewards[rewards == -(2**31)] = None
+    content = [row["status"], row["proven_bound"], rewards.tolist()]
     for part, moves in parts.items():
         for _, *facts, q, waypoints in moves:
             content.append([part, *facts, q.tolist(), [p.tolist() for p in waypoints] or None])

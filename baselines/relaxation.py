@@ -34,15 +34,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from coartic import Task
 from coartic.robot import BASE_DOF, HANDS, Arm, Array, Hand, directions
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 PartialSequence = tuple[Hand | None, ...]
 """A hand per goal, None where it is undecided."""
@@ -155,7 +157,7 @@ class Relaxation:
         """Multipliers for a box, the relaxation's minimiser, iterations of the solver."""
         matrix, offsets = self.with_half_spaces(box)
         solution = clarabel.DefaultSolver(
-            sparse.csc_matrix((self._size, self._size)),
+            self._no_squares,
             self._objective,
             matrix,
             np.concatenate([self._right, offsets]),
@@ -219,6 +221,8 @@ class Relaxation:
 
     def lay_out(self, fixed: Array) -> None:
         """Store the places of the half-spaces' entries, below the rows that are fixed."""
+        from scipy.sparse import csc_matrix  # slow, and a command that names methods needs none
+
         links = len(self._directions)
         turned, angle_columns = np.nonzero(self._angles)  # of each link, its angle's joints
         self._turned = turned
@@ -232,9 +236,10 @@ class Relaxation:
         self._order = np.lexsort((rows, columns))
         self._rows = rows[self._order]
         self._ends = np.searchsorted(columns[self._order], np.arange(self._size + 1))
-        self._matrix = sparse.csc_matrix((len(fixed) + HALF_SPACES * links, self._size))
+        self._matrix = csc_matrix((len(fixed) + HALF_SPACES * links, self._size))
+        self._no_squares = csc_matrix((self._size, self._size))
 
-    def with_half_spaces(self, box: Array) -> tuple[sparse.csc_matrix, Array]:
+    def with_half_spaces(self, box: Array) -> tuple[csc_matrix, Array]:
         """All rows, and the right sides of the half-spaces ``A x <= b``.
 
         They hold (c, s, φ) of every link in its interval.

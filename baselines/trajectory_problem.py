@@ -35,7 +35,6 @@ from typing import Any, Literal
 import casadi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BPoly
 
 from coartic.method import Information
 from coartic.model import PAPER
@@ -437,6 +436,8 @@ def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:
 
     Hermite cubics (one rate) or quintics (two) between start and goals.
     """
+    from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
+
     corners = np.vstack([q0, plan.configurations])
     times = np.concatenate([[0.0], np.cumsum(plan.durations)])
     curve = BPoly.from_derivatives(times, np.stack([corners, *plan.rates], axis=1))

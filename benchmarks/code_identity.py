@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections import deque
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from coartic.motion.compiled import model_files
+from coartic.motion.sources import model_files
+
+_WITHIN_STATEMENTS = ast.stmt | ast.excepthandler | ast.match_case
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
@@ -55,7 +58,7 @@ def code_text(path: Path) -> str:
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
     """What counts of a module, as a text; its imports: level, module, names."""
     imports = []
-    for node in ast.walk(tree := ast.parse(content)):
+    for node in statements(tree := ast.parse(content)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             node.value.value = None
         elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__version__":
@@ -66,3 +69,12 @@ def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]],
             names = ("", *(alias.name for alias in node.names))
             imports.append((node.level, node.module or "", names))
     return ast.dump(tree), tuple(imports)
+
+
+def statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """What :func:`ast.walk` finds, without expressions, which are most of a tree."""
+    waiting = deque([tree])
+    while waiting:
+        node = waiting.popleft()
+        waiting += [n for n in ast.iter_child_nodes(node) if isinstance(n, _WITHIN_STATEMENTS)]
+        yield node

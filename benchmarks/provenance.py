@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import coartic
-from coartic.motion.compiled import PACKAGE, source_fingerprint
+from coartic.motion.sources import FINGERPRINT, PACKAGE
 from coartic.text import LONGEST_LINE, plain
 from coartic.threads import ONE_THREAD, threads_for
 
@@ -39,7 +39,7 @@ def current_environment() -> dict[str, Any]:
     """With what this process makes results: versions, platform, commit."""
     return {
         "coartic": coartic.__version__,
-        "model_code": source_fingerprint(),
+        "model_code": FINGERPRINT,
         "commit": commit_of_checkout(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},

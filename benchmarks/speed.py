@@ -1,4 +1,4 @@
-"""How fast trials are: through each public way, and in each of the paper's cells.
+"""How fast trials are, through each public way and in each of the paper's cells; and commands.
 
     python -m coartic.benchmarks.speed
 
@@ -7,6 +7,12 @@ Times depend on the machine; compare ratios, and times of one call.
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 
@@ -36,6 +42,7 @@ def main() -> None:
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
+    show_commands()
 
 
 def trials_a_second() -> dict[str, float]:
@@ -89,6 +96,51 @@ def _us_a_trial(task: Task, condition: str, runs: int) -> float:
     clock = time.thread_time()
     learn_many(task, CONDITIONS[condition], seeds=range(runs), jobs=1)
     return (time.thread_time() - clock) / runs / TRIALS * 1e6
+
+
+def show_commands() -> None:
+    """Print the CPU time of commands: of a fresh process and of all that it starts."""
+    print(f"{'command':32}{'median':>9}{'least':>9}{'most':>9}   CPU seconds, all processes")
+    with tempfile.TemporaryDirectory() as folder:
+        results = f"{folder}/quick"
+        for name, command, repeats in (
+            ("first check, compiling", ["check", "EC4"], 1),
+            ("run quick", ["run", "quick", "--redo", "--out", results], 3),
+            ("report", ["report", results], 3),
+            ("verify", ["verify", results], 3),
+            ("trace", ["trace", "claims", "--in", results], 5),
+            ("check", ["check", "EC4"], 5),
+            ("draw", ["draw", "--out", f"{folder}/tasks.svg", "--replace"], 5),
+            ("list", ["list"], 5),
+            ("cite", ["cite"], 5),
+            ("--help", ["--help"], 5),
+        ):
+            times = sorted(cpu_s(command, cache=folder) for _ in range(repeats))
+            columns = "".join(f"{time:9.2f}" for time in (np.median(times), times[0], times[-1]))
+            print(f"{name:32}{columns}", flush=True)
+
+
+def cpu_s(command: list[str], cache: str) -> float:
+    """CPU seconds of a command and of the processes that it starts, with kernels kept in a folder.
+
+    On Linux also of those that end after it, such as the server of worker processes.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER: they become our children
+    before = os.times()
+    subprocess.run(
+        [sys.executable, "-m", "coartic", *command],
+        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=True,
+    )
+    with contextlib.suppress(ChildProcessError):  # there are no more
+        while True:
+            os.wait()
+    after = os.times()
+    user = after.children_user - before.children_user
+    return user + after.children_system - before.children_system
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Compiled code is never older than the sources it comes from."""
 
+import logging
 import os
 import shutil
 import subprocess
@@ -38,12 +39,12 @@ def lever(folder):
     from kernel import across
 
     dy = across(np.array([1.0, 6.5]), np.zeros(2))
-    return float(dy), sum(across.stats.cache_hits.values())
+    return float(dy), sum(across.dispatcher.stats.cache_hits.values())
 
 
 def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
     code = """if True:
-        import coartic.motion
+        import coartic.motion.compiler
         from numba.core import config
         config.reload_config()
         print(config.CACHE_DIR, config.DISABLE_JIT)"""
@@ -102,7 +103,7 @@ def reaches(folder, numbers):
     sys.path.insert(0, str(folder))
     from lanes import length, reach_of
 
-    return [reach_of(links) for links in numbers], sum(length.stats.cache_hits.values())
+    return [reach_of(links) for links in numbers], sum(length.dispatcher.stats.cache_hits.values())
 
 
 def test_machine_code_of_several_processes_goes_together(tmp_path):
@@ -112,3 +113,19 @@ def test_machine_code_of_several_processes_goes_together(tmp_path):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
     for numbers in ([1, 2], [2, 1]):
         assert apart(reaches, tmp_path, numbers) == (numbers, 2)
+
+
+def said(folder):
+    """What the package logs while the kernel is called."""
+    log, texts = logging.getLogger("coartic"), []
+    log.setLevel(logging.INFO)
+    log.addFilter(lambda record: texts.append(record.getMessage()))
+    lever(folder)
+    return texts
+
+
+def test_compiling_is_said_once(tmp_path):
+    write_kernel(tmp_path)
+    (text,) = apart(said, tmp_path)
+    assert "Compiling (once)" in text
+    assert apart(said, tmp_path) == []

@@ -336,7 +336,8 @@ def test_near_ties(hands, repeats):
         hands=[{"L": "left", "R": "right"}[hand] for hand in hands],
         execution=SimpleNamespace(configurations=[task.q0] * 3),
     )
-    assert list(measures.near_ties(run)) == [2]
+    ties = measures.near_ties(SimpleNamespace(task=task, runs=[run]))
+    assert ties[0, 1:].tolist() == [True, False]
     of_30, of_29 = (
         measures.near_tie_repeats(
             planted((task, "receding-horizon", {"horizon": 1}, (run,) * count)),

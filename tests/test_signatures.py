@@ -23,6 +23,7 @@ from coartic.analysis.statistics.estimates import wilson
 from coartic.analysis.topics.coarticulation import placebo, sentences, tables, values
 from coartic.analysis.topics.coarticulation.values import signature_values
 from coartic.analysis.trajectories import Trajectories, best_sequences, change_from
+from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.strategies import as_released, changed, tiny_task
 
@@ -276,37 +277,43 @@ def test_a_lead_is_at_most_the_shortest_movement():
 # Subtasks and hands
 
 
+def isolated_ticks(task, q, goal, hand):
+    return subtasks.isolated_reaches(
+        task, q[None], np.array([goal]), np.array([HANDS.index(hand)])
+    )[0]
+
+
 def test_isolated_reaches_are_the_corrective_process():
     task = load_task("two-armed-1")
     for hand, letter in (("left", "L"), ("right", "R")):
-        ticks, _ = subtasks.isolated_reach(task, task.q0, 1, hand)
-        assert ticks == corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
-    assert subtasks.isolated_reach(tiny_task(), posture(0.5, 0.9), 1, "right")[0] == 0
+        ticks = corrective_trial(task, letter + "RRR").ticks_by_goal()[0]
+        assert isolated_ticks(task, task.q0, 1, hand) == ticks
+    assert isolated_ticks(tiny_task(), posture(0.5, 0.9), 1, "right") == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
-    assert subtasks.isolated_reach(unreachable, unreachable.q0, 3, "right") is None
+    assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
     stays = SimpleNamespace(configurations=np.tile(unreachable.q0, (3, 1)))
     path = SimpleNamespace(task=unreachable, hands=("right",) * 3, execution=stays)
-    assert subtasks.ticks_slower(path)[2] == math.inf
+    assert subtasks.ticks_slower(unreachable, [path])[0, 2] == math.inf
 
 
 def test_what_a_posture_serves():
     """The corrective process itself gains nothing; half the way ahead, half the way is left."""
     task = as_released("two-armed-2")
     initial = trajectory(task, corrective_trial(task, "RRRR").movements)
-    assert subtasks.served(initial) == pytest.approx(np.zeros((3, 2)))
+    assert subtasks.served(task, [initial])[0] == pytest.approx(np.zeros((3, 2)))
     alone = initial.execution.configurations
     q = alone.copy()
     q[:-1] += 0.5 * np.diff(alone, axis=0)
     ticks = np.add(initial.execution.ticks_by_goal(), [7, 0, 0, 0])
     execution = SimpleNamespace(configurations=q, ticks_by_goal=lambda: ticks)
     path = SimpleNamespace(task=task, hands=initial.hands, execution=execution)
-    left = subtasks.isolated_reach(task, q[0], 2, "right")[0]
-    gain = subtasks.isolated_reach(task, alone[0], 2, "right")[0] - left
+    left = isolated_ticks(task, q[0], 2, "right")[0]
+    gain = isolated_ticks(task, alone[0], 2, "right")[0] - left
     assert gain > 0.4 * left
-    assert subtasks.served(path)[0] == pytest.approx([7, gain])
+    assert subtasks.served(task, [path])[0, 0] == pytest.approx([7, gain])
     # What the other arm does is not the chosen one's.
     q[0, task.robot.joints("left")] += 0.3
-    assert subtasks.served(path)[0, 1] == gain
+    assert subtasks.served(task, [path])[0, 0, 1] == gain
 
 
 def test_other_hands_are_no_sacrifice():
@@ -330,7 +337,7 @@ def test_signs_are_signatures_with_one_number_a_run():
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
     nearer = [subtasks.preshaping(run, corrective_trial(task, "RRRR")) for run in cell.runs]
     assert SIGNS["other arm"].of(cell) == pytest.approx([np.nanmean(run) for run in nearer])
-    each = [subtasks.served(run).mean(axis=0) for run in cell.runs]
+    each = subtasks.served(task, cell.runs).mean(axis=1)
     assert SIGNS["cost"].of(cell) == pytest.approx([cost for cost, _ in each])
     assert SIGNS["arm"].of(cell) == pytest.approx([gain for _, gain in each])
     assert not any(sign.of(Trajectories(task, "", "", ())).size for sign in SIGNS.values())

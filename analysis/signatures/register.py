@@ -158,7 +158,7 @@ def hand_as_in_isolation(runs: Trajectories) -> Array:
 
     As a sign, the mean of 1 - a(i, g) over g < G.
     """
-    return np.array([subtasks.ticks_slower(run) == 0 for run in runs.runs])
+    return np.asarray(subtasks.ticks_slower(runs.task, runs.runs) == 0)
 
 
 @signature(
@@ -226,7 +226,7 @@ def turning_angle(runs: Trajectories) -> Array:
 )
 def cost_at_this_goal(runs: Trajectories) -> Array:
     """t(i, g) - r(i, g), g < G, as :func:`~.subtasks.served` says; as a sign, the mean over g."""
-    return np.array([subtasks.served(run)[:, 0] for run in runs.runs])
+    return subtasks.served(runs.task, runs.runs)[..., 0]
 
 
 @signature(
@@ -241,7 +241,7 @@ def cost_at_this_goal(runs: Trajectories) -> Array:
 def gain_at_the_next_goal(runs: Trajectories) -> Array:
     """r'(i, g + 1) - r(i, g + 1), g < G, as :func:`~.subtasks.served` says; as a sign, the mean
     over g."""
-    return np.array([subtasks.served(run)[:, 1] for run in runs.runs])
+    return subtasks.served(runs.task, runs.runs)[..., 1]
 
 
 # One goal before two different successors

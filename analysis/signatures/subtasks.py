@@ -3,11 +3,13 @@ the arm that is not chosen does meanwhile."""
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coartic import Execution, Hand, Task, Trajectory, correct, move
+from coartic import Execution, Hand, Task, Trajectory
+from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
 
 ROUNDING = 1
@@ -21,44 +23,52 @@ def other(hand: Hand) -> Hand:
     return "right" if hand == "left" else "left"
 
 
-def isolated_reach(task: Task, q: Array, goal: int, hand: Hand) -> tuple[int, Array] | None:
-    """Ticks in which a hand reaches a goal from ``q`` by the corrective process alone, and where.
+def isolated_reaches(
+    task: Task, q: Array, goals: NDArray[np.int64], hands: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Ticks in which hands reach goals from ``q`` by the corrective process alone, and where.
 
-    ``goal`` counts from 1; 0 ticks and ``q`` where the hand is there. None where the corrective
-    process brings it to no hit.
+    ``q`` has shape ``(..., dof)``; ``goals``, which count from 1, and ``hands``, places in HANDS,
+    have the shape before it or one that spreads to it. 0 ticks and ``q`` where the hand is there;
+    NaN ticks where the corrective process brings it to no hit.
     """
-    centre, robot = task.goals[goal - 1], task.robot
-    if np.hypot(*(robot.forward_kinematics(q, hand) - centre)) <= task.radius:
-        return 0, q
-    target = correct(robot, q, hand, centre, locked_base=task.locked_base)
-    if not target.converged:
-        return None
-    reached = move(robot, q, target.q, hand, centre, task.radius, stop_on_arrival=False)
-    return (reached.ticks, reached.q) if reached.hit else None
+    shape = q.shape[:-1]
+    reached = reach_unchecked(
+        task.robot,
+        q.reshape(-1, q.shape[-1]),
+        np.broadcast_to(hands, shape).ravel(),
+        task.goal_array[np.broadcast_to(goals, shape).ravel() - 1],
+        task.radius,
+        locked_base=task.locked_base,
+    )
+    ticks = np.where(reached.hit, reached.ticks, np.nan)
+    return ticks.reshape(shape), reached.q.reshape(q.shape)
 
 
-def served(path: Trajectory) -> Array:
-    """What the way each goal is hit costs there and gains at the next, shape ``(G − 1, 2)``.
+def served(task: Task, paths: Sequence[Trajectory]) -> Array:
+    """What the way each goal is hit costs there and gains at the next, shape ``(n, G − 1, 2)``.
 
-    In ticks, with the hands of the path, for each goal that another follows, against the
+    In ticks, with the hands of each path, for each goal that another follows, against the
     corrective process from the same posture before. First: how much longer the path's own way to
     the goal is. Second: how much sooner the corrective process reaches the next goal from where
     base and chosen arm of the path hit this one than from where it would have hit it itself;
     what the other arm does meanwhile is left out. NaN where the corrective process does not hit.
     """
-    task, execution = path.task, path.execution
-    befores, ticks = postures_before(execution, task), execution.ticks_by_goal()
-    cost_and_gain = np.full((len(task.goals) - 1, 2), np.nan)
-    for k, (now, after) in enumerate(itertools.pairwise(path.hands)):
-        alone = isolated_reach(task, befores[k], k + 1, now)
-        if alone is None:
-            continue
-        hit = np.array(execution.configurations[k])
-        waiting = task.robot.joints(other(now))
-        hit[waiting] = alone[1][waiting]
-        nexts = [isolated_reach(task, q, k + 2, after) for q in (alone[1], hit)]
-        if nexts[0] is not None and nexts[1] is not None:
-            cost_and_gain[k] = ticks[k] - alone[0], nexts[0][0] - nexts[1][0]
+    ticks = np.array([path.execution.ticks_by_goal() for path in paths])
+    hits = np.array([path.execution.configurations for path in paths])
+    befores, hands = starts_of(task, paths), hand_numbers(task, paths)
+    goals = 1 + np.arange(len(task.goals))
+    now, following = np.s_[:, :-1], np.s_[:, 1:]
+    alone, there = isolated_reaches(task, befores[now], goals[:-1], hands[now])
+    waiting = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
+    for number, hand in enumerate(HANDS):
+        waiting[number, task.robot.joints(other(hand))] = True
+    hit = np.where(waiting[hands[now]], there, hits[now])
+    after, nearer = (
+        isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
+    )
+    cost_and_gain = np.stack([ticks[now] - alone, after - nearer], axis=-1)
+    cost_and_gain[np.isnan(cost_and_gain.sum(axis=-1))] = np.nan
     return cost_and_gain
 
 
@@ -67,20 +77,44 @@ def postures_before(execution: Execution, task: Task) -> list[Array]:
     return [np.array(task.q0), *execution.configurations[:-1]]
 
 
-def ticks_slower(path: Trajectory) -> Array:
-    """Ticks by which each goal's hand is slower for that goal alone, shape ``(G,)``.
+def starts_of(task: Task, paths: Sequence[Trajectory]) -> Array:
+    """:func:`postures_before` of each path, shape ``(n, G, dof)``."""
+    befores = [postures_before(path.execution, task) for path in paths]
+    return np.array(befores).reshape(-1, len(task.goals), task.robot.dof)
+
+
+def hand_numbers(task: Task, paths: Sequence[Trajectory]) -> NDArray[np.int64]:
+    """Hand chosen for each goal, its place in HANDS, shape ``(n, G)``."""
+    hands = [[HANDS.index(hand) for hand in path.hands] for path in paths]
+    return np.array(hands, dtype=np.int64).reshape(-1, len(task.goals))
+
+
+def ticks_alone(task: Task, paths: Sequence[Trajectory]) -> Array:
+    """Ticks in which each hand reaches each goal from where the path was at the goal before.
+
+    By the corrective process alone, shape ``(2, n, G)``. Infinite where it does not reach the goal
+    with the hand, and for a hand that the task does not have.
+    """
+    befores, goals = starts_of(task, paths), 1 + np.arange(len(task.goals))
+    ticks = np.full((len(HANDS), *befores.shape[:-1]), np.inf)
+    for hand in map(HANDS.index, task.hands):
+        reached, _ = isolated_reaches(task, befores, goals, np.array(hand))
+        ticks[hand] = np.where(np.isnan(reached), np.inf, reached)
+    return ticks
+
+
+def ticks_slower(task: Task, paths: Sequence[Trajectory]) -> Array:
+    """Ticks by which each goal's hand is slower for that goal alone, shape ``(n, G)``.
 
     Slower than the hand with which the corrective process alone reaches the goal in the fewest
     ticks from the posture before; 0 for that hand and one as quick. Where it is above 0, the choice
     of hand serves other goals than its own. Infinite where the corrective process does not reach
     the goal with the hand.
     """
-    slower = np.empty(len(path.hands))
-    befores = postures_before(path.execution, path.task)
-    for k, (hand, q) in enumerate(zip(path.hands, befores, strict=True)):
-        reaches = {each: isolated_reach(path.task, q, k + 1, each) for each in path.task.hands}
-        ticks = {each: reach[0] for each, reach in reaches.items() if reach is not None}
-        slower[k] = ticks[hand] - min(ticks.values()) if hand in ticks else np.inf
+    alone = ticks_alone(task, paths)
+    chosen = np.take_along_axis(alone, hand_numbers(task, paths)[None], axis=0)[0]
+    slower: Array = np.full_like(chosen, np.inf)
+    np.subtract(chosen, alone.min(axis=0), out=slower, where=chosen < np.inf)
     return slower
 
 

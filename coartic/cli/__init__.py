@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import io
+import logging
 import os
 import sys
 import warnings
@@ -18,7 +19,7 @@ import typer
 
 import coartic
 from coartic.cli import draw, paper, read, run
-from coartic.cli.terminal import complain
+from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
 app = typer.Typer(
@@ -54,6 +55,14 @@ for command in (
 app.add_typer(paper.group, name="paper")
 
 
+class Said(logging.Handler):
+    """Says what the package logs."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One record, to standard error."""
+        say(record.getMessage(), stream=sys.stderr)
+
+
 def main() -> None:
     """Run the command line; exit code 2 for what the user can put right."""
     gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
@@ -61,6 +70,8 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
+    logging.getLogger("coartic").setLevel(logging.INFO)
+    logging.getLogger("coartic").addHandler(Said())
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     if os.path.lexists("matplotlibrc"):  # its settings name programs to run: it may be a stranger's
         with contextlib.chdir(os.path.dirname(__file__)):

@@ -128,6 +128,11 @@ def trajectory(
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
+    return spell_out(task, execution, model)
+
+
+def spell_out(task: Task, execution: Execution, model: MotionModel) -> Trajectory:
+    """Every control tick of an execution that has hit all goals."""
     q = np.array(task.q0)
     rows = [q[None, :][:0]]
     elapsed = np.zeros(len(task.goals), dtype=np.int64)

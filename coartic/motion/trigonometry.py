@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from coartic.motion.kernels import scalar
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 
@@ -30,7 +31,7 @@ _S3, _S5, _S7, _S9, _S11, _S13, _S15, _S17 = (
 _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n in range(2, 9))
 
 
-@njit(nogil=True)
+@scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
     """Sine and cosine of the angle less k quarter turns, and k modulo 4."""
     quarters = np.rint(angle * _PER_QUARTER)
@@ -48,7 +49,7 @@ def _reduced(angle: float) -> tuple[float, float, int]:
     return sine, cosine, int(quarters) & 3
 
 
-@njit(nogil=True)
+@scalar
 def near_cosine(angle: float) -> float:
     """cos(angle) for |angle| < LARGEST, without a branch."""
     sin, cos, quarter = _reduced(angle)
@@ -56,7 +57,7 @@ def near_cosine(angle: float) -> float:
     return -value if (quarter + 1) & 2 else value
 
 
-@njit(nogil=True)
+@scalar
 def near_sine(angle: float) -> float:
     """sin(angle) for |angle| < LARGEST, without a branch."""
     sin, cos, quarter = _reduced(angle)
@@ -64,13 +65,13 @@ def near_sine(angle: float) -> float:
     return -value if quarter & 2 else value
 
 
-@njit(nogil=True)
+@scalar
 def cosine(angle: float) -> float:
     """cos(angle), angle in rad."""
     return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
 
 
-@njit(nogil=True)
+@scalar
 def sine(angle: float) -> float:
     """sin(angle), angle in rad."""
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)

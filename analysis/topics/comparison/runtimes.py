@@ -187,6 +187,8 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     too few runs.
     """
     values, weights, runs = pairs(times)
+    reached = np.isfinite(values)
+    values, weights, runs = values[reached], weights[reached], runs[reached]
 
     def budget(weights: Array) -> float:
         place = np.searchsorted(np.cumsum(weights), share - 1e-9)
@@ -196,10 +198,21 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     if min(sizes) < FEWEST:
         return Estimate(budget(weights))
     rng = np.random.default_rng(SEED)
-    drawn = [rng.multinomial(size, np.full(size, 1 / size), BUDGET_RESAMPLES) for size in sizes]
-    budgets = [budget(weights * counts[runs]) for counts in np.concatenate(drawn, axis=1)]
+    drawn = np.concatenate([times_drawn(size, rng) for size in sizes], axis=1)
+    budgets = [budget(weights * counts[runs]) for counts in drawn]
     low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
     return Estimate(budget(weights), float(low), float(high))
+
+
+def times_drawn(size: int, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """How often each of so many runs is drawn in each resample, ``(BUDGET_RESAMPLES, size)``.
+
+    A byte each, as there may be many runs: none is drawn 256 times.
+    """
+    shares, drawn = np.full(size, 1 / size), np.empty((BUDGET_RESAMPLES, size), dtype=np.uint8)
+    for row in drawn:
+        row[:] = rng.multinomial(size, shares)
+    return drawn
 
 
 def trials_to_half(study: Study, method: str) -> dict[str, float]:

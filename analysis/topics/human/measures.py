@@ -14,11 +14,11 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from coartic import Trajectory
 from coartic.analysis.methods import most_exploring
-from coartic.analysis.signatures.subtasks import isolated_reach, postures_before
+from coartic.analysis.signatures.subtasks import hand_numbers, isolated_reaches, ticks_alone
 from coartic.analysis.study import CellRuns, Study
 from coartic.analysis.topics.random_tasks import RECEDING_HORIZON, solved_cells
 from coartic.analysis.trajectories import Trajectories, postures
@@ -304,11 +304,14 @@ def excess_of_first(study: Study, model: Model) -> ByTask:
     """Ticks to goal 1 beyond the way to it alone, where the other hand hits goal 2."""
     values = {}
     for task, runs in unmoved_tasks(study, model, 2).items():
-        excess = []
-        for run in runs.runs:
-            alone = isolated_reach(run.task, run.task.q0, 1, run.hands[0])
-            if run.hands[0] != run.hands[1] and alone is not None:
-                excess.append(int(run.execution.ticks_by_goal()[0]) - alone[0])
+        hands = hand_numbers(runs.task, runs.runs)
+        starts = np.tile(runs.task.q0, (len(hands), 1))
+        alone, _ = isolated_reaches(runs.task, starts, np.array(1), hands[:, 0])
+        excess = [
+            run.execution.ticks_by_goal()[0] - ticks
+            for run, ticks in zip(runs.runs, alone, strict=True)
+            if run.hands[0] != run.hands[1] and not math.isnan(ticks)
+        ]
         if excess:
             values[task] = float(np.mean(excess))
     return values
@@ -318,23 +321,18 @@ def near_tie_repeats(study: Study, model: Model) -> ByTask:
     """Whether the hand stays the same in each near tie, ``(n, 1)``; NaN if all tasks have few."""
     by_task = {}
     for task, runs in unmoved_tasks(study, model, 2).items():
-        ties = ((run.hands, goal) for run in runs.runs for goal in near_ties(run))
-        repeats = [[float(hands[goal - 1] == hands[goal - 2])] for hands, goal in ties]
-        if repeats:
-            by_task[task] = np.array(repeats)
+        hands, ties = hand_numbers(runs.task, runs.runs), near_ties(runs)
+        repeats = (hands[:, 1:] == hands[:, :-1])[ties[:, 1:]]
+        if len(repeats):
+            by_task[task] = repeats[:, None].astype(float)
     enough = sum(map(len, by_task.values())) >= FEWEST_TIES
     return {task: repeats if enough else math.nan * repeats for task, repeats in by_task.items()}
 
 
-def near_ties(run: Trajectory) -> Iterator[int]:
-    """Goals but the first that both hands reach in the same ticks from the posture before."""
-    befores = postures_before(run.execution, run.task)
-    for goal in range(2, len(run.task.goals) + 1):
-        reaches = [isolated_reach(run.task, befores[goal - 1], goal, h) for h in run.task.hands]
-        ticks = [reach[0] for reach in reaches if reach is not None]
-        few, many = min(ticks, default=0), max(ticks, default=0)
-        if len(ticks) == 2 and many - few <= NEAR_TIE * few:
-            yield goal
+def near_ties(runs: Trajectories) -> NDArray[np.bool_]:
+    """Whether both hands reach a goal in the same ticks from the posture before, ``(n, G)``."""
+    few, many = np.sort(ticks_alone(runs.task, runs.runs), axis=0)
+    return np.asarray((many < math.inf) & (many <= (1 + NEAR_TIE) * few))
 
 
 def sufficient_horizon(study: Study, model: Model) -> ByTask:

@@ -18,7 +18,7 @@ from coartic.analysis.claims.rules import TEST_OF_MEANS, all_of, higher
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.context import dependence_below
-from coartic.analysis.signatures.subtasks import ticks_slower
+from coartic.analysis.signatures.subtasks import hand_numbers, ticks_slower
 from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
 from coartic.analysis.statistics.hypotheses import (
     share_test,
@@ -26,7 +26,8 @@ from coartic.analysis.statistics.hypotheses import (
 from coartic.analysis.topics.paper.claims import ONE_ARMED, TASK_1, TASK_2, TWO_ARMED
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import estimate, number
-from coartic.robot import Array
+from coartic.robot import HANDS, Array
+from coartic.tasks.task import hands_of
 
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
 """The learner that is rewarded for each subtask by itself."""
@@ -217,11 +218,10 @@ def chosen_slower(cell: Trajectories, initial: str) -> Array:
 
     Of goals that others follow, hit with another hand than that of the initial solution.
     """
-    ticks = []
-    for run in cell.runs:
-        other = np.array(list(run.execution.hands)) != np.array(list(initial))
-        ticks.append(float(ticks_slower(run)[:-1][other[:-1]].sum()))
-    return np.array(ticks)
+    first = [HANDS.index(hand) for hand in hands_of(initial)]
+    others = hand_numbers(cell.task, cell.runs) != first
+    slower = np.where(others, ticks_slower(cell.task, cell.runs), 0.0)
+    return np.asarray(slower[:, :-1].sum(axis=1))
 
 
 def gained_by_slower(cell: Trajectories, slower: Array) -> str:
