@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, paper, read, run
+from coartic.cli import draw, new, paper, read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
@@ -51,6 +51,7 @@ for command in (
     *(draw.draw, draw.animate),
 ):
     app.command(name=command.__name__.removesuffix("_"))(command)
+app.add_typer(new.group, name="new")
 app.add_typer(paper.group, name="paper")
 
 
