@@ -13,7 +13,7 @@ class Mine(Optimiser):
     citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what they cite
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise the cost of a trial; this ends when no trial is left, and the best one counts."""
+        """Minimise the cost of a trial; this ends when no trial is left; the best counts."""
         # Draw from rng alone. A point has the joints of all goals; units: length, rad.
         x = objective.x0  # the corrective process alone
         best = objective(x)  # ticks

@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, new, paper, read, run
+from coartic.cli import draw, new, paper, read, run, share
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
@@ -49,6 +49,7 @@ for command in (
     *(run.run, run.list_, run.check, run.reproduce),
     *(read.report, read.trace, read.compare, read.verify, read.cite),
     *(draw.draw, draw.animate),
+    *(share.merge,),
 ):
     app.command(name=command.__name__.removesuffix("_"))(command)
 app.add_typer(new.group, name="new")
