@@ -182,9 +182,14 @@ def check_scores(folder: Path, method: MethodCard, runs: Sequence[Run], stored: 
     ]
     again = score(Job(setting, method, tuple(run.key for run in runs)), stated)
     for run, scored, result in zip(runs, again, stored, strict=True):
-        before, after = run.to_row() | {"result": result}, scored.to_row()
-        wrong = [f"{name} is {after[name]}, not {before[name]}" for name in _SCORED
-                 if before[name] != after[name]]  # fmt: skip
+        before, after = run.to_row(), scored.to_row()
+        wrong = [
+            f"{name} is {after[name]}, not {before[name]}"
+            for name in _SCORED
+            if before[name] != after[name]
+        ]
+        if run.result != result:
+            wrong.append("a joint or a trial was changed")
         if run.key != setting.key(run.key.suite_seed, run.key.number):
             wrong.append("it is not the run that its id says")
         if not math.isclose(run.other_arm_travel or 0, scored.other_arm_travel or 0, abs_tol=1e-9):
