@@ -82,14 +82,42 @@ def put_beside(plan: Plan, folder: Path, out: Path) -> Plan:
     CoarticError as :func:`merge` does, and where the folder lacks runs.
     """
     with open_store(folder) as source:
-        theirs = source.plan()
-        if (lacking := theirs.size - sum(1 for _ in source.present())) > 0:
-            raise CoarticError(f"{folder} lacks {counted(lacking, 'run')}: finish it first")
-        whole = join({str(folder): theirs, "this command": plan})
+        theirs = complete_plan(source)
+        whole = join({"the results that it is put beside": theirs, "this command": plan})
         with writing(out) as target:
             target.ask(whole, current_environment(), command(), now())
             copy_runs(source, target)
     return whole
+
+
+def gather(first: Path, others: Sequence[Path], out: Path) -> dict[Path, str]:
+    """Join with the first folder, whose tasks count, what goes with it; of each other folder, why
+    it was left out, or nothing."""
+    said = dict.fromkeys(others, "")
+    with open_store(first) as ours, writing(out) as target:
+        plans = {"the results that it is put beside": ours.plan()}
+        target.ask(join(plans), current_environment(), command(), now())
+        copy_runs(ours, target)
+        for folder in others:
+            try:
+                with open_store(folder) as store:
+                    more = {**plans, str(folder): complete_plan(store)}
+                    if added := join(more).tasks.keys() - ours.plan().tasks:
+                        raise CoarticError(f"the suite does not have task {min(added)!r}")
+                    copy_runs(store, target)
+                    plans = more
+            except CoarticError as error:
+                said[folder] = str(error)
+        target.ask(join(plans), current_environment(), command(), now())
+    return said
+
+
+def complete_plan(store: Store) -> Plan:
+    """What a folder was asked for. Raises CoarticError where it lacks runs of that."""
+    plan = store.plan()
+    if (lacking := plan.size - sum(1 for _ in store.present())) > 0:
+        raise CoarticError(f"{store.folder} lacks {counted(lacking, 'run')}: finish it first")
+    return plan
 
 
 def join(plans: Mapping[str, Plan]) -> Plan:
