@@ -1,18 +1,22 @@
 """Commands that hand results on: standings of submitted folders, exports."""
 
+import json
 import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from coartic import load_task
+from coartic.analysis.ioh import function_of
 from coartic.analysis.study import load
 from coartic.benchmarks import released, template
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
+from coartic.optimisers import FAILED
 from coartic.runs.store import RUNS_FILE
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
@@ -118,3 +122,60 @@ def test_merge_command(coartic, shipped, tmp_path):
     assert code == 0
     assert "both: 10 runs (10 of them in more than one folder), each scored again." in text
     assert coartic("merge", shipped, "--out", tmp_path / "c")[0] == 2
+
+
+def written_by_hand(study):
+    """Best cost so far at each improvement, from the reward of every trial; the number of trials."""
+    for run_id, rewards in study.rewards():
+        costs = np.where(np.isnan(rewards), FAILED, -rewards).tolist()
+        better = [n for n in range(len(costs)) if n == 0 or costs[n] < min(costs[:n])]
+        yield run_id, [(n + 1, costs[n]) for n in better], len(costs)
+
+
+def test_export_for_iohprofiler(coartic, tmp_path):
+    """Files line by line, and what IOHinspector reads of them: runs and times to a target."""
+    methods = ["dual-process/EC1", "dual-process/EC1-uncorrected", "corrective-alone/given"]
+    tasks = ["ascending", "one-armed/v1/i003"]
+    study = run_and_write(tmp_path / "runs", of(methods, tasks), runs=3, trials=60)
+    planner = of(["trajectory-optimisation/path-length"], ["ascending"])
+    run_and_write(tmp_path / "planner", planner)
+    assert coartic("export", tmp_path / "planner", "--ioh")[0] == 2  # it makes no trials
+    assert coartic("export", tmp_path / "runs")[0] == 2  # in which format?
+    code, text, _ = coartic("export", tmp_path / "runs", "--ioh", "--out", tmp_path / "ioh")
+    assert (code, "3 methods in 12 files" in text) == (0, True)
+    by_id = {run_id: rest for run_id, *rest in written_by_hand(study)}
+    read = {}
+    for path in (tmp_path / "ioh").rglob("*.json"):
+        said = json.loads(path.read_text())
+        assert not said["maximization"]
+        for scenario in said["scenarios"]:
+            blocks = (path.parent / scenario["path"]).read_text().split("evaluations raw_y\n")[1:]
+            lines = [[tuple(map(int, line.split())) for line in b.splitlines()] for b in blocks]
+            key = said["algorithm"]["name"], said["function_name"]
+            read[key] = list(zip(scenario["runs"], lines, strict=True))
+            assert scenario["dimension"] == (3 * 10 if key[1] == "ascending" else 4 * 9)  # y locked
+    assert {function for _, function in read} == {"ascending", "one-armed/v1/i"}
+    for (task, label), cell in study.cells.items():
+        runs = read[label, function_of(study.tasks[task])]
+        for run_id, (run, lines) in zip(cell.runs.run_id, runs, strict=True):
+            steps, trials = by_id[run_id]
+            assert lines == steps + [(trials, steps[-1][1])] * (steps[-1][0] < trials)
+            assert (run["evals"], run["best"]["evals"], run["best"]["y"]) == (trials, *steps[-1])
+            assert run["instance"] == (3 if "/" in task else 1)
+    inspector = pytest.importorskip("iohinspector")
+    manager = inspector.DataManager()
+    manager.add_folder(str(tmp_path / "ioh"))
+    assert manager.n_runs == len(by_id)
+    data = manager.load(monotonic=True, include_meta_data=True)
+    of_ec1 = data.filter((data["algorithm_name"] == methods[0]) & (data["function_id"] == 1))
+    steps = [by_id[run_id] for run_id in study.cells["ascending", methods[0]].runs.run_id]
+    found = of_ec1.group_by("run_id", maintain_order=True).agg("evaluations", "raw_y").to_dicts()
+    assert [list(zip(f["evaluations"], f["raw_y"], strict=True)) for f in found] == [
+        of_run for of_run, _ in steps
+    ]
+    target = sorted(of_run[-1][1] for of_run, _ in steps)[1]  # two of three runs reach it
+    table = inspector.metrics.aggregate_running_time(
+        of_ec1, f_min=target, f_max=target + 49, scale_f_log=False, eval_max=60
+    )
+    hit = [min((n for n, cost in of_run if cost <= target), default=0) for of_run, _ in steps]
+    assert table.ERT[table.raw_y == target].item() == sum(n or 60 for n in hit) / sum(map(bool, hit))

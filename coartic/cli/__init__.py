@@ -49,7 +49,7 @@ for command in (
     *(run.run, run.list_, run.check, run.reproduce),
     *(read.report, read.trace, read.compare, read.verify, read.cite),
     *(draw.draw, draw.animate),
-    *(share.merge, share.standings),
+    *(share.merge, share.standings, share.export),
 ):
     app.command(name=command.__name__.removesuffix("_"))(command)
 app.add_typer(new.group, name="new")

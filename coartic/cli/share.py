@@ -38,6 +38,32 @@ def merge(
     say_pairs([("Next", f"coartic report {merged.folder}")])
 
 
+def export(
+    folder: given.Results,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            parser=given.output_named,
+            metavar="FOLDER",
+            help="Where to write; FOLDER/ioh if not given.",
+        ),
+    ] = None,
+    ioh: Annotated[bool, typer.Option("--ioh", help="For IOHinspector and IOHanalyzer.")] = False,
+) -> None:
+    """Write the runs that made trials in the format of another program."""
+    from coartic.analysis.ioh import ioh_files
+    from coartic.analysis.study import load
+    from coartic.files import publish
+
+    if not ioh:
+        raise CoarticError("say in which format: --ioh")
+    out = folder / "ioh" if out is None else out
+    files = ioh_files(load(folder))
+    publish(out, files)
+    count = len({name.partition("/")[0] for name in files})
+    say(f"{out}: {counted(count, 'method')} in {counted(len(files), 'file')}.")
+
+
 def standings(
     folder: Annotated[
         Path,
