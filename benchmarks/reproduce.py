@@ -99,6 +99,8 @@ def perform_some_again(
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """In what the results of two runs differ; times and surroundings apart."""
+    if a.is_thin or b.is_thin:
+        a, b = a.thin(), b.thin()
     first, second = a.to_row(), b.to_row()
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"

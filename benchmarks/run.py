@@ -136,12 +136,13 @@ class Batch(NamedTuple):
 def missing_runs(
     plan: Plan, store: Store, progress: Progress, *, retry_failed: bool, redo: bool
 ) -> list[Batch]:
-    """The runs to perform, a batch for each cell; those that are there are counted."""
+    """The runs to perform, a batch for each cell; those that are there are counted. Runs of a
+    method whose code is not here stay as they are."""
     there: set[tuple[int, int]] = set()
-    for position, number, status, had_s in store.present() if not redo else ():
+    for position, number, status, had_s in store.present():
         longer = had_s is not None and (plan.time_limit_s is None or plan.time_limit_s > had_s)
-        again = status in _RETRIED and (retry_failed or (status == "timeout" and longer))
-        if not again:
+        failed = status in _RETRIED and (retry_failed or (status == "timeout" and longer))
+        if not (plan.cells[position].method.where and (redo or failed)):
             there.add((position, number))
             progress.present += 1
             progress.count(status)

@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, paper, read, run
+from coartic.cli import draw, new, paper, read, run, share
 from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
@@ -50,8 +50,10 @@ for command in (
     *(run.run, run.list_, run.check, run.reproduce),
     *(read.report, read.trace, read.compare, read.verify, read.cite),
     *(draw.draw, draw.animate),
+    *(share.merge, share.standings, share.export),
 ):
     app.command(name=command.__name__.removesuffix("_"))(command)
+app.add_typer(new.group, name="new")
 app.add_typer(paper.group, name="paper")
 
 

@@ -103,6 +103,13 @@ RetryFailed = Annotated[
     bool, typer.Option("--retry-failed", help="Repeat runs that crashed or took too long.")
 ]
 Redo = Annotated[bool, typer.Option("--redo", help="Repeat every run.")]
+Beside = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Put these results beside: a folder, or 'released' for the shipped ones.",
+    ),
+]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 
 

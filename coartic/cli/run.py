@@ -37,21 +37,29 @@ def run(
     scheduler: given.Scheduler = None,
     retry_failed: given.RetryFailed = False,
     redo: given.Redo = False,
+    beside: given.Beside = None,
 ) -> None:
     """Run the missing part of a suite and say what came out.
 
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
     from coartic.benchmarks.cluster import Dask
+    from coartic.benchmarks.merge import put_beside
     from coartic.benchmarks.planning import Selection, plan_suite
     from coartic.benchmarks.pool import Local
+    from coartic.benchmarks.registry import registry
+    from coartic.benchmarks.released import results_folder
     from coartic.benchmarks.run import perform
     from coartic.benchmarks.suites import load_suite
 
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    wanted = split_names(tasks, "--tasks"), split_names(methods, "--methods")
-    select = Selection(*wanted, task_file or (), method_file or ())
+    names = split_names(methods, "--methods")
+    if beside is not None and not names:
+        names = sorted({*registry(method_file or ())} - {*registry()})
+        if not names:
+            raise CoarticError("--beside needs a method to run: add --method-file or --methods")
+    select = Selection(split_names(tasks, "--tasks"), names, task_file or (), method_file or ())
     plan = plan_suite(
         chosen,
         runs=runs,
@@ -62,6 +70,9 @@ def run(
         trial_budget=trial_budget,
         readings=reading or (),
     )
+    if beside is not None:
+        with results_folder(beside, plan.suite) as theirs:
+            plan = put_beside(plan, theirs, out)
     display = Display(chosen.name)
 
     def saved() -> str:

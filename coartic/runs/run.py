@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -111,7 +112,7 @@ class Run:
     scores: dict[str, Score] = field(default_factory=dict)
     """By part (:data:`PARTS`), of those that there are."""
     rewards: list[int | None] = field(default_factory=list)
-    """Reward of each trial; None where it failed."""
+    """Reward of each trial; None where it failed, or is not kept."""
     meter: Meter | None = None
     """None where the worker died."""
     times: Times = Times()
@@ -142,6 +143,21 @@ class Run:
         if self.reward is None or self.reward not in self.rewards:
             return None
         return self.rewards.index(self.reward)
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether rewards of some trials are not kept (:meth:`thin`)."""
+        return self.meter is not None and self.rewards.count(None) > self.meter.failed_trials
+
+    def thin(self) -> Run:
+        """The run with the rewards of its best trial and of trials that were better than all before
+        alone; the others are None. It takes a tenth of the room."""
+        best, solved, kept = -math.inf, self.best_trial, list[int | None]()
+        for trial, reward in enumerate(self.rewards):
+            better = reward is not None and reward > best
+            kept.append(reward if better or trial == solved else None)
+            best = max(best, -math.inf if reward is None else reward)
+        return replace(self, rewards=kept)
 
     @property
     def corrections(self) -> list[int] | None:

@@ -200,7 +200,11 @@ def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
         runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
         if runs:
             named = {"task": task, "method": label, "runs": len(runs)}
-            curves.append(pd.DataFrame(named | learning_curve(runs, window)))
+            curve = learning_curve(runs, window)
+            failed = study.cells[task, label].good.failed_trials.sum()
+            if sum(int(np.isnan(run).sum()) for run in runs) > failed:  # more were left out
+                curve["trials"] = np.full(len(curve["trial"]), math.nan)
+            curves.append(pd.DataFrame(named | curve))
     return pd.concat(curves[1:] or curves, ignore_index=True)
 
 
@@ -258,6 +262,7 @@ def draw_curves(
         axes.axhline(optimum.reward, **style.OPTIMUM)
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
-    axes.set_ylim(max(data.trials.min(), floor - 0.9 * reach) - 0.04 * reach, top + 0.06 * reach)
+    lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)
+    axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
     style.log_axis(axes)
     axes.set_xlim(1, max(2, data.trial.max()))

@@ -1,0 +1,72 @@
+"""Results that are shipped: ``released/SUITE.sqlite.xz``, each a results folder of one file.
+
+``python -m coartic.benchmarks.released FOLDER`` makes one of a results folder. The rewards of
+trials are thinned (:meth:`coartic.runs.run.Run.thin`), which takes it from 30 to 2 MB.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import lzma
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from coartic.errors import CoarticError
+from coartic.files import folder_named
+from coartic.runs.store import RUNS_FILE, open_store, writing
+
+RELEASED = "released"
+"""What stands for the shipped results in place of a folder."""
+_FOLDER = Path(__file__).with_name("released")
+_HASHES = "SHA256SUMS"
+_ENDING = ".sqlite.xz"
+
+
+@contextmanager
+def results_folder(name: str | Path, suite: str) -> Iterator[Path]:
+    """A results folder, or, for the name ``released``, the shipped results of a suite in a folder
+    that is there for a while. Raises CoarticError where there are none, or they were changed."""
+    if str(name) != RELEASED:
+        yield folder_named(name)
+        return
+    hashes = released_hashes()
+    if suite not in hashes:
+        raise CoarticError(
+            f"no results of suite {suite!r} are released, but of {', '.join(hashes)}"
+        )
+    path = _FOLDER / f"{suite}{_ENDING}"
+    content = path.read_bytes()
+    if hashlib.sha256(content).hexdigest() != hashes[suite]:
+        raise CoarticError(f"{path} is not as it was released: install coartic again")
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / RUNS_FILE).write_bytes(lzma.decompress(content))
+        yield Path(folder)
+
+
+def released_hashes() -> dict[str, str]:
+    """SHA-256 of the shipped results of each suite."""
+    lines = (_FOLDER / _HASHES).read_text(encoding="ascii").splitlines()
+    pairs = (line.split() for line in lines)
+    return {name.removesuffix(_ENDING): digits for digits, name in pairs}
+
+
+def pack(folder: Path, out: Path) -> None:
+    """Write the results of a folder, thinned, and their hash to where they are shipped."""
+    with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
+        plan, made_with = source.plan(), source.made_with()
+        ran, date = made_with.pop("command"), made_with.pop("date")
+        with writing(Path(made)) as target:
+            target.ask(plan, made_with, ran, date)
+            target.write(source.run(run_id).thin() for run_id in source.frame("runs").run_id)
+        content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
+    (out / f"{plan.suite}{_ENDING}").write_bytes(content)
+    packed = sorted(out.glob(f"*{_ENDING}"))
+    lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in packed]
+    (out / _HASHES).write_text("".join(lines), encoding="ascii")
+
+
+if __name__ == "__main__":
+    pack(folder_named(sys.argv[1]), _FOLDER)

@@ -1,0 +1,28 @@
+"""NAME: say in a line what it does. Check it: coartic check NAME --method-file FILE."""
+
+import numpy as np
+
+from coartic import Objective, Optimiser
+
+
+class Mine(Optimiser):
+    """Random steps from the best point."""
+
+    name = "NAME"  # its id in commands and tables
+    title = "Random steps from the best point"  # what readers see
+    citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what they cite
+
+    def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
+        """Minimise the cost of a trial; this ends when no trial is left; the best counts."""
+        # Draw from rng alone. A point has the joints of all goals; units: length, rad.
+        x = objective.x0  # the corrective process alone
+        best = objective(x)  # ticks
+        while True:
+            points = x + 0.03 * rng.standard_normal((10, objective.dim))
+            costs = objective.many(points)  # side by side, as fast as one
+            if costs.min() < best:
+                x, best = points[costs.argmin()], costs.min()
+
+
+# It is told the corrective process and the reward of its trials. A method that needs more, such as
+# the goals or a Jacobian, says so and has a `solve`: see "Make a method of your own" in the docs.

@@ -1,0 +1,52 @@
+"""The command that begins something of one's own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coartic.cli import arguments as given
+from coartic.cli.terminal import say_pairs
+from coartic.errors import CoarticError
+
+group = typer.Typer(no_args_is_help=True, help="Begin a method of your own.")
+
+
+@group.callback()
+def _group() -> None:
+    pass
+
+
+@group.command("method")
+def new_method(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Its id, such as my-search.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(parser=given.output_named, metavar="FILE", help="File to write (.py)."),
+    ] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Write a method that works, to be changed into one of your own."""
+    from coartic.benchmarks import template
+    from coartic.benchmarks.registry import add_cards, check_declaration, registry
+    from coartic.files import write_output
+    from coartic.runs.card import card_of
+
+    path = Path(re.sub(r"\W", "_", name) + ".py") if out is None else out
+    if path.suffix != ".py":
+        raise CoarticError(f"--out {path}: the name must end in .py.")
+    mine = type("Mine", (template.Mine,), {"name": name})
+    check_declaration(mine, "this method")
+    add_cards(registry(), [card_of(mine, "this method", "", "")])
+    text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
+    write_output(path, text.encode(), replace=replace)
+    say_pairs(
+        [
+            ("Written", f"{path}: change it as you like"),
+            ("Check", f"coartic check {name} --method-file {path}"),
+            ("Run", f"coartic run comparison --method-file {path} --beside released"),
+        ]
+    )
