@@ -198,7 +198,7 @@ def check_scores(folder: Path, method: MethodCard, runs: Sequence[Run], stored: 
     setting = runs[0].setting
     stated = [
         Outcome(
-            run.status,
+            run.status,  # type: ignore[arg-type]  # the table takes no other
             run.reason,
             {part: list(score.movements) for part, score in run.scores.items()},
             bound=run.bound,

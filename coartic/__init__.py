@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from coartic.analysis.runtimes import runtimes
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
@@ -66,10 +67,12 @@ __all__ = [
     "move",
     "objective",
     "parse_task",
+    "runtimes",
     "trajectory",
 ]
 
 _HOMES = {
+    "analysis.runtimes": ("runtimes",),
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),

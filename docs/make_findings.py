@@ -28,8 +28,8 @@ STORED = DOCS / "stored"
 ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
-        "claims contexts hands learning methods price published ranking signatures tasks",
-        "postures published ranking price recruitment learning-curves",
+        "claims contexts hands learning methods runtimes published ranking signatures tasks",
+        "postures published ranking runtimes recruitment learning-curves",
     ),
     "ablations": ("methods signatures claims", ""),
     "locus": ("signatures", ""),

@@ -238,14 +238,15 @@ def test_the_address_holds_the_view(opened, address):
     page.get_by_label("One tick back").click()
     page.focus("#claims-verdict")
     page.select_option("#claims-verdict", "undecided")
-    page.locator("#price").scroll_into_view_if_needed()
-    page.evaluate("document.getElementById('price').scrollIntoView()")
-    page.wait_for_url("**player-tick=56**#price")
+    page.locator("#runtimes").scroll_into_view_if_needed()
+    page.evaluate("document.getElementById('runtimes').scrollIntoView()")
+    page.wait_for_url("**player-tick=56**#runtimes")
     again = opened(link=page.url, reduced_motion="no-preference")
     assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
     again.wait_for_timeout(300)
     assert again.url == page.url
-    assert abs(again.evaluate("document.getElementById('price').getBoundingClientRect().top")) < 2
+    top = "document.getElementById('runtimes').getBoundingClientRect().top"
+    assert abs(again.evaluate(top)) < 2
     # Back at the beginning nothing is left of it.
     page.evaluate("scrollTo(0, 0)")
     page.select_option("#claims-verdict", "")

@@ -185,7 +185,7 @@ def test_packed_results_say_the_same(parts, tmp_path):
     (tmp_path / "thin" / RUNS_FILE).write_bytes(lzma.decompress(content))
     assert check_runs(tmp_path / "thin").wrong == []
     full, thin = load(parts[0]), load(tmp_path / "thin")
-    for name in ("learning", "ranking", "methods", "price"):
+    for name in ("learning", "ranking", "methods", "runtimes"):
         before, after = TABLES[name](full), TABLES[name](thin)
         assert before.equals(after)
     assert full.runs.best_trial.equals(thin.runs.best_trial)

@@ -125,7 +125,7 @@ def test_merge_command(coartic, shipped, tmp_path):
 
 
 def written_by_hand(study):
-    """Best cost so far at each improvement, from the reward of every trial; the number of trials."""
+    """Best cost so far at each improvement, from the reward of every trial; how many trials."""
     for run_id, rewards in study.rewards():
         costs = np.where(np.isnan(rewards), FAILED, -rewards).tolist()
         better = [n for n in range(len(costs)) if n == 0 or costs[n] < min(costs[:n])]
@@ -178,4 +178,5 @@ def test_export_for_iohprofiler(coartic, tmp_path):
         of_ec1, f_min=target, f_max=target + 49, scale_f_log=False, eval_max=60
     )
     hit = [min((n for n, cost in of_run if cost <= target), default=0) for of_run, _ in steps]
-    assert table.ERT[table.raw_y == target].item() == sum(n or 60 for n in hit) / sum(map(bool, hit))
+    ert = sum(n or 60 for n in hit) / sum(map(bool, hit))
+    assert table.ERT[table.raw_y == target].item() == ert

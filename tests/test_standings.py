@@ -157,7 +157,7 @@ def test_targets_are_evenly_spaced_rewards():
     half = -319 + (319 - 292) / 2
     seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
     vars(seen)["rewards"] = lambda: iter(())
-    paid = TABLES["price"](seen).loc["posture-based/two-goals"]
+    paid = TABLES["runtimes"](seen).loc["posture-based/two-goals"]
     assert paid.reached == 10 / 20
     assert (paid.trials_to_quarter, paid.trials_to_half) == (10, 10)  # trials of the made-up row
 
@@ -173,7 +173,7 @@ def test_a_failed_run_reaches_nothing():
     vars(again)["rewards"] = lambda: iter(())
     assert scores.gaps(again).method.tolist() == [learner]
     assert TABLES["against-learner"](again).empty
-    assert TABLES["price"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
+    assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
     (times,) = runtimes.running_times(again)[other, "solve_s"]
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 

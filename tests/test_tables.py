@@ -127,7 +127,7 @@ def test_methods(study):
     })  # fmt: skip
 
 
-def test_price(study):
+def test_runtimes(study):
     """Within 20, 50, 100, 101, 200, 500 and 1000 trials the learner has 5, 10, 15, 21, 51, 56 and
     91 of 120 pairs: 30 of two-armed 1 from trial 200.
 
@@ -144,7 +144,7 @@ def test_price(study):
         CMA: (38 / 40, 10, 10, 10, 10, 10, 10, 1e4, 1e4, 1e4, 0.025, NONE, 10, 10),
         PLAN: (33 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
     }
-    table = TABLES["price"](study)
+    table = TABLES["runtimes"](study)
     same(table.loc[list(cells)], {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip

@@ -185,7 +185,7 @@ def summary(study: Study) -> str:
         title=title(study),
         answers=answers(study),
         provenance=about.provenance(study),
-        figures=[name for name in ("postures", "ranking", "price") if name in plots(study)],
+        figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
     )
 
 

@@ -30,7 +30,7 @@ SECTIONS: tuple[Section, ...] = (
     paper.PUBLISHED,
     paper.CLAIMS,
     comparison.NEAREST,
-    comparison.PRICE,
+    comparison.RUNTIMES,
     paper.HANDS,
     comparison.LEARNING,
     coarticulation.SIGNATURES,

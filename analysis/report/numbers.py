@@ -63,7 +63,7 @@ def with_interval(
 
 
 def numbers(study: Study) -> Iterator[Number]:
-    """The headline first: verdicts, prices, gaps; then rewards."""
+    """The headline first: verdicts, running times, gaps; then rewards."""
     if entries := papers_claims(study):
         for verdict_of_claim, count in counts(entries).items():
             comment = f"claims that are {verdict_of_claim}: table claims"
@@ -81,10 +81,10 @@ def numbers(study: Study) -> Iterator[Number]:
             continue
         of = "Learner" if row is learner else letters_alone(name_of(row.method))
         for level, column in (("Half", "trials_to_half"), ("Quarter", "trials_to_quarter")):
-            comment = f"{COLUMNS[column].header} of the targets: table price, row '{row.method}'"
+            comment = f"{COLUMNS[column].header} of the targets: table runtimes, row '{row.method}'"
             yield from with_interval(f"{level}{of}", row, column, 0, 1, comment)
     for column, ratio in comparison.ratios(study).items():
-        comment = f"ratio of trials, learner over {name_of(rival.method)}: table price"
+        comment = f"ratio of trials, learner over {name_of(rival.method)}: table runtimes"
         yield f"{letters_alone(column).removeprefix('TrialsTo')}Ratio", decimals(ratio, 1), comment
     ranking = TABLES["ranking"](study)
     for label in main_methods(str(m) for m in ranking.index if not is_variant(str(m))):

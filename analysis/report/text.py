@@ -27,7 +27,7 @@ ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
     ),
     ("Is the paper reproduced?", "Paper", {"paper": paper.answer}),
     ("Who comes nearest to the optimum?", "Nearest", {"nearest": comparison.answer_nearest}),
-    ("What does it cost?", "Cost", {"price": comparison.answer_price}),
+    ("What does it cost?", "Cost", {"runtimes": comparison.answer_runtimes}),
 )
 """The four questions with their words on the terminal, and the functions that answer them.
 

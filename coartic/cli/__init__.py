@@ -48,7 +48,7 @@ def _options(
 
 for command in (
     *(run.run, run.list_, run.check, run.reproduce),
-    *(read.report, read.trace, read.compare, read.verify, read.cite),
+    *(read.report, read.runtimes, read.trace, read.compare, read.verify, read.cite),
     *(draw.draw, draw.animate),
     *(share.merge, share.standings, share.export),
 ):

@@ -31,7 +31,8 @@ def new_method(
 ) -> None:
     """Write a method that works, to be changed into one of your own."""
     from coartic.benchmarks import template
-    from coartic.benchmarks.registry import add_cards, check_declaration, registry
+    from coartic.benchmarks.reader import check_declaration
+    from coartic.benchmarks.registry import add_cards, registry
     from coartic.files import write_output
     from coartic.runs.card import card_of
 

@@ -6,11 +6,12 @@ import sys
 import time
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from coartic.cli import arguments as given
+from coartic.cli.arguments import split_names
 from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -49,6 +50,55 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
     say_pairs([(answer["word"], answer["text"]) for answer in answers(study)])
     if not for_paper:
         say_pairs([("More", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
+
+
+def runtimes(
+    folder: given.Results,
+    by: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="One for each 'task' or 'family'.")
+    ] = None,
+    methods: given.Methods = None,
+    targets: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="Shares of the way to the optimum, such as 0.5,0.9,1."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            parser=given.output_named,
+            metavar="FILE",
+            help="All steps (.csv), or a figure (.svg, .pdf, .png).",
+        ),
+    ] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Show what methods spend to reach targets, as ECDFs of running times."""
+    from coartic.analysis.figures.plot import FORMATS, picture
+    from coartic.analysis.runtimes import draw, summary
+    from coartic.analysis.runtimes import runtimes as curves_of
+    from coartic.files import check_output, write_output
+
+    if out is not None:
+        endings = (".csv", *FORMATS)
+        if out.suffix.lower() not in endings:
+            raise CoarticError(f"--out {out}: the name must end in {', '.join(endings)}.")
+        check_output(out, replace=replace)
+    names, options = split_names(methods, "--methods"), dict[str, Any]()
+    if targets is not None:
+        try:
+            options["targets"] = [float(text) for text in targets.split(",")]
+        except ValueError:
+            raise CoarticError(f"--targets {targets}: write numbers, such as 0.5,0.9,1.") from None
+    curves = curves_of(folder, by=by, methods=names, **options)  # type: ignore[arg-type]
+    show_frame(summary(curves).map(lambda x: f"{x:.3g}" if isinstance(x, float) else x))
+    say("Budgets to half of the targets.")
+    if out is not None:
+        is_table = out.suffix.lower() == ".csv"
+        data = (
+            curves.to_csv(index=False).encode() if is_table else picture(draw(curves), out.suffix)
+        )
+        write_output(out, data, replace=replace)
+        say(f"{out}: {counted(len(curves), 'step')}.")
 
 
 def trace(

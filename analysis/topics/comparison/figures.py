@@ -85,14 +85,14 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, s
 
 
 @figure(
-    "price",
+    "runtimes",
     "What it costs to come near",
     f"Share of {len(runtimes.TARGETS)} reward targets reached within a budget (mean over all tasks "
     "where there are several). Targets are evenly spaced from the initial solution to the optimum; "
     "a run counts for each target that it has reached. a: trials; planners make none and are "
     "lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
-def ecdf_of_costs(study: Study) -> Parts:
+def ecdf_of_runtimes(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
     data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
@@ -121,7 +121,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     """
     parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
     times = runtimes.running_times(study)
-    for label in methods.in_order(methods.main_methods(tables.price(study).index)):
+    for label in methods.in_order(methods.main_methods(tables.runtimes(study).index)):
         for spend in PANELS:
             if (label, spend) in times:
                 budget, share = runtimes.ecdf(times[label, spend])

@@ -147,10 +147,10 @@ def running_times(study: Study) -> dict[tuple[str, str], RunningTimes]:
     return by_method
 
 
-def times_of(study: Study, cell: CellRuns, spend: str) -> Array:
-    """What each run of a cell had spent when it reached each target, ``(runs, 20)``."""
+def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) -> Array:
+    """What each run of a cell had spent when it reached each target, shape ``(runs, targets)``."""
     initial, optimum = scores.initial_and_optimum(study)[cell.task]
-    targets = np.ceil(initial + TARGETS * (optimum - initial) - 1e-9)
+    targets = np.ceil(initial + shares * (optimum - initial) - 1e-9)
     runs = steps_of(study, cell)
     known = [run for run in runs if not run.solved or np.isfinite(run.total[spend])]
     return np.array([run.times(spend, targets) for run in known])
@@ -162,7 +162,7 @@ def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int64]]:
     values = np.concatenate([of_task.ravel() for of_task in times])
     weights = [np.full(of_task.size, 1 / of_task.size / len(times)) for of_task in times]
     order = np.argsort(values, kind="stable")
-    return values[order], np.concatenate(weights)[order], order // len(TARGETS)
+    return values[order], np.concatenate(weights)[order], order // times[0].shape[1]
 
 
 def ecdf(times: RunningTimes) -> tuple[Array, Array]:

@@ -172,7 +172,7 @@ def learner_and_rival(study: Study) -> tuple[Any, Any]:
 
     The rival learns from the reward of trials too and reaches most targets. None without them.
     """
-    rows = tables.price(study)
+    rows = tables.runtimes(study)
     learners = [label for label in methods.main_methods(rows.index) if methods.is_learner(label)]
     others = [label for label in rivals(study) if is_by_trial(study, label)]
     reached = rows.reached[others]
@@ -184,7 +184,7 @@ def learner_and_rival(study: Study) -> tuple[Any, Any]:
 
 def rivals(study: Study) -> list[str]:
     """Labels of methods in the table of costs other than the learner."""
-    return [label for label in tables.price(study).index if not methods.is_learner(label)]
+    return [label for label in tables.runtimes(study).index if not methods.is_learner(label)]
 
 
 def is_by_trial(study: Study, label: str) -> bool:
@@ -257,7 +257,7 @@ def costs_by_task(study: Study, learner: str, rival: str) -> str:
 
 def costs_of_planner(study: Study, learner: Any) -> str:
     """A sentence about the planner that reaches half of the targets with the fewest evaluations."""
-    rows = tables.price(study)
+    rows = tables.runtimes(study)
     planners = rows.loc[[label for label in rivals(study) if not is_by_trial(study, label)]]
     planners = planners[planners.reached >= 0.5]
     if not len(planners):
@@ -275,7 +275,7 @@ def evaluations(row: Any, unit: str = "") -> str:
     return f"{two_figures(row.kinematics_to_half)}{unit} in {two_figures(row.seconds_to_half)} s"
 
 
-def answer_price(study: Study) -> str:
+def answer_runtimes(study: Study) -> str:
     """What the learner pays beside its rival, in a dozen words."""
     learner, rival = learner_and_rival(study)
     if learner is None:
@@ -363,14 +363,14 @@ NEAREST = Section(
     single=True,
 )
 
-PRICE = Section(
-    "price",
+RUNTIMES = Section(
+    "runtimes",
     short="Cost",
     title="What does it cost?",
     caption="What it takes to reach a quarter and half of the targets",
     finding=finding_of_costs,
-    figure="price",
-    table="price",
+    figure="runtimes",
+    table="runtimes",
     note=(
         "Kinematics: how often a method computes where the hand is in a posture, a cost of "
         "computing that does not depend on the machine. ∞: not reached within the budget of "

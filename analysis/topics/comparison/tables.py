@@ -14,7 +14,15 @@ from coartic.analysis.statistics.instances import Runs, other_tasks
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation.tables import adjust_p
-from coartic.analysis.topics.comparison import runtimes, scores
+from coartic.analysis.topics.comparison import scores
+from coartic.analysis.topics.comparison.runtimes import (
+    budget_for,
+    cells_compared,
+    running_times,
+    share_reached,
+    steps_of,
+    trials_to_half,
+)
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.words import marked
 from coartic.robot import Array
@@ -27,7 +35,7 @@ COSTS = (
     ("kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`price`: what is spent to reach which share of the targets."""
+"""Columns of :func:`runtimes`: what is spent to reach which share of the targets."""
 
 
 @table("task, method, runs, reward, learner, p_holm, least_p")
@@ -137,7 +145,7 @@ def variants(study: Study) -> Rows:
 
 def best_trial_gaps(study: Study, task: str, label: str) -> Array:
     """Gap of the best trial of each run of a cell whose runs have a solution, shape ``(n,)``."""
-    best = [run.rewards[-1] for run in runtimes.steps_of(study, study.cells[task, label])]
+    best = [run.rewards[-1] for run in steps_of(study, study.cells[task, label])]
     return gap_share(best, scores.initial_and_optimum(study)[task][1])
 
 
@@ -145,19 +153,19 @@ def best_trial_gaps(study: Study, task: str, label: str) -> Array:
     "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
     "seconds_to_half[], half on *",
 )
-def price(study: Study) -> Rows:
+def runtimes(study: Study) -> Rows:
     """What it costs to reach a quarter and half of the targets; ``half on``: median trials to the
     target halfway, by task."""
-    compared, times = runtimes.cells_compared(study), runtimes.running_times(study)
+    compared, times = cells_compared(study), running_times(study)
     for label in known.in_order(compared):
         if (label, "trials") not in times:
             continue
-        row: Row = {"method": label, "reached": runtimes.share_reached(times[label, "trials"])}
+        row: Row = {"method": label, "reached": share_reached(times[label, "trials"])}
         for name, spend, share in COSTS:
             if (label, spend) in times:
-                row |= interval(name, runtimes.budget_for(times[label, spend], share))
+                row |= interval(name, budget_for(times[label, spend], share))
         if scores.group_of(study, label) == scores.BY_TRIAL:
-            medians = runtimes.trials_to_half(study, label)
+            medians = trials_to_half(study, label)
             row |= {f"half on {task}": trials for task, trials in medians.items()}
         yield label, row | runs_of(*compared[label])
 
@@ -166,7 +174,7 @@ def price(study: Study) -> Rows:
 def learning(study: Study) -> Rows:
     """Best reward after so many trials, and when half of a run's gain was there."""
     for (task, label), cell in study.cells.items():
-        runs = runtimes.steps_of(study, cell)
+        runs = steps_of(study, cell)
         if task not in one_by_one(study) or not scores.is_compared(label):
             continue
         if not runs or not all(run.learns and run.solved for run in runs):

@@ -1,0 +1,142 @@
+"""Running times of any methods, by task or by family, to targets of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from coartic.analysis import methods as known
+from coartic.analysis.figures import style
+from coartic.analysis.optima import locks_base
+from coartic.analysis.study import Study, load
+from coartic.analysis.topics.comparison import scores
+from coartic.analysis.topics.comparison.figures import draw_shares
+from coartic.analysis.topics.comparison.runtimes import SPENDS, TARGETS, ecdf, times_of
+from coartic.errors import CoarticError
+from coartic.robot import Array
+from coartic.text import unknown
+
+By = Literal["task", "family"]
+AXES = {
+    "trials": "trials",
+    "forward_kinematics": "forward-kinematics evaluations",
+    "solve_s": "seconds",
+}
+"""What can be spent, in words."""
+EVERYTHING = "all"
+"""The group of all tasks."""
+_MOST_GROUPS = 20  # of a figure
+
+
+def runtimes(
+    results: str | Path | Study,
+    *,
+    by: By | None = None,
+    methods: Sequence[str] = (),
+    targets: Sequence[float] | Array = TARGETS,
+) -> pd.DataFrame:
+    """Share of reward targets that methods reach within a budget: the ECDF of running times.
+
+    Parameters
+    ----------
+    results : str, Path or Study
+        A results folder, or a study of one.
+    by : {"task", "family"}, optional
+        One ECDF for each; over all tasks by default. Tasks of a group count alike.
+    methods : sequence of str, optional
+        Methods with their variants, such as ``"cma-es/bandit trials=200"``; by default all that
+        are compared in the report. A method needs runs on all tasks of a group.
+    targets : sequence of float, shape (n,), optional
+        As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
+        default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row at each budget at which the share rises: ``group``, ``method``, ``spend`` (``trials``;
+        ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
+        trials of a run), ``budget``, and ``share`` of the pairs of run and target that are reached
+        within it. A method that reaches no target has one row, of share 0 and an infinite budget.
+
+    Raises
+    ------
+    CoarticError
+        For what is no results folder, an unknown method, targets out of bounds, and where no task
+        has a known optimum that is better than the initial solution.
+    """
+    study = results if isinstance(results, Study) else load(results)
+    shares = np.asarray(targets, dtype=np.float64)
+    if shares.ndim != 1 or not shares.size or not ((shares > 0) & (shares <= 1)).all():
+        raise CoarticError(f"targets are {list(targets)}: needed are numbers above 0 and up to 1")
+    if by is not None and by not in get_args(By):
+        raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
+    by_method = scores.labels_by_task(study)
+    for name in methods:
+        if name not in by_method:
+            raise CoarticError(unknown("method", name, by_method))
+    groups: dict[str, list[str]] = {}
+    for name in scores.initial_and_optimum(study):
+        group = {None: EVERYTHING, "task": name, "family": study.tasks[name].family or name}[by]
+        groups.setdefault(group, []).append(name)
+    if not groups:
+        raise CoarticError("no task has a known optimum that is better than its initial solution")
+    compared = [name for name in by_method if scores.is_compared(name)]
+    rows: list[tuple[str, str, str, float, float]] = []
+    for group, tasks in groups.items():
+        for name in known.in_order(methods or compared):
+            labels = by_method[name]
+            if not labels.keys() >= set(tasks):
+                continue
+            cells = [study.cells[task, labels[task]] for task in tasks]
+            repeated = name not in (used := {cell.label for cell in cells}) and len(used) == 1
+            if not methods and (repeated or any(locks_base(cell.runs) for cell in cells)):
+                continue
+            for spend in SPENDS:
+                times = [times_of(study, cell, spend, shares) for cell in cells]
+                if all(map(len, times)):
+                    steps = list(zip(*map(np.ndarray.tolist, ecdf(times)), strict=True))
+                    steps = steps or [(np.inf, 0.0)]
+                    rows += [(group, name, spend, budget, share) for budget, share in steps]
+    return pd.DataFrame(rows, columns=["group", "method", "spend", "budget", "share"])
+
+
+def summary(curves: pd.DataFrame, share: float = 0.5) -> pd.DataFrame:
+    """One row for each group and method of :func:`runtimes`: per cent of the targets reached in the
+    end, and the least budget of each kind that reaches a share of them, infinite without any."""
+    keys = ["group", "method"]
+    enough = curves[curves.share >= share - 1e-9]
+    least = enough.pivot_table("budget", keys, "spend", "min").reindex(columns=SPENDS)
+    table = pd.DataFrame({"reached (%)": 100 * curves.groupby(keys, sort=False).share.max()})
+    return table.join(least.rename(columns=AXES)).fillna(np.inf).reset_index()
+
+
+@style.styled
+def draw(curves: pd.DataFrame) -> Figure:
+    """A figure of :func:`runtimes`: a row for each group, a panel for each kind of budget.
+
+    Raises CoarticError for more groups than a figure has room for.
+    """
+    groups = list(dict.fromkeys(curves.group))
+    if len(groups) > _MOST_GROUPS:
+        raise CoarticError(f"{len(groups)} groups; a figure has room for {_MOST_GROUPS}")
+    reached = curves[np.isfinite(curves.budget)]
+    spends = [spend for spend in SPENDS if (reached.budget[reached.spend == spend] > 0).any()]
+    looks = style.looks(curves.method)
+    size = style.TWO, 0.6 + 1.7 * len(groups)
+    drawing, panels = style.figure_of((len(groups), len(spends)), size, sharey=True)
+    for place, axes in enumerate(panels):
+        row, column = divmod(place, len(spends))
+        here = (reached.group == groups[row]) & (reached.spend == spends[column])
+        if (reached.budget[here] > 0).any():
+            draw_shares(axes, reached[here], looks)
+        axes.set_title(groups[row])
+        axes.set_xlabel(AXES[spends[column]] if row == len(groups) - 1 else "")
+        axes.set_ylabel("" if column else "targets reached (%)")
+    entries = [style.entry(known.name_of(name), **look) for name, look in looks.items()]
+    style.legend(drawing, entries, min(len(entries), 4))
+    return drawing

@@ -1,0 +1,125 @@
+"""Running times of any methods, beside a count of all pairs one by one."""
+
+import math
+
+import pandas as pd
+import pytest
+
+import coartic
+from coartic import CoarticError, load_task
+from coartic.analysis.runtimes import draw, summary
+from coartic.analysis.topics.comparison.runtimes import SPENDS
+from tests.support.commands import call
+from tests.support.made_up import MadeUp, made_up_optima, row, study_of
+
+ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "nullspace-qp/none"
+LIMITS = {ONE: (-319, -292), TWO: (-675, -465)}  # initial solution, optimum
+TRIALS = {
+    (ONE, "own"): [[-330, -319, -310, -300], [-319, -319, -292, -310]],
+    (TWO, "own"): [[-675, math.nan, -560, -600, -470]],
+    (TWO, LEARNER): [[-675, -570], [-570, -700]],
+}  # by task and method: the reward of every trial of each run
+PLANNED = {ONE: -300, TWO: -500}
+
+
+@pytest.fixture(scope="module")
+def study():
+    rows, rewards = [], {}
+    for (task, method), runs in TRIALS.items():
+        for run, of_trials in enumerate(runs):
+            run_id, best = f"{task}{method}{run}", max(r for r in of_trials if not math.isnan(r))
+            rewards[run_id] = pd.Series(of_trials, dtype=float).to_numpy()
+            trials = len(of_trials)
+            rows.append(row(method, best, task=task, run=run, run_id=run_id, seed=run, warm=True,
+                            trials=trials, forward_kinematics=10 * trials))  # fmt: skip
+    for task, reward in PLANNED.items():
+        rows.append(row(PLAN, reward, task=task, run_id=f"{task}{PLAN}", trials=0, seed=0,
+                        forward_kinematics=7, warm=True))  # fmt: skip
+    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    made_up = study_of(frame, [load_task(ONE), load_task(TWO)])
+    parts = {"optima": made_up_optima(ONE, TWO), "rewards": lambda: iter(rewards.items())}
+    return MadeUp(made_up, **parts)
+
+
+def share_by_hand(tasks, method, targets, trials):
+    """Pairs of run and target reached within so many trials, each task counting the same."""
+    shares = []
+    for task in tasks:
+        (initial, best), pairs = LIMITS[task], []
+        runs = [[PLANNED[task]]] if method == PLAN else TRIALS[task, method]
+        for rewards in runs:
+            seen = rewards if method == PLAN else rewards[:trials]
+            for target in targets:
+                pairs.append(any(r >= initial + target * (best - initial) - 1e-9 for r in seen))
+        shares.append(sum(pairs) / len(pairs))
+    return sum(shares) / len(shares)
+
+
+GROUPS = {
+    None: {"all": [ONE, TWO]},
+    "task": {ONE: [ONE], TWO: [TWO]},
+    "family": {ONE: [ONE], TWO: [TWO]},  # a task of none is one for itself
+}
+
+
+@pytest.mark.parametrize("by", GROUPS)
+@pytest.mark.parametrize("targets", [(0.5,), (0.25, 0.5, 1.0), [n / 20 for n in range(1, 21)]])
+def test_shares_are_those_of_all_pairs(study, by, targets):
+    curves = coartic.runtimes(study, by=by, targets=targets)
+    assert set(curves.group) == {*GROUPS[by]}
+    for (group, method), steps in curves[curves.spend == "trials"].groupby(["group", "method"]):
+        for trials in range(6):
+            within = steps.share[steps.budget <= trials].max() if trials or method == PLAN else 0.0
+            by_hand = share_by_hand(GROUPS[by][group], method, targets, trials)
+            assert (0 if math.isnan(within) else within) == pytest.approx(by_hand)
+        assert (steps.share.diff().dropna() > 0).all()
+    ran = {(group, m) for group, tasks in GROUPS[by].items() for m in ("own", LEARNER)
+           if all((task, m) in TRIALS for task in tasks)}  # fmt: skip
+    named = set(zip(curves.group, curves.method, strict=True))
+    assert named == ran | {(group, PLAN) for group in GROUPS[by]}
+    if not by and len(targets) == 20:
+        assert coartic.runtimes(study).equals(curves)
+
+
+def test_budgets_to_a_share(study):
+    """Of the targets at half (-305.5 and -570) the first run of ascending hits its own at trial 4,
+    the second at 3, and that of two-armed at 3; evaluations are 10 a trial."""
+    curves = coartic.runtimes(study, methods=["own", PLAN], targets=[0.5])
+    table = summary(curves).set_index("method")
+    assert table.loc["own"].tolist() == ["all", 100.0, 3.0, 30.0, pytest.approx(0.25 * 3 / 5)]
+    assert table.loc[PLAN].tolist() == ["all", 100.0, 0.0, 7.0, 0.25]
+    top = summary(coartic.runtimes(study, targets=[1.0])).set_index("method")
+    assert (top["reached (%)"]["own"], top.trials["own"]) == (25.0, math.inf)
+    assert (top["reached (%)"][PLAN], top.trials[PLAN]) == (0.0, math.inf)
+    assert len(draw(curves).axes) == len(SPENDS)
+
+
+def test_what_cannot_be_shown(study, tmp_path):
+    for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]]):
+        with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
+            coartic.runtimes(study, targets=targets)
+    with pytest.raises(CoarticError, match="'genus'; it must be 'task' or 'family'"):
+        coartic.runtimes(study, by="genus")
+    with pytest.raises(CoarticError, match="unknown method 'owm'; did you mean 'own'"):
+        coartic.runtimes(study, methods=["owm"])
+    with pytest.raises(CoarticError, match="no task has a known optimum"):
+        coartic.runtimes(MadeUp(study, optima={}))
+    with pytest.raises(CoarticError, match="does not exist"):
+        coartic.runtimes(tmp_path / "nowhere")
+
+
+def test_command(traced, monkeypatch, capsys, tmp_path):
+    """The steps as CSV are those of the function; a figure is a picture."""
+    command = ("runtimes", traced.folder, "--by", "task", "--targets", "0.5,1")
+    assert call(monkeypatch, capsys, *command, "--out", tmp_path / "r.csv")[0] == 0
+    read = pd.read_csv(tmp_path / "r.csv")
+    pd.testing.assert_frame_equal(read, coartic.runtimes(traced, by="task", targets=[0.5, 1]))
+    assert call(monkeypatch, capsys, *command, "--out", tmp_path / "r.svg")[0] == 0
+    assert "<svg" in (tmp_path / "r.svg").read_text()
+    for wrong, said in (
+        (("--targets", "x"), "write numbers, such as"),
+        (("--out", tmp_path / "r.txt"), "must end in .csv, .svg"),
+        (("--out", tmp_path / "r.csv"), "is there already"),
+    ):
+        code, _, error = call(monkeypatch, capsys, *command, *wrong)
+        assert (code, said in error) == (2, True)
