@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.suites import Cell
 from tests.support.commands import call
-from tests.support.suites import ROOT, run_and_write
+from tests.support.suites import ROOT
 
 EXAMPLE = ROOT / "tests" / "example_plugin"
 METHOD = EXAMPLE / "coartic_example" / "__init__.py"
@@ -192,13 +190,3 @@ def test_the_pages_show_the_example_as_it_is():
     assert any(TEXT.strip() in block for block in shown)
     task = (EXAMPLE / "shelf.toml").read_text(encoding="utf-8").strip()
     assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)
-
-
-def test_the_agent_of_the_page_learns(tmp_path):
-    page = (ROOT / "docs" / "howto" / "method.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r'```python\n("""REINFORCE.*?)```', page, re.DOTALL)
-    (tmp_path / "agent.py").write_text(text, encoding="utf-8")
-    cell = Cell(load_task("ascending"), registry([tmp_path / "agent.py"])["reinforce"])
-    runs = run_and_write(tmp_path / "out", [cell], runs=1, trials=400).runs
-    assert (runs.status == "ok").all()
-    assert (runs.reward > -319).all()
