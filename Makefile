@@ -3,7 +3,7 @@
 #   make test        the test suite
 # make benchmark FULL=1 adds the ablations, the moved goals and the search for the optima.
 # make docs builds the site; make findings makes the numbers in it anew; make paper prints the
-# article on the replication.
+# two articles.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
@@ -59,7 +59,7 @@ findings: $(READY)
 	done
 	$(BIN)/python docs/make_findings.py --from $(OUT)
 
-# docs/paper.md as a PDF; it needs Chromium.
+# The two articles, docs/paper.md and docs/ahead.md, as PDF; it needs Chromium.
 paper: $(READY)
 	$(BIN)/python docs/print_paper.py
 

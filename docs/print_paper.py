@@ -1,4 +1,5 @@
-"""Prints the article as build/coartic-replication.pdf: ``python docs/print_paper.py``.
+"""Prints the articles as build/coartic-replication.pdf and build/coartic-ahead.pdf:
+``python docs/print_paper.py``.
 
 It needs Chromium; the environment variable COARTIC_BROWSER names one that is not on the path.
 """
@@ -14,13 +15,14 @@ from markdown_it import MarkdownIt
 from playwright.sync_api import sync_playwright
 
 DOCS = Path(__file__).parent
-PDF = DOCS.parent / "build" / "coartic-replication.pdf"
+BUILD = DOCS.parent / "build"
+ARTICLES = {"paper.md": "coartic-replication.pdf", "ahead.md": "coartic-ahead.pdf"}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
-def article() -> str:
-    """docs/paper.md as a page of HTML that reads its figures from docs."""
-    text = (DOCS / "paper.md").read_text("utf-8")
+def article(name: str) -> str:
+    """An article as a page of HTML that reads its figures from docs."""
+    text = (DOCS / name).read_text("utf-8")
     body = MarkdownIt("commonmark").enable("table").render(text)
     # On paper, a link to another page of the site is the path of that page.
     link = r'<a href="([\w/-]+\.md)[^"]*">(.*?)</a>'
@@ -49,23 +51,26 @@ def article() -> str:
 
 
 def main() -> None:
-    """Print it."""
+    """Print both."""
     browser = os.environ.get("COARTIC_BROWSER") or next(
         filter(None, map(shutil.which, BROWSERS)), ""
     )
     if not browser:
         raise SystemExit("No Chromium is installed; set COARTIC_BROWSER to the one to use.")
-    PDF.parent.mkdir(exist_ok=True)
-    page = PDF.with_suffix(".html")
-    page.write_text(article(), encoding="utf-8")
+    BUILD.mkdir(exist_ok=True)
     with sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
-        opened = started.new_page()
-        opened.goto(page.as_uri(), wait_until="load")
-        opened.pdf(path=PDF, prefer_css_page_size=True, print_background=True, tagged=True)
+        for name, printed in ARTICLES.items():
+            pdf = BUILD / printed
+            page = pdf.with_suffix(".html")
+            page.write_text(article(name), encoding="utf-8")
+            opened = started.new_page()
+            opened.goto(page.as_uri(), wait_until="load")
+            opened.pdf(path=pdf, prefer_css_page_size=True, print_background=True, tagged=True)
+            opened.close()
+            page.unlink()
+            print(f"Look at {pdf}.")
         started.close()
-    page.unlink()
-    print(f"Look at {PDF}.")
 
 
 if __name__ == "__main__":
