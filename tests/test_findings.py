@@ -15,6 +15,7 @@ _SPEC.loader.exec_module(make_findings)
     "page",
     [
         "findings.md",
+        "ahead.md",
         "foreign.md",
         "horizon.md",
         "human.md",
