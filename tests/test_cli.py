@@ -10,10 +10,12 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
 from coartic import __version__
 from coartic.analysis.study import load
 from coartic.benchmarks import pool
+from coartic.cli import COMMANDS, app
 from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
@@ -335,3 +337,10 @@ def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path, settings):
         env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True,
     )  # fmt: skip
     assert done.stdout.splitlines()[-1] == "False"
+
+
+@pytest.mark.parametrize(("command", "example"), COMMANDS)
+def test_the_example_of_a_command_has_options_that_there_are(command, example):
+    known = get_command(app).commands[command.__name__.removesuffix("_")].params
+    options = {name for parameter in known for name in parameter.opts}
+    assert {word for word in example.split() if word.startswith("--")} <= options

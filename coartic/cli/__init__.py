@@ -46,13 +46,27 @@ def _options(
     pass
 
 
-for command in (
-    *(run.run, run.list_, run.check, run.reproduce),
-    *(read.report, read.runtimes, read.trace, read.compare, read.verify, read.cite),
-    *(draw.draw, draw.animate),
-    *(share.merge, share.standings, share.export),
-):
-    app.command(name=command.__name__.removesuffix("_"))(command)
+COMMANDS = (
+    (run.run, "comparison --methods EC4,CMA-ES --tasks ascending --runs 5 --out results/mine"),
+    (run.list_, "comparison"),
+    (run.check, "EC4"),
+    (run.reproduce, "1a2b3c --in results/quick"),
+    (read.report, "results/quick --for-paper"),
+    (read.runtimes, "results/comparison --by family --out runtimes.csv"),
+    (read.trace, "ranking CMA-ES --in results/comparison"),
+    (read.compare, "results/old results/new --out cells.csv"),
+    (read.verify, "results/quick --again 3"),
+    (read.cite, "results/comparison --analysis"),
+    (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
+    (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
+    (share.merge, "results/a results/b --out results/all"),
+    (share.standings, "submissions --out standings.csv"),
+    (share.export, "results/comparison --ioh --out ioh"),
+)
+"""The commands, each with what stands behind its name in the example of its help."""
+for command, example in COMMANDS:
+    name = command.__name__.removesuffix("_")
+    app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
 app.add_typer(new.group, name="new")
 app.add_typer(paper.group, name="paper")
 
