@@ -62,7 +62,7 @@ TASKS = [
     (task('"RR"', '"RRR"'), "3 hands for 2 goals"),
     (task('"RR"', '"RX"'), "initial_hands"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
-    (GOOD.partition("[start]")[0], "start"),
+    (GOOD.partition("[start]")[0] + "q0 = [1.0, 2.0]\n", "q0 has shape (2,)"),
     (task('"mine"', '"my task"'), "name is 'my task'; it begins with a letter or digit"),
     ("locked_base = ['x', 'y', 'x']\n" + GOOD, "it may have at most 2 items"),
     ("title = 7\n" + GOOD, "title is 7; it should be a text"),

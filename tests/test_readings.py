@@ -67,6 +67,10 @@ def test_a_choice_is_loaded_as_it_is_written(reading):
         (["ties=\x1b[2J"], r"'\\x1b\[2J'"),
         (["ties=left", "ties=right"], "cannot both hold"),
         ([1], "reading 1: "),
+        (["model.gain=x"], "model.gain=x: it must be a number"),
+        (["model.max_iterations=2.5"], "model.max_iterations=2.5: it must be a whole number"),
+        (["model.gain=0"], "model.gain is 0.0; it must be a number from 1e-06"),
+        (["model.gian=1"], "did you mean 'model.gain'"),
         ("ties=right", "must be a list of texts"),
         (7, "must be a list of texts"),
     ],
@@ -88,6 +92,13 @@ def test_what_the_text_says_if_it_is_taken_at_its_word():
 
 def test_the_default_choice_is_no_reading():
     assert [str(each) for each in load_readings(["ties=left", "state=goal"])] == ["state=goal"]
+
+
+def test_constants_of_the_model_are_set_as_readings_are():
+    chosen = load_readings(["model.gain=0.1", "ties=right", "model.step=0.01"])
+    assert [str(each) for each in chosen] == ["ties=right", "model.gain=0.1"]
+    assert model_under(chosen) == PAPER._replace(gain=0.1)
+    assert load_readings(map(str, chosen)) == chosen
 
 
 ALTERNATIVES = [

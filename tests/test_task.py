@@ -1,9 +1,13 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
+import numpy as np
 import pytest
 
 from coartic import (
     NotApplicableError,
+    Robot,
+    Start,
+    Task,
     TaskError,
     builtin_tasks,
     corrective_trial,
@@ -108,3 +112,22 @@ def test_a_file_with_a_byte_order_mark(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
     assert load_task(path).name == "mine"
+
+
+def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
+    goals = [(3.0, 2.0), (4.5, 2.0)]
+    robot = Robot(right_links=(0.5,) * 6)
+    q0 = np.linspace(-0.3, 0.3, robot.dof)
+    task = Task(goals=goals, robot=robot, q0=q0)
+    assert task.q0.tolist() == q0.tolist()
+    assert task == Task(
+        name="unnamed",
+        goals=goals,
+        robot=robot,
+        initial_hands="best-single-hand",
+        start=Start(base=tuple(q0[:2]), left=tuple(q0[2:6]), right=tuple(q0[6:])),
+    )
+    assert corrective_trial(task, "RR").completed
+    path = tmp_path / "shelf.toml"
+    path.write_text("goals = [[3.0, 2.0], [4.5, 2.0]]\n", encoding="utf-8")
+    assert load_task(path) == Task(name="shelf", goals=goals, q0=np.zeros(10))

@@ -1,7 +1,8 @@
 """What the paper leaves open, and what is chosen here (``readings.toml``).
 
 A reading is one open question with the choices that the text allows, the default among them.
-Each is applied to one field, of the motion model or of the exploration condition.
+Each is applied to one field, of the motion model or of the exploration condition. A constant of the
+motion model is set in the same way, to any number: ``model.gain=0.1``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pydantic import Field, TypeAdapter
 
 from coartic.errors import CoarticError
 from coartic.inputs import FileData, brief, brief_value, read_toml
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.text import did_you_mean, unknown
 
 REFUTED = {
@@ -34,7 +35,7 @@ REFUTED = {
 class Choice(FileData):
     """One way to read the text."""
 
-    value: bool | str
+    value: bool | int | float | str
     """Value of the parameter."""
     says: str
     """What it means, in a line."""
@@ -92,20 +93,57 @@ class ChosenReading(NamedTuple):
 
 @cache
 def readings() -> tuple[Reading, ...]:
-    """Every reading, in the order of the table."""
+    """Every open question, in the order of the table."""
     rows: dict[str, dict[str, Any]] = read_toml(Path(__file__).with_name("readings.toml"))
     entries = [{"id": name, **row} for name, row in rows.items()]
     return TypeAdapter(tuple[Reading, ...]).validate_python(entries)
 
 
+@cache
+def constants() -> tuple[Reading, ...]:
+    """The numbers of the motion model, to be set by ``model.gain=0.1`` and the like."""
+    numbers = [name for name, value in PAPER._asdict().items() if not isinstance(value, bool)]
+    return tuple(
+        Reading(
+            id=f"model.{name}",
+            question=f"Constant {name} of the motion model",
+            quote="",
+            place="",
+            parameter=f"model.{name}",
+            default=Choice(value=getattr(PAPER, name), says="as in the paper's model"),
+            alternatives=(),
+            why="",
+        )
+        for name in numbers
+    )
+
+
+def set_constant(constant: Reading, value: str) -> ChosenReading:
+    """A constant with a value. Raises CoarticError for one that no movement can be made with."""
+    kind = type(constant.default.value)
+    number: Any
+    try:
+        number = kind(value)
+        check_model(PAPER._replace(**{constant.field: number}))
+    except ValueError as error:
+        reason = str(error) if str(error).startswith("model.") else "it must be a number"
+        if kind is int and reason == "it must be a number":
+            reason = "it must be a whole number"
+        raise CoarticError(f"reading {constant.id}={brief(value)}: {reason}") from None
+    is_default = number == constant.default.value
+    return ChosenReading(
+        constant, constant.default if is_default else Choice(value=number, says="")
+    )
+
+
 def load_reading(text: str) -> ChosenReading:
-    """A reading and its choice from ``id=value``, such as ``ties=right``.
+    """A reading and its choice from ``id=value``, such as ``ties=right`` or ``model.gain=0.1``.
 
     Raises CoarticError for what is not written so, an unknown reading, and a value that is not
-    among its choices.
+    among its choices or that no movement can be made with.
     """
     name, sign, value = (part.strip() for part in str(text).partition("="))
-    by_id = {reading.id: reading for reading in readings()}
+    by_id = {reading.id: reading for reading in (*readings(), *constants())}
     if not sign:
         raise CoarticError(
             f"reading {brief_value(text)}: write it as NAME=VALUE, such as ties=right"
@@ -118,6 +156,8 @@ def load_reading(text: str) -> ChosenReading:
     if name not in by_id:
         raise CoarticError(unknown("reading", brief(name), by_id))
     reading = by_id[name]
+    if reading in constants():
+        return set_constant(reading, value)
     for choice in reading.choices:
         if choice.written == value:
             return ChosenReading(reading, choice)
@@ -142,7 +182,8 @@ def load_readings(texts: Iterable[str]) -> tuple[ChosenReading, ...]:
         old = chosen.setdefault(new.reading.id, new)
         if old.choice != new.choice:
             raise CoarticError(f"reading {new.reading.id}: {old} and {new} cannot both hold")
-    ordered = (chosen[reading.id] for reading in readings() if reading.id in chosen)
+    every = (*readings(), *constants())
+    ordered = (chosen[reading.id] for reading in every if reading.id in chosen)
     return tuple(new for new in ordered if new.choice != new.reading.default)
 
 

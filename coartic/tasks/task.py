@@ -26,7 +26,14 @@ from pydantic import (
 )
 
 from coartic.errors import TaskError
-from coartic.inputs import FileData, brief_value, error_saying, problems, read_toml
+from coartic.inputs import (
+    FileData,
+    brief_value,
+    error_saying,
+    problems,
+    read_toml,
+    real_array,
+)
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 from coartic.text import Line, counted, did_you_mean, short_repr
@@ -151,12 +158,15 @@ class Penalty(FileData):
 class Task(FileData):
     """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
 
-    :func:`load_task` reads one from a file, or finds it by its name. It cannot be changed.
+    :func:`load_task` reads one from a file, or finds it by its name. It cannot be changed. In
+    Python ``q0=``, a configuration ``(dof,)``, can stand for ``start``:
+    ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
+
     Source of the shipped tasks: paper, section *Experiments*; ``provenance`` says where each
     figure comes from.
     """
 
-    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)]
+    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
     """Name in commands, suites and tables: letters, digits, ``.``, ``_``, ``-``."""
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
@@ -170,11 +180,12 @@ class Task(FileData):
     """θ^g: radius of every goal, length unit."""
     locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
-    initial_hands: str
+    initial_hands: str = "best-single-hand"
     """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
     the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
-    """Configuration in which every trial begins: table ``[start]``."""
+    """Configuration in which every trial begins: table ``[start]``. By default the base is at
+    (0, 0) and the arms are straight along +x."""
     robot: Robot = Robot()
     """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     penalty: Penalty | None = None
@@ -237,6 +248,25 @@ class Task(FileData):
     def reconstructed(self) -> tuple[str, ...]:
         """Keys whose figures were inferred, not printed."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_start(cls, content: Any) -> Any:
+        """Read ``q0`` as the start, or let both arms point along +x where there is none."""
+        if not isinstance(content, dict) or "start" in content:
+            return content
+        robot = content.get("robot", Robot())
+        try:
+            robot = robot if isinstance(robot, Robot) else Robot(**robot)
+        except (TypeError, ValidationError):
+            robot = Robot()  # the table [robot] is wrong, and is said to be
+        content = dict(content)
+        q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
+        if q.shape != (robot.dof,):
+            raise error_saying(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
+        left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
+        content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
+        return content
 
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Task:
@@ -380,8 +410,9 @@ def check_task(task: Task, model: MotionModel = PAPER) -> Task:
 
 
 def read_task(path: Path) -> Task:
-    """The task of a file. Raises TaskError, naming the file and the key, where it is none."""
-    return parse_task(read_toml(path, error=TaskError), str(path))
+    """The task of a file, which has the file's name unless it says another. Raises TaskError,
+    naming the file and the key, where it is none."""
+    return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
 @cache
