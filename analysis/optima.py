@@ -1,20 +1,16 @@
 """The optimum of each task: the best reward known, and what is proven about it.
 
-``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with the run ids and the
-solutions; ``docs/scripts/renew_optima.py`` makes it from the results folder of that suite. Searches
-for the optimum in a results folder of the user's own count as well, so a table for the user's own
-task has gaps as soon as the task's optimum is among its runs.
+What is shipped is in :mod:`coartic.tasks.optima`. Searches for the optimum in a results folder of
+the user's own count as well, so a table for the user's own task has gaps as soon as the task's
+optimum is among its runs.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -22,46 +18,9 @@ from numpy.typing import ArrayLike
 
 from coartic import PAPER, MotionModel, Task
 from coartic.analysis.trajectories import initial_solution
-from coartic.inputs import FileData
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
-
-BASE = "task"
-"""Base locked as the task has it: the case that rewards compare with."""
-DATA = Path(__file__).with_name("optima.json")
-
-OtherArm = Literal["free", "still"]
-"""Whether the arm that is not chosen may move, or is kept still."""
-KEPT = ("start", "radius", "hands", "locked_base", "robot")
-"""What makes a task beside its goals."""
-
-
-class ShippedOptimum(FileData):
-    """What is shipped of one task under one restriction: a reward, or why there is none."""
-
-    task: str
-    essence: str
-    """The task's :func:`essence`."""
-    base: str
-    """Directions in which the base is locked; ``task``: as the task locks it."""
-    other_arm: OtherArm
-    run_ids: tuple[str, ...]
-    made_by: dict[str, Any]
-    reward: int | None = None
-    hands: str = ""
-    bound: int | None = None
-    """Reward that no solution exceeds; None where nothing is proven."""
-    searches: Mapping[str, int] = {}
-    """Reward that each search found, by method."""
-    solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.runs.run.movements_from` reads them, in full precision."""
-    infeasible: str = ""
-    """Why no search has a solution."""
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What it is about: task, lock of the base, other arm."""
-        return self.task, self.base, self.other_arm
+from coartic.tasks.optima import BASE, best_shipped
 
 
 @dataclass(frozen=True)
@@ -88,8 +47,6 @@ def known_optima(
     run of the folder may better them.
     """
     optima: dict[str, KnownOptimum] = {}
-    free = [entry for entry in entries() if (entry.base, entry.other_arm) == (BASE, "free")]
-    shipped = {entry.essence: entry for entry in free}
     solved = runs[runs.status == "ok"]
     asked = restrictions(solved)
     solved = solved[asked.base == BASE]
@@ -98,7 +55,7 @@ def known_optima(
     for name, task in tasks.items():
         of_task = searches[searches.task == name]
         candidates = [from_runs(of_task)] if len(of_task) else []
-        entry = shipped.get(essence(task)) if model == PAPER else None
+        entry = best_shipped(task) if model == PAPER else None
         if entry is not None and entry.reward is not None:
             candidates.append(KnownOptimum(entry.reward, entry.bound))
         if not candidates:
@@ -135,20 +92,6 @@ def initial_reward(task: Task, model: MotionModel) -> float:
     """Reward of the initial solution, less its penalty; NaN where there is none."""
     solution = initial_solution(task, model)
     return math.nan if solution is None or solution.reward is None else float(solution.reward)
-
-
-def essence(task: Task) -> str:
-    """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
-    content = task.model_dump(mode="json")
-    keys = ("goals", *KEPT, *(["penalty"] if "penalty" in content else []))
-    text = json.dumps({key: content[key] for key in keys}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def entries() -> list[ShippedOptimum]:
-    """The shipped data, one entry per task and restriction."""
-    content = json.loads(DATA.read_text(encoding="utf-8"))
-    return [ShippedOptimum.model_validate(entry) for entry in content["optima"]]
 
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:

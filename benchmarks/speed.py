@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -27,15 +28,18 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Session
 from coartic.motion.lanes import LANES
-from coartic.motion.trials import movements_of
+from coartic.motion.reach import batch_for, blank, reach_goals
+from coartic.motion.trials import Bench, hand_codes, movements_of
+from coartic.robot import Array
 
 
 def main() -> None:
     """Measure and print."""
     rates = trials_a_second()
-    print(f"{'way':32}{'trials a second':>18}")
+    print(f"{'way':32}{'trials a second':>18}{'times the kernel':>20}")
     for way, rate in rates.items():
-        print(f"{way:32}{rate:18,.0f}")
+        kernel = rates[ALONE if "one by one" in way else TOGETHER]
+        print(f"{way:32}{rate:18,.0f}{kernel / rate:20.2f}")
     warm_up(load_task("ascending"))
     print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
     for cell in plan_suite("paper").cells:
@@ -45,8 +49,11 @@ def main() -> None:
     show_commands()
 
 
+ALONE, TOGETHER = "bare kernel, one by one", "bare kernel, 1000 at once"
+
+
 def trials_a_second() -> dict[str, float]:
-    """Trials a second on one core through each public way: the same trials, of ``two-armed-1``.
+    """Trials a CPU second through each public way: the same trials, of ``two-armed-1``.
 
     They are around what CMA-ES finds, so that few goals are missed.
     """
@@ -65,13 +72,22 @@ def trials_a_second() -> dict[str, float]:
     free = noise[..., many.unwrapped.arms.free]
     actions = np.concatenate([choice, free], axis=-1).swapaxes(0, 1)  # goals first
     many.reset()
+    bench, codes = Bench(task), hand_codes(task, hands, 1000)
+
+    def arguments(targets: Array) -> tuple[Any, ...]:
+        arms = bench.arms(codes[: len(targets)], targets.copy())
+        return arms, bench.setup, blank(arms), batch_for(task.robot)
+
+    together, *alone = map(arguments, (targets, *targets[:100, None]))
     return {
+        TOGETHER: _rate(1000, lambda: reach_goals(*together)),
         "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(hands, targets)),
         "objective.many, 1000 at once": _rate(1000, lambda: cost.many(targets[:, cost.joints])),
         "vector environment of 1000": _rate(
             1000,
             lambda: [many.step(action) for action in (*actions, actions[0])],  # all begin anew
         ),
+        ALONE: _rate(100, lambda: [reach_goals(*arguments) for arguments in alone]),
         "objective, one by one": _rate(
             100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
         ),
@@ -86,9 +102,9 @@ def _rate(trials: int, make: Callable[[], object]) -> float:
     make()
     times: list[float] = []
     while len(times) < 5 or (sum(times) < 1.0 and len(times) < 500):
-        clock = time.thread_time()
+        clock = time.process_time()  # of all threads
         make()
-        times.append(time.thread_time() - clock)
+        times.append(time.process_time() - clock)
     return trials / float(np.median(times))
 
 

@@ -11,22 +11,25 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands
-from coartic.motion.outside import inside
+from coartic.motion.outside import inside, note_trials
 from coartic.motion.solution import Execution, Movement, execute
-from coartic.motion.trials import HandSequences, Trials, hand_codes, make_trials
+from coartic.motion.trials import Bench, HandSequences, Trials, check_targets, hand_codes
 from coartic.robot import Array, Hand
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
@@ -144,6 +147,13 @@ class Meter:
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
 """What a counter can hold where runs are stored."""
+_FAILED = -MOST_COUNT
+"""Reward of a trial that failed, where rewards are kept."""
+
+
+def kept(rewards: Iterable[int | None]) -> array[int]:
+    """Rewards of trials as a session keeps them, in 8 bytes each."""
+    return array("q", [_FAILED if reward is None else reward for reward in rewards])
 
 
 @dataclass(frozen=True)
@@ -262,11 +272,14 @@ class TaskView:
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Corrective movements without a target are a use of the corrective process."""
-        if any(getattr(m, "kind", "") == "corrective" and m.target is None for m in solution):
-            self._use(Information.CORRECTIVE_PROCESS)
+        for m in solution:
+            if getattr(m, "kind", "") == "corrective" and m.target is None:
+                self._use(Information.CORRECTIVE_PROCESS)
 
     def _use(self, *information: Information) -> None:
         for item in information:
+            if item in self._used:
+                continue
             if item not in self._told:
                 told = ", ".join(sorted(self._told)) or "nothing"
                 raise UndeclaredError(
@@ -304,7 +317,7 @@ class Session(TaskView):
         self._of_run = of_run
         self._trial_budget = trial_budget
         self._meter = Meter()
-        self._rewards: list[int | None] = []
+        self._rewards = array("q")
 
     # Calls that are counted.
 
@@ -352,12 +365,15 @@ class Session(TaskView):
         """
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
-        if self.trials_left == 0:
-            raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
-        with inside(self._of_run):
-            execution = execute(self._task, solution, model=self.model)
+        self._affordable(1)
+        execution = self._bench.execute(solution)
+        if execution is not None:
+            note_trials(0 if self._of_run else 1)
+        else:
+            with inside(self._of_run):
+                execution = execute(self._task, solution, model=self.model)
         spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
-        self._count_trials([execution.reward], *spent)
+        self._count(kept([execution.reward]), *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
             return execution
         return replace(
@@ -383,25 +399,12 @@ class Session(TaskView):
         Raises BudgetError where no trial is left, ValueError for arrays that do not fit the task.
         """
         self._use(Information.REWARD_BY_TRIAL)
-        given = np.asarray(targets, dtype=np.float64)
-        if given.ndim != 3:
-            raise ValueError(f"targets have shape {given.shape}; needed is (N, G, dof)")
-        without_base = given[np.isnan(given[..., 0])]  # few, in which to look further
-        if np.isnan(without_base).all(axis=-1).any():
+        given = check_targets(self._task, targets)
+        if np.isnan(given.min(initial=0.0)) and np.isnan(given).all(axis=2).any():
             self._use(Information.CORRECTIVE_PROCESS)
-        count, left = len(given), self.trials_left
-        codes = hand_codes(self._task, hands, count)
-        if left is not None and left < count:
-            if left <= 0:
-                raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
-            codes, given = codes[:left], given[:left]
-        with inside(self._of_run):
-            trials = make_trials(self._task, codes, given, model=self.model)
-        if until is not None:
-            better = trials.rewards > np.asarray(until)[: len(given)]
-            if better.any():
-                trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
-        self._count_batch(trials)
+        codes = hand_codes(self._task, hands, len(given))
+        left = self._affordable(len(given))
+        trials = self.unchecked_trials(codes[:left], given[:left], until=until)
         if Information.CORRECTIVE_PROCESS in self._told:
             return trials
         return trials._replace(
@@ -411,13 +414,59 @@ class Session(TaskView):
             reached=trials.reached[:0],
         )
 
+    def _affordable(self, count: int) -> int:
+        """How many of so many trials the budget has. Raises BudgetError where it has none."""
+        if self._trial_budget is None:
+            return count
+        left = self._trial_budget - self._meter.trials
+        if left <= 0 < count:
+            raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
+        return min(count, left)
+
+    # The same for an objective, which hands over what fits the task and the budget.
+
+    @cached_property
+    def _bench(self) -> Bench:
+        return Bench(self._task, self.model)
+
+    def unchecked_trials(
+        self, codes: NDArray[np.int64], targets: Array, *, until: Any = None
+    ) -> Trials:
+        """:meth:`trials` with hands ``(N, G)`` as indices into HANDS and with ``targets`` that are
+        its own: joints without one are filled in."""
+        note_trials(0 if self._of_run else len(targets))
+        trials = self._bench.make(codes, targets)
+        if until is not None:
+            better = trials.rewards > np.asarray(until)[: len(targets)]
+            if better.any():
+                trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
+        self._count_batch(trials)
+        return trials
+
     def _count_batch(self, trials: Trials) -> None:
         """Count the trials of a batch and keep their rewards."""
-        rewards: list[int | None] = (-(trials.ticks + trials.penalties)).tolist()
-        for failed in np.flatnonzero(~trials.completed).tolist():
-            rewards[failed] = None
+        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _FAILED)
         spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
-        self._count_trials(rewards, *(each.sum() for each in spent))
+        self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
+
+    def unchecked_trial(self, codes: NDArray[np.int64], targets: Array) -> int | None:
+        """The reward of one trial, None where it fails; as :meth:`unchecked_trials` for N = 1."""
+        note_trials(0 if self._of_run else 1)
+        reached = self._bench.reach(codes, targets)
+        completed = bool(reached.hit[0, -1])
+        ticks, corrections, iterations, evaluations = (
+            sum(each[0].tolist())
+            for each in (
+                reached.ticks,
+                reached.corrections,
+                reached.iterations,
+                reached.evaluations,
+            )
+        )
+        penalty = self._bench.penalty(codes, reached)
+        reward = -(ticks + penalty) if completed else None
+        self._count(kept([reward]), ticks, corrections, iterations, evaluations)
+        return reward
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).
@@ -432,24 +481,23 @@ class Session(TaskView):
         self._meter.add(**spent)
         return chosen
 
-    def _count_trials(
+    def _count(
         self,
-        rewards: list[int | None],
+        rewards: array[int],
         ticks: int,
         corrections: int,
         iterations: int,
         evaluations: int,
     ) -> None:
         """Count trials by their rewards and what they spent in all."""
-        self._meter.add(
-            trials=len(rewards),
-            movement_ticks=ticks,
-            corrections=corrections,
-            corrective_iterations=iterations,
-            jacobians=iterations,
-            forward_kinematics=evaluations,
-            failed_trials=rewards.count(None),
-        )
+        meter = self._meter
+        meter.trials += len(rewards)
+        meter.movement_ticks += ticks
+        meter.corrections += corrections
+        meter.corrective_iterations += iterations
+        meter.jacobians += iterations
+        meter.forward_kinematics += evaluations
+        meter.failed_trials += rewards.count(_FAILED)
         self._rewards.extend(rewards)
 
     @property
@@ -467,7 +515,7 @@ class Session(TaskView):
     @property
     def rewards(self) -> list[int | None]:
         """Reward of each trial made, in order; None where it failed."""
-        return list(self._rewards)
+        return [None if reward == _FAILED else reward for reward in self._rewards]
 
     # What the method has to state itself.
 
@@ -522,7 +570,7 @@ class Session(TaskView):
         """Rewards of the trials of a compiled method of this project, and its time for them: of
         the runs of a batch, each has its share."""
         self._needs_trust("record")
-        self._rewards.extend(rewards)
+        self._rewards.extend(kept(rewards))
         self._meter.solve_s += solve_s
 
     def _needs_trust(self, name: str) -> None:

@@ -30,6 +30,7 @@ from coartic.method import (
 )
 from coartic.model import PAPER, MotionModel
 from coartic.motion.initial import too_many_sequences
+from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.solution import Movement
 from coartic.motion.trials import movements_of
 from coartic.robot import HANDS, Array
@@ -41,6 +42,8 @@ TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
+CHUNK = 8192
+"""Points that are evaluated at a time, so that many take no more memory."""
 
 
 def explored_joints(
@@ -119,6 +122,9 @@ class Objective:
         """Cost of the best trial so far; at the start that of the corrective process alone."""
         self._best_x = np.full(self.dim, np.nan)
         self._best_targets = alone.targets[best].copy()
+        codes = [HANDS.index(hand) for hand in hands_of(self.hands)]
+        self._codes = np.array([codes])
+        self._entries = np.flatnonzero(self.joints)
 
     def __repr__(self) -> str:
         return (
@@ -151,7 +157,18 @@ class Objective:
             raise ValueError(
                 f"x has shape {points.shape}; needed is ({self.dim},) or ({self.dim}, N)"
             )
-        return float(self.many(points[None])[0]) if points.ndim == 1 else self.many(points.T)
+        if points.ndim == 2:
+            return self.many(points.T)
+        if not points @ points <= LARGEST_ENTRY:  # NaN, or far away: to be looked at
+            return float(self.many(points[None])[0])
+        self._trials_left(1)
+        targets = self._targets(points[None])
+        reward = self._session.unchecked_trial(self._codes, targets)
+        cost = FAILED if reward is None else min(-reward, FAILED)
+        self.evaluations += 1
+        if cost < self.best_cost:
+            self._keep(cost, points, targets[0])
+        return float(cost)
 
     def many(self, points: ArrayLike) -> Array:
         """Costs ``(N,)`` of points ``(N, dim)``, which are evaluated side by side.
@@ -164,24 +181,40 @@ class Objective:
         array = real_array("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
-        targets = self._targets(array)
-        left = self._trials_left(len(array))
-        targets = targets[:left]
-        trials = self._session.trials(self.hands, targets)
-        costs = np.minimum(-trials.rewards, FAILED)
-        self.evaluations += len(costs)
-        if len(costs) and costs.min() < self.best_cost:
-            best = int(costs.argmin())
-            self.best_cost, self._best_x = float(costs[best]), array[best].copy()
-            self._best_targets = trials.targets[best].copy()
-        if len(costs) < len(array):
+        self._check(array)
+        left, costs = self._trials_left(len(array)), np.empty(len(array))
+        for first in range(0, left, CHUNK):
+            some = array[first : min(first + CHUNK, left)]
+            targets = self._targets(some)
+            hands = np.repeat(self._codes, len(some), axis=0)
+            trials = self._session.unchecked_trials(hands, targets)
+            found = costs[first : first + len(some)]
+            np.minimum(-trials.rewards, FAILED, out=found)
+            self.evaluations += len(some)
+            best = int(found.argmin())
+            if found[best] < self.best_cost:
+                self._keep(found[best], some[best], targets[best])
+        if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
 
+    def _keep(self, cost: float, point: Array, targets: Array) -> None:
+        """Note the best trial so far."""
+        self.best_cost, self._best_x = float(cost), point.copy()
+        self._best_targets = targets.copy()
+
     def _targets(self, points: Array) -> Array:
         """Targets ``(N, G, dof)`` of points; NaN for joints that have none."""
-        targets = np.full((len(points), *self.joints.shape), np.nan)
-        targets[:, self.joints] = points
+        targets = np.full((len(points), self.joints.size), np.nan)
+        targets[:, self._entries] = points
+        return targets.reshape(len(points), *self.joints.shape)
+
+    def _check(self, points: Array) -> None:
+        """Raises ValueError for goals that are NaN in part, and for entries that are infinite or
+        beyond what a trial takes."""
+        if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
+            return
+        targets = self._targets(points)
         missing = (np.isnan(targets) & self.joints).sum(axis=2)
         in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
         if in_part.any():
@@ -190,13 +223,19 @@ class Objective:
                 f"point {point}: of goal {goal + 1} some entries are NaN; needed are all of them "
                 "(the corrective process alone) or none"
             )
-        if np.isinf(targets).any():
+        if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
-        return targets
+        if (np.abs(points) > LARGEST_ENTRY).any():
+            raise ValueError(f"a point has an entry beyond {LARGEST_ENTRY:g}")
 
     def _trials_left(self, wanted: int) -> int:
         """How many of so many trials are left."""
-        left = wanted if self._end is None else self._end - self._session.meter.trials
+        left = self._session.trials_left
+        if self._end is not None:
+            own = self._end - self._session.meter.trials
+            left = own if left is None else min(own, left)
+        if left is None:
+            return wanted
         if left <= 0 < wanted:
             raise BudgetError("all trials of the budget are made")
         return min(wanted, left)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import os
 import shutil
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 
 from coartic.inputs import check_limits
@@ -39,6 +41,22 @@ def threads_for(jobs: int) -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
+    """Do work on the rows of a call: in threads where each has so many rows at least.
+
+    There are as many threads as cores, or as ``OMP_NUM_THREADS`` allows: one in worker processes.
+    """
+    allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    threads = min(count // least, int(allowed) if allowed.isdigit() else threads_for(-1))
+    edges = [count * part // max(threads, 1) for part in range(max(threads, 1) + 1)]
+    first, *others = itertools.starmap(slice, itertools.pairwise(edges))
+    with ThreadPoolExecutor(max(len(others), 1)) as pool:
+        waited_for = [pool.submit(work, part) for part in others]
+        work(first)
+        for each in waited_for:
+            each.result()
 
 
 def one_thread_each() -> AbstractContextManager[None]:

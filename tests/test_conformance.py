@@ -6,7 +6,6 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from coartic import load_task
-from coartic.analysis.optima import entries
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.pool import worker_context
@@ -14,6 +13,7 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
 from coartic.model import PAPER
 from coartic.runs.plan import RunKey, Setting
+from coartic.tasks.optima import entries
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task

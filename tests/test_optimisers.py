@@ -9,13 +9,13 @@ import pytest
 
 import coartic
 from coartic import MotionModel, builtin_tasks, corrective_trial, execute, hand_sequences, load_task
-from coartic.analysis.optima import entries
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session
 from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
 from coartic.runs.run import movements_from
+from coartic.tasks.optima import entries
 from tests.support.strategies import tiny_task
 
 DOCS = Path(__file__).parent.parent / "docs"

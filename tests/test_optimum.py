@@ -11,7 +11,6 @@ import renew_optima
 
 from coartic import PAPER, builtin_tasks, correct, execute, load_task
 from coartic.analysis import optima
-from coartic.analysis.optima import ShippedOptimum, entries, essence
 from coartic.baselines.optimum import (
     METHODS,
     BranchAndBound,
@@ -25,6 +24,7 @@ from coartic.benchmarks.suites import Cell
 from coartic.method import MethodError, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
+from coartic.tasks.optima import DATA, ShippedOptimum, entries, essence
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve, tiny_task
 from tests.support.suites import KNOWN, run_and_write
@@ -161,7 +161,7 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
 
 def test_renewing_with_what_is_there_changes_nothing():
     shipped = entries()
-    before = optima.DATA.read_bytes()
+    before = DATA.read_bytes()
     assert renew_optima.content_with(shipped[2:], shipped) == before
     better = shipped[0].model_copy(update={"reward": -1})
     changed = json.loads(renew_optima.content_with([better], shipped))["optima"]

@@ -9,10 +9,10 @@ import pytest
 
 from coartic import CONDITIONS, VARIANTS, Task, execute, learn, load_task, parse_task
 from coartic.analysis import verify as checker
-from coartic.analysis.optima import essence
 from coartic.benchmarks.run import run_suite
 from coartic.motion.trials import make_trials, movements_of
 from coartic.tasks.families import task_text
+from coartic.tasks.optima import essence
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import sample, uneven_task

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coartic import load_task
+from coartic import Movement, execute, load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.trials import hand_codes, make_trials, movements_of
 from coartic.optimisers import TOLD
@@ -122,3 +122,35 @@ def test_what_was_given_is_left_alone():
 def test_trials_that_cannot_be_made(name, hands, shape, value, message):
     with pytest.raises(ValueError, match=message):
         make_trials(load_task(name), hands, np.full(shape, value))
+
+
+def test_a_trial_of_a_session_is_an_execution():
+    """To the last figure, whichever way it takes."""
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 12, noise=0.05)
+    targets[::3, 2] = np.nan
+    session = Session(task, 0, TOLD)
+    for letters, goals in zip(hands, targets, strict=True):
+        solution = movements_of(letters, goals)
+        twice = [*solution, Movement(4, solution[-1].hand, "planned", task.q0)]
+        for given in (solution, twice):
+            made, due = session.trial(given), execute(task, given)
+            for one, other in zip(made.movements, due.movements, strict=True):
+                np.testing.assert_array_equal(one.target, other.target)
+                assert (one.hand, one.kind, one.ticks) == (other.hand, other.kind, other.ticks)
+            np.testing.assert_array_equal(made.configurations, due.configurations)
+            for name in ("ticks", "corrections", "iterations", "evaluations", "penalty"):
+                assert getattr(made, name) == getattr(due, name)
+            assert made.reward == session.rewards[-1]
+
+
+def test_no_number_of_threads_changes_a_trial(monkeypatch):
+    task = load_task("two-armed-1")
+    hands, targets = sample(task, 50)
+    hands, targets = [*hands] * 50, np.tile(targets, (50, 1, 1))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    alone = make_trials(task, hands, targets)
+    for threads in ("2", "3,1", "7"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        for one, other in zip(make_trials(task, hands, targets), alone, strict=True):
+            np.testing.assert_array_equal(one, other)

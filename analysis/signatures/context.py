@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import Task
-from coartic.analysis.optima import KEPT
 from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred, slices
 from coartic.robot import Array
+from coartic.tasks.optima import KEPT
 
 IN_MEMORY = 500
 """Divisions or resamples of whole runs at once: thousands of runs would fill the memory."""

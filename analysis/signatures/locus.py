@@ -22,10 +22,10 @@ from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
 from coartic import Task
-from coartic.analysis.optima import KEPT
 from coartic.analysis.signatures.context import p_values
 from coartic.analysis.statistics.estimates import RESAMPLES, Estimate, centred, student, varies
 from coartic.robot import Array
+from coartic.tasks.optima import KEPT
 
 LEAST = 3
 """Positions of a goal that make it a moved one."""

@@ -9,8 +9,7 @@ what one gives depends neither on the others nor on their number.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from itertools import pairwise
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
 from coartic.motion.movement import Goal, move_lanes
 from coartic.motion.problem import arm_of
 from coartic.robot import Array, Robot
+from coartic.threads import in_parts
 
 
 class Reached(NamedTuple):
@@ -34,6 +34,8 @@ class Reached(NamedTuple):
     """Whether its hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
     """Control ticks of its movements, shape ``(N,)``."""
+    correcting: NDArray[np.int64]
+    """Control ticks of the corrective movement among them."""
     corrected: Array
     """Target of its corrective movement, shape ``(N, dof)``; NaN where none was reached."""
     corrections: NDArray[np.int64]
@@ -160,7 +162,19 @@ def correct_missed(
     move_acting(first, count, g, goal, setup.model.corrective_arrival, arms, setup, batch)
     for i in range(count):
         if batch.runs[i].acting:
+            reached.correcting[first + i, g] = batch.runs[i].ticks
             reached.ticks[first + i, g] += batch.runs[i].ticks
+
+
+@inlined
+def clear(n: int, reached: Any) -> None:
+    """Note that an arm has not done anything yet."""
+    for g in range(reached.hit.shape[1]):
+        reached.hit[n, g] = False
+        reached.ticks[n, g] = reached.correcting[n, g] = reached.corrections[n, g] = 0
+        reached.iterations[n, g] = reached.evaluations[n, g] = 0
+        for j in range(reached.q.shape[2]):
+            reached.q[n, g, j] = reached.corrected[n, g, j] = math.nan
 
 
 @inlined
@@ -169,6 +183,7 @@ def reach_lot(
 ) -> None:
     """Requests of one group, as many as there is room for."""
     for i in range(count):
+        clear(first + i, reached)
         fill_row(batch.runs[i].q, arms.starts[first + i])
         batch.going[i] = True
     for g in range(arms.goals.shape[1]):
@@ -194,46 +209,67 @@ def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
             reach_lot(first, min(room, end - first), group, arms, setup, reached, batch)
 
 
-def reach_in_turn(
-    robot: Robot,
-    starts: Array,
-    hands: NDArray[np.int64],
-    goals: Array,
-    radius: float,
-    targets: Array,
-    stops: NDArray[np.bool_],
-    *,
-    bounds: Sequence[int],
-    corrects: bool = True,
-    looks: bool = True,
-    locked_base: Collection[str] = (),
-    model: MotionModel = PAPER,
-) -> Reached:
+SHARE = 14 * LANES
+"""Arms for a thread, at least: to begin one takes as long as a hundred trials."""
+_IDLE: dict[int, list[Batch]] = {}
+_ONLY = np.zeros(1, dtype=np.int64)
+
+
+def blank(arms: Requests) -> Reached:
+    """Arrays for what comes of arms, to be filled."""
+    count, goals, dof = arms.targets.shape
+    places, counts = np.empty((2, count, goals, dof)), np.empty((5, count, goals), dtype=np.int64)
+    hit = np.empty((count, goals), dtype=np.bool_)
+    ticks, correcting, *others = counts
+    return Reached(places[0], hit, ticks, correcting, places[1], *others)
+
+
+def batch_for(robot: Robot) -> Batch:
+    """Arrays for the kernel to work on: some that are idle, or new ones."""
+    try:
+        return _IDLE.setdefault(robot.most_links, []).pop()  # no other thread gets it
+    except IndexError:
+        flags = np.zeros((2, LANES), dtype=np.bool_)
+        return Batch(runs_for(LANES, robot), flags[0], flags[1], lanes_for(robot))
+
+
+def reach_with(robot: Robot, arms: Requests, setup: Setup) -> Reached:
     """Let N arms in K groups reach for G goals each, in turn, until they miss one.
 
-    Nothing is checked. ``starts`` has shape ``(N, dof)``;
-    ``hands`` ``(N, G)``, indices into HANDS; ``goals`` ``(K, G, 2)``, those of a group, whose arms
-    are those from ``bounds[k]`` up to ``bounds[k + 1]``; ``targets`` ``(N, G, dof)`` and ``stops``
-    ``(N, G)``, as in :func:`reach_unchecked`. In ``targets`` joints without one are filled in, for
-    goals that were attempted.
+    Nothing is checked. In ``arms.targets`` joints without a target are filled in, for goals that
+    were attempted. Many arms of one group are shared among threads.
     """
-    places = np.full((2, *hands.shape, robot.dof), np.nan)
-    counts = np.zeros((4, *hands.shape), dtype=np.int64)
-    hit = np.zeros(hands.shape, dtype=np.bool_)
-    reached = Reached(places[0], hit, counts[0], places[1], *counts[1:])
-    largest = max((end - first for first, end in pairwise(bounds)), default=1)
-    lot = max(min(largest, LANES), 1)
-    free = ("x" not in locked_base, "y" not in locked_base)
-    flags = np.zeros((2, lot), dtype=np.bool_)
-    reach_goals(
-        Requests(starts, hands, targets, stops, np.array(bounds, dtype=np.int64), goals),
-        Setup(
-            robot.arm("left"), robot.arm("right"), radius, Corrector(*free), model, corrects, looks
-        ),
-        reached,
-        Batch(runs_for(lot, robot), flags[0], flags[1], lanes_for(robot)),
-    )
+    count, reached = len(arms.targets), blank(arms)
+
+    def work(part: slice) -> None:
+        some, own, rows = arms, reached, part.stop - part.start
+        if rows < count:
+            each = [field[part] for field in arms[:4]]
+            some = Requests._make([*each, np.array([0, rows]), arms.goals])
+            own = Reached._make(field[part] for field in reached)
+        batch = batch_for(robot)
+        reach_goals(some, setup, own, batch)
+        _IDLE[robot.most_links].append(batch)
+
+    if len(arms.goals) == 1 and count >= 2 * SHARE:
+        in_parts(work, count, SHARE)
+    else:
+        work(slice(0, count))
     return reached
+
+
+def setup_for(
+    robot: Robot,
+    radius: float,
+    *,
+    locked_base: Collection[str] = (),
+    model: MotionModel = PAPER,
+    corrects: bool = True,
+    looks: bool = True,
+) -> Setup:
+    """Robot, constants and options for the kernel; see :func:`reach_unchecked`."""
+    free = Corrector("x" not in locked_base, "y" not in locked_base)
+    return Setup(robot.arm("left"), robot.arm("right"), radius, free, model, corrects, looks)
 
 
 def reach_unchecked(
@@ -263,26 +299,26 @@ def reach_unchecked(
     paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
     """
     count = len(q)
-    order = np.lexsort(goals.T)  # arms of one goal are neighbours, in the order given
-    places = goals[order]
-    begins = np.ones(count, dtype=np.bool_)
-    begins[1:] = (places[1:] != places[:-1]).any(axis=1)
-    bounds = np.flatnonzero(begins)
+    order = back = bounds = _ONLY
+    if count != 1:  # arms of one goal are neighbours, in the order given
+        order = np.lexsort(goals.T)
+        places = goals[order]
+        begins = np.ones(count, dtype=np.bool_)
+        begins[1:] = (places[1:] != places[:-1]).any(axis=1)
+        bounds = np.flatnonzero(begins)
+        back = np.empty_like(order)
+        back[order] = np.arange(count)
     given = np.full((count, robot.dof), np.nan) if targets is None else targets
-    reached = reach_in_turn(
-        robot,
-        q[order],
-        hands[order, None],
-        places[bounds, None],
-        radius,
-        given[order, None],
-        np.broadcast_to(stops, count)[order, None],
-        bounds=[*bounds.tolist(), count],
-        corrects=corrects,
-        looks=looks,
-        locked_base=locked_base,
-        model=model,
+    requests = Requests(
+        starts=q[order],
+        hands=hands[order, None],
+        targets=given[order, None],
+        stops=np.broadcast_to(stops, count)[order, None],
+        bounds=np.append(bounds, count),
+        goals=goals[order[bounds], None],
     )
-    back = np.empty_like(order)
-    back[order] = np.arange(count)
+    setup = setup_for(
+        robot, radius, locked_base=locked_base, model=model, corrects=corrects, looks=looks
+    )
+    reached = reach_with(robot, requests, setup)
     return Reached._make(field[back, 0] for field in reached)

@@ -21,7 +21,7 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import check_goal, configuration, follow
 from coartic.motion.outside import note_trials
 from coartic.motion.penalty import penalties
-from coartic.motion.reach import Reached, reach_in_turn
+from coartic.motion.reach import Reached, Requests, reach_with, setup_for
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
 from coartic.text import short_repr
@@ -339,20 +339,23 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
     if how == "move":
         targets[:, 0] = [movement.target for _, movement in due]
     ends = [movement.kind != "corrective" or model.corrective_arrival for _, movement in due]
-    reached = reach_in_turn(
+    arms = Requests(
+        starts=np.array([run.q for run, _ in due]),
+        hands=np.array([[HANDS.index(movement.hand)] for _, movement in due]),
+        targets=targets,
+        stops=np.array(ends)[:, None],
+        bounds=np.array([0, len(due)]),
+        goals=np.array([[check_goal(task.goals[number - 1], task.radius)[:2]]]),
+    )
+    setup = setup_for(
         task.robot,
-        np.array([run.q for run, _ in due]),
-        np.array([[HANDS.index(movement.hand)] for _, movement in due]),
-        np.array([[check_goal(task.goals[number - 1], task.radius)[:2]]]),
         float(task.radius),
-        targets,
-        np.array(ends)[:, None],
-        bounds=(0, len(due)),
-        corrects=how == "correct",
-        looks=how == "look",
         locked_base=task.locked_base,
         model=model,
+        corrects=how == "correct",
+        looks=how == "look",
     )
+    reached = reach_with(task.robot, arms, setup)
     return Reached._make(field[:, 0] for field in reached)
 
 

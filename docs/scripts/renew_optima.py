@@ -8,10 +8,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from coartic import CoarticError
-from coartic.analysis.optima import DATA, ShippedOptimum, entries, essence, from_runs, restrictions
+from coartic.analysis.optima import from_runs, restrictions
 from coartic.analysis.study import Study, load
 from coartic.files import write_atomically
 from coartic.runs.plan import SEARCH
+from coartic.tasks.optima import DATA, ShippedOptimum, entries, essence
 from coartic.text import one_line
 
 
