@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from coartic.motion.movement import MoveResult, move
     from coartic.motion.solution import Execution, Movement, execute
     from coartic.motion.ticks import Trajectory, trajectory
+    from coartic.motion.trials import movements_of
     from coartic.optimisers import Objective, Optimiser, objective
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
@@ -65,6 +66,7 @@ __all__ = [
     "learn_many",
     "load_task",
     "move",
+    "movements_of",
     "objective",
     "parse_task",
     "runtimes",
@@ -84,6 +86,7 @@ _HOMES = {
     "motion.movement": ("MoveResult", "move"),
     "motion.solution": ("Execution", "Movement", "execute"),
     "motion.ticks": ("Trajectory", "trajectory"),
+    "motion.trials": ("movements_of",),
     "optimisers": ("Objective", "Optimiser", "objective"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),

@@ -27,20 +27,30 @@ MARKERS: dict[Hand, dict[str, Any]] = {
 _CROWDED = 0.6  # length unit: a goal that near above another has its number
 
 
-def draw_robot(axes: Axes, task: Task, q: Array, *, weight: float = 1.0) -> Callable[[Array], None]:
+def draw_robot(
+    axes: Axes, task: Task, q: Array, *, weight: float = 1.0, alpha: float = 1.0
+) -> Callable[[Array], None]:
     """Draw base and arms in configuration ``q`` (dof,), their joints marked.
 
     Returns a function that moves what is drawn to another configuration. ``weight`` is the width
-    of lines. Set the limits of ``axes``: patches do not widen them, which takes long.
+    of lines, ``alpha`` makes all paler. Set the limits of ``axes``: patches do not widen them,
+    which takes long.
     """
     outline = task.robot.base_outline(q)
     base = [
-        Polygon(outline, facecolor=BASE, alpha=0.25, edgecolor="none", zorder=1.5),
-        Polygon(outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, zorder=1.6),
+        Polygon(outline, facecolor=BASE, alpha=0.25 * alpha, edgecolor="none", zorder=1.5),
+        Polygon(
+            outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, alpha=alpha, zorder=1.6
+        ),
     ]
     for patch in base:
         axes.add_artist(patch)
-    style: Any = {"color": BLACK, "linewidth": 0.9 * weight, "markeredgewidth": 0.7 * weight}
+    style: Any = {
+        "color": BLACK,
+        "linewidth": 0.9 * weight,
+        "markeredgewidth": 0.7 * weight,
+        "alpha": alpha,
+    }
     arms = {
         hand: axes.plot(*task.robot.joint_positions(q, hand).T, **style, **MARKERS[hand])[0]
         for hand in task.hands

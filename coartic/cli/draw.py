@@ -76,9 +76,9 @@ def animate(
 ) -> None:
     """Make a film of a run, alone or beside another one."""
     from coartic import corrective_trial, initial_hands, trajectory
-    from coartic.analysis.figures.animation import check_film, write_film
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
+    from coartic.film import check_film, write_film
 
     check_film(out, replace=replace)
     if initial and other is not None:

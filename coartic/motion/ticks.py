@@ -5,17 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.errors import SolutionError
+from coartic.errors import CoarticError, SolutionError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
-from coartic.robot import Array, Hand
+from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of
-from coartic.text import short_repr
+from coartic.text import short_repr, unknown
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,11 @@ class Trajectory:
         """Number of control ticks; the reward also loses the penalty, where there is one."""
         return self.execution.ticks
 
+    @property
+    def reward(self) -> int:
+        """Total reward: -1 a tick, less the penalty."""
+        return -(self.execution.ticks + self.execution.penalty)
+
     def hand_path(self, hand: Hand) -> Array:
         """The path of a hand.
 
@@ -89,6 +100,151 @@ class Trajectory:
         """
         first = self.hits[goal - 2] if goal > 1 else 0
         return self.configurations[first : self.hits[goal - 1] + 1]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The movement as a table.
+
+        Returns
+        -------
+        DataFrame
+            A row for each control tick. ``goal`` is the number of the goal that the robot moves to,
+            ``hand`` the hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in
+            length units, ``left_1`` and so on in rad) and the place of both hands (``left_x``,
+            ``left_y``, ``right_x``, ``right_y``, length unit).
+        """
+        import pandas as pd
+
+        goal = np.minimum(
+            np.searchsorted(self.hits, np.arange(len(self.configurations))), len(self.hits) - 1
+        )
+        frame = pd.DataFrame({"goal": goal + 1, "hand": np.array(self.hands)[goal]})
+        frame.index.name = "tick"
+        frame[list(self.task.robot.joint_names)] = self.configurations
+        for hand in HANDS:
+            frame[[f"{hand}_x", f"{hand}_y"]] = self.hand_path(hand)
+        return frame
+
+    def plot(self) -> Figure:
+        """A picture of the movement.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The robot at the start (pale) and at each hit, with the path of the hand that hits.
+        """
+        from matplotlib.figure import Figure
+
+        from coartic.drawing import box, draw_goals, draw_robot, number_goals
+
+        figure = Figure(figsize=(6, 4.5), layout="constrained")
+        low, high = box(self.task, self.configurations)
+        axes = figure.add_subplot(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set(xlabel="x (length unit)", ylabel="y (length unit)")
+        postures = [self.task.q0, *self.execution.configurations]
+        for number, q in enumerate(postures):
+            draw_robot(axes, self.task, q, alpha=0.25 + 0.75 * number / len(self.hits))
+        for number, hand in enumerate(self.hands, 1):
+            x, y = self.task.robot.forward_kinematics(self.subtask(number), hand).T
+            axes.plot(x, y, color="0.5", linewidth=0.8, zorder=1)
+        draw_goals(axes, self.task)
+        number_goals(axes, self.task)
+        axes.set_title(f"{self.task.name}: {self.execution.hands}, reward −{-self.reward}")
+        return figure
+
+    def animate(self, path: str | Path, *, width: int = 560, replace: bool = False) -> None:
+        """Write a film of the movement.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            The file, ``.gif`` or, where ffmpeg is installed, ``.mp4``.
+        width : int
+            Width of the picture, pixels.
+        replace : bool
+            Whether a file that is there is written over.
+
+        Raises
+        ------
+        CoarticError
+            The file cannot be written.
+        """
+        from coartic.film import write_film
+
+        title = f"{self.task.name}, {self.execution.hands}"
+        write_film([(title, self)], Path(path), width=width, replace=replace)
+
+    def compare(
+        self, *others: str | Trajectory, runs: int = 10, trials: int = 10_000
+    ) -> pd.DataFrame:
+        """The movement beside others on the same task.
+
+        Parameters
+        ----------
+        *others : str or Trajectory
+            ``"EC1"`` to ``"EC4"``: the learner under this condition; ``"corrective process"``: the
+            corrective process alone with the hands of this movement; ``"optimum"``: the best known
+            reward; or another trajectory of the task.
+        runs : int
+            Runs of the learner, with seeds from 0.
+        trials : int
+            Trials of each run.
+
+        All of them move by the paper's constants.
+
+        Returns
+        -------
+        DataFrame
+            A row for this movement and for each other one: ``reward`` (of the learner the mean
+            learned reward), ``better_by`` (ticks by which this movement is better), ``hands`` (of
+            the learner those of its best run) and ``runs``.
+
+        Raises
+        ------
+        CoarticError
+            Another name, or no optimum of the task is known.
+        """
+        import pandas as pd
+
+        from coartic.learner.conditions import CONDITIONS
+        from coartic.learner.learning import learn_many
+        from coartic.motion.initial import corrective_trial
+        from coartic.tasks.optima import best_shipped
+
+        rows: dict[str, tuple[float | None, str, int]] = {
+            "this movement": (self.reward, self.execution.hands, 1)
+        }
+        for other in others:
+            if isinstance(other, Trajectory):
+                rows[f"movement {len(rows)}"] = other.reward, other.execution.hands, 1
+            elif other in CONDITIONS:
+                learned = learn_many(self.task, CONDITIONS[other], seeds=range(runs), trials=trials)
+                solved = {run.reward: run for run in learned if run.reward is not None}
+                if len(solved) == 0:
+                    raise CoarticError(f"no run of {other} completed task {self.task.name!r}")
+                best = solved[max(solved)]
+                mean = float(np.mean([run.reward for run in learned if run.reward is not None]))
+                rows[other] = mean, best.execute().hands, runs
+            elif other == "corrective process":
+                alone = corrective_trial(self.task, self.execution.hands)
+                rows[other] = alone.reward, alone.hands, 1
+            elif other == "optimum":
+                known = best_shipped(self.task)
+                if known is None or known.reward is None:
+                    raise CoarticError(
+                        f"no optimum of task {self.task.name!r} is known; search for it: "
+                        "coartic run comparison --tasks FILE --methods optimum/dynamic-programming"
+                    )
+                rows["optimum" if known.bound == known.reward else "best known"] = (
+                    known.reward,
+                    known.hands,
+                    1,
+                )
+            else:
+                names = [*CONDITIONS, "corrective process", "optimum"]
+                raise CoarticError(unknown("movement", str(other), names))
+        frame = pd.DataFrame.from_dict(rows, orient="index", columns=["reward", "hands", "runs"])
+        frame.insert(1, "better_by", self.reward - frame.reward)
+        return frame
 
 
 def trajectory(

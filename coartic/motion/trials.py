@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from coartic.inputs import brief_value, real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
 from coartic.motion.outside import note_trials
@@ -192,8 +193,33 @@ def make_trials(
     return bench.make(hand_codes(task, hands, len(given)), given)
 
 
-def movements_of(hands: str, targets: Array) -> tuple[Movement, ...]:
-    """A trial as a solution: ``targets`` has shape ``(G, dof)``, NaN where **A** acts alone."""
+def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
+    """A solution from hands and target configurations.
+
+    Parameters
+    ----------
+    hands : str
+        The hand for each goal, such as ``"RRLR"``.
+    targets : array_like, shape (G, dof)
+        The configuration to move to for each goal, length unit (base) and rad (joints). Where a row
+        is NaN, the corrective process acts alone.
+
+    Returns
+    -------
+    tuple of Movement
+        A movement for each goal, for :func:`coartic.execute` and :func:`coartic.trajectory`.
+
+    Raises
+    ------
+    ValueError
+        The hands are no text of L and R, or there is not a row for each.
+    """
+    targets = real_array("targets", targets)
+    if targets.ndim != 2 or len(targets) != len(hands):
+        raise ValueError(
+            f"targets have shape {targets.shape}; needed is a row for each of the "
+            f"{len(hands)} hands in {brief_value(hands)}"
+        )
     return tuple(
         Movement(number, hand, "corrective")
         if np.isnan(target).all()

@@ -10,7 +10,7 @@ import math
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -18,10 +18,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coartic import CoarticError, Trajectory
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
+from coartic.errors import CoarticError
 from coartic.files import check_output, write_output
 from coartic.interruption import temporary_folder
+
+if TYPE_CHECKING:
+    from coartic.motion.ticks import Trajectory
 
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -34,7 +37,7 @@ _WEIGHT = 1.5  # of lines
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
 
 
-Panel = tuple[str, Trajectory]
+Panel = tuple[str, "Trajectory"]
 """A title and a movement."""
 
 
