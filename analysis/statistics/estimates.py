@@ -41,6 +41,7 @@ FEWER_RESAMPLES = 1_999
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
+_AT_ONCE = 1_000_000  # values of the resamples that are in memory
 NEGLIGIBLE = 1e-9
 """Values that differ by less than this share of their size do not differ: it is rounding."""
 
@@ -166,7 +167,7 @@ def bootstrap_estimate(
             samples,
             statistic,
             n_resamples=resamples,
-            batch=100 if large else 1_000,
+            batch=max(1, min(100, _AT_ONCE // max(n))) if large else 1_000,
             vectorized=True,
             confidence_level=CONFIDENCE,
             method="percentile" if large else "BCa",
