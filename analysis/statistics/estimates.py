@@ -5,6 +5,8 @@ taken as known without error. Intervals are of the BCa bootstrap, and the edge c
 all in :func:`bootstrap_estimate`. Signatures have :func:`student` intervals, shares of runs
 Wilson's. Resampling has one seed, :data:`SEED`, which has nothing to do with the seeds of the runs.
 
+scipy.stats is imported where it is needed: it takes longer than drawing a figure.
+
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
 
@@ -20,7 +22,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy import special, stats
 
 from coartic.robot import Array
 
@@ -159,6 +160,8 @@ def bootstrap_estimate(
         return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
+    from scipy import stats
+
     with warnings.catch_warnings():
         # scipy warns where BCa is undefined; that case is dealt with below.
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
@@ -181,6 +184,8 @@ def bootstrap_estimate(
 
 def student(value: float, error: float, freedom: float, p: float = math.nan) -> Estimate:
     """A value with Student's interval, by its standard error and degrees of freedom."""
+    from scipy import special
+
     half = float(special.stdtrit(freedom, TAILS[1])) * error
     return Estimate(value, value - half, value + half, p)
 
@@ -201,5 +206,7 @@ def standard_deviation(values: Array) -> float:
 @cache
 def wilson(count: int, total: int) -> Estimate:
     """``count`` of ``total`` runs as a share, with Wilson's interval (1927)."""
+    from scipy import stats
+
     ends = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
     return Estimate(count / total, float(ends.low), float(ends.high))
