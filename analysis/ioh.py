@@ -95,6 +95,6 @@ def runs_of(study: Study, cells: list[CellRuns]) -> Iterator[tuple[dict[str, Any
 
 def costs(run: BestSoFar) -> list[tuple[int, int]]:
     """Trial and cost of each improvement, from trial 1, which may have failed."""
-    pairs = zip(run.spent["trials"].tolist(), run.rewards.tolist(), strict=True)
+    pairs = zip(run.spent("trials").tolist(), run.rewards.tolist(), strict=True)
     steps = [(int(trial), -int(reward)) for trial, reward in pairs]
     return steps if steps and steps[0][0] == 1 else [(1, FAILED), *steps]

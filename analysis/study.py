@@ -21,10 +21,11 @@ from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
+from coartic.motion.solution import Movement
 from coartic.motion.ticks import spell_out
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import PARTS, execute_all, movements_from
+from coartic.runs.run import PARTS, execute_all, movements_by_run
 from coartic.runs.store import RUNS_FILE, explain_errors, open_store
 from coartic.tasks.task import address_of
 from coartic.text import counted
@@ -159,16 +160,16 @@ class Study:
         """One row a movement of each run's solution."""
         return self._frame("solutions")
 
-    @cached_property
-    def movements(self) -> tuple[dict[str, pd.DataFrame], dict[str, pd.DataFrame]]:
-        """Movements of each run's solution, and waypoints of those along a path, by run id.
+    def movements(self, task: str, label: str) -> dict[str, tuple[Movement, ...]]:
+        """The solutions of a cell, by run id: of the runs that :meth:`trajectories` executes."""
+        return self._movements((task, label), "solution")
 
-        Of the runs that :meth:`trajectories` executes.
-        """
-        executed = [run_id for cell in self.cells.values() for run_id in _executed_of(cell)]
-        tables = (self.solutions, self._frame("paths"))
-        movements, waypoints = (_by_run(table[table.run_id.isin(executed)]) for table in tables)
-        return movements, waypoints
+    def _movements(self, key: CellKey, part: str) -> dict[str, tuple[Movement, ...]]:
+        ids = set(_executed_of(self.cells[key]))
+        rows, paths = self._frame(part), self._frame("paths")
+        rows, paths = rows[rows.run_id.isin(ids)], paths[paths.run_id.isin(ids)]
+        with explain_errors(self.folder):
+            return movements_by_run(self.tasks[key[0]], rows, paths)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs that made trials, each with the reward of every trial, NaN where it failed."""
@@ -183,7 +184,7 @@ class Study:
         """
         key = task, label
         if key not in self._trajectories:
-            self._trajectories[key] = self._executed(key, *self.movements)
+            self._trajectories[key] = self._executed(key, "solution")
         return self._trajectories[key]
 
     def replays(self, task: str, label: str) -> Trajectories:
@@ -193,25 +194,21 @@ class Study:
         """
         key = task, label
         if key not in self._replays:
-            self._replays[key] = self._executed(key, self._replayed, {})
+            self._replays[key] = self._executed(key, "replay")
         return self._replays[key]
 
-    def _executed(
-        self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
-    ) -> Trajectories:
+    def _executed(self, key: CellKey, part: str) -> Trajectories:
         cell, task = self.cells[key], self.tasks[key[0]]
-        ids = [run_id for run_id in _executed_of(cell) if run_id in movements]
+        solutions = self._movements(key, part)
+        ids = [run_id for run_id in _executed_of(cell) if run_id in solutions]
         with explain_errors(self.folder):
-            solutions = [
-                movements_from(task, movements[run_id], waypoints.get(run_id)) for run_id in ids
-            ]
-            executions = execute_all(task, solutions, self.model)
+            executions = execute_all(task, [solutions[run_id] for run_id in ids], self.model)
             runs = []
             for run_id, execution in zip(ids, executions, strict=True):
                 if (
                     not isinstance(execution, Execution)
                     or not execution.completed
-                    or execution.ticks != movements[run_id].ticks.sum()
+                    or execution.ticks != sum(movement.ticks or 0 for movement in solutions[run_id])
                 ):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 runs.append(spell_out(task, execution, self.model))
@@ -224,10 +221,6 @@ class Study:
     @cached_property
     def _replays(self) -> dict[CellKey, Trajectories]:
         return {}
-
-    @cached_property
-    def _replayed(self) -> dict[str, pd.DataFrame]:
-        return _by_run(self._frame("replay"))
 
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:
@@ -268,16 +261,17 @@ def one_by_one(study: Study) -> set[str]:
 
 @lru_cache(maxsize=4)
 def _frame(folder: Path, view: str, _: int) -> pd.DataFrame:
-    """A view of a folder as it was at a time: studies of parts of a folder share it."""
+    """A view of a folder as it was at a time, or movements and waypoints of the runs that are
+    executed: studies of parts of a folder share it."""
     with open_store(folder) as store:
-        return store.movements(view) if view in PARTS else store.frame(view)
+        if view in PARTS:
+            table = store.movements(view, MOST_EXECUTED)
+        else:
+            table = store.waypoints(MOST_EXECUTED) if view == "paths" else store.frame(view)
+    if view in PARTS and table.ticks.sum() > MOST_TICKS:
+        raise CoarticError(f"the solutions take more than {MOST_TICKS:_} ticks in all")
+    return table
 
 
 def _executed_of(cell: CellRuns) -> list[str]:
     return [str(run_id) for run_id in cell.good.run_id[:MOST_EXECUTED]]
-
-
-def _by_run(table: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    if "ticks" in table and table.ticks.sum() > MOST_TICKS:
-        raise CoarticError(f"the solutions take more than {MOST_TICKS:_} ticks in all")
-    return {str(run_id): rows for run_id, rows in table.groupby("run_id")} if len(table) else {}

@@ -24,12 +24,12 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from functools import cache
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.uninformed import Practice, UninformedParameters
 from coartic.method import Method, Outline, Result, Session
 from coartic.motion.initial import too_many_sequences
@@ -63,44 +63,24 @@ class Strategy:
 
     def generation(self) -> None:
         """Make one generation of trials, or the trials that are left."""
-        if self._restarts < 0 or self._evolution.stop():
+        if self._restarts < 0 or self._evolution.has_ended():
             self._restart()
-        values = np.array(self._evolution.ask())[: self._practice.left]
-        count = len(values)
-        trials = self._practice.by_targets([self.hands] * count, [self._mask] * count, values)
-        rewards = trials.rewards
+        values = self._evolution.ask()[: self._practice.left]
+        rewards = self._practice.around(self.hands, self._mask, values).rewards
         self.generations += 1
-        self.trials += count
+        self.trials += len(values)
         self.reward = max(self.reward, float(rewards.max()))
-        if count == self._evolution.popsize:
+        if len(values) == self._evolution.size:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
-            self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst).tolist())
+            self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
 
     def _restart(self) -> None:
-        import cma
-
         self._restarts += 1
         size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
-        options = {
-            **cma_options(len(self._mean), size * 2**self._restarts),
-            "randn": lambda *shape: self._rng.standard_normal(shape),
-        }
-        self._evolution = cma.CMAEvolutionStrategy(self._mean, self.sigma, options)
-
-
-@cache
-def cma_options(joints: int, population: int) -> dict[str, Any]:
-    """The options of CMA-ES as values. As the texts that they are otherwise, evaluating them
-    takes as long as ten generations."""
-    import cma
-
-    chosen = {
-        "popsize": population,
-        "seed": np.nan,  # leave NumPy's global generator alone
-        "verbose": -9,
-    }
-    return dict(cma.CMAOptions(chosen).complement().evalall({"N": joints}))
+        self._evolution = EvolutionStrategy(
+            self._mean, self.sigma, size * 2**self._restarts, self._rng
+        )
 
 
 class CMAES(Method):
@@ -120,9 +100,6 @@ class CMAES(Method):
 
     def solve(self, session: Session) -> Result:
         """Search until the trials are used up; the solution is the best trial's."""
-        with session.building():
-            import cma  # noqa: F401  # a second of its own, part of no solve
-
         practice = Practice(session, self.parameters)
         with session.solving():
             strategies = []

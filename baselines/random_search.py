@@ -111,7 +111,8 @@ class Centre(NamedTuple):
     """The point around which trials of one hand sequence are made."""
 
     mask: NDArray[np.bool_]  # explored joints, (G, dof)
-    values: Array  # their values, (number of explored joints,)
+    size: int  # how many they are
+    targets: Array  # their values, (G, dof); NaN for the other joints
     reward: float  # a trial with more moves the centre
 
 
@@ -161,18 +162,17 @@ class RandomSearch:
         attempt = self._practice.by_correction(hands)
         if attempt.rewards[0] > -np.inf:
             reward = attempt.rewards[0] if self._climbs else np.inf
-            self.centres[hands] = Centre(mask, attempt.reached[0, mask], reward)
+            self.centres[hands] = centre_at(attempt.reached[0], mask, reward)
         else:
             self._hopeless.add(hands)
 
     def _ahead(
         self, hands: str, best: str, count: int
     ) -> tuple[list[tuple[str, Array]], str | None]:
-        """Hands and noise of at most ``count`` trials; the hands after them, where drawn."""
+        """Hands and normal noise of at most ``count`` trials; the hands after them, where drawn."""
         drawn: list[tuple[str, Array]] = []
         while hands in self.centres:
-            size = len(self.centres[hands].values)
-            drawn.append((hands, self._sigma * self._rng.standard_normal(size)))
+            drawn.append((hands, self._rng.standard_normal(self.centres[hands].size)))
             if len(drawn) == count:
                 return drawn, None
             hands = self._draw(best)
@@ -181,26 +181,32 @@ class RandomSearch:
     def _around(self, drawn: list[tuple[str, Array]]) -> tuple[int, bool]:
         """Make trials up to the first that moves its centre: their number, and whether one did."""
         centres = [self.centres[hands] for hands, _ in drawn]
-        values = [centre.values + noise for centre, (_, noise) in zip(centres, drawn, strict=True)]
         than = np.array([centre.reward for centre in centres])
-        masks = [centre.mask for centre in centres]
-        attempt = self._practice.by_targets([hands for hands, _ in drawn], masks, values, than)
+        targets = np.array([centre.targets for centre in centres])
+        explored = np.array([centre.mask for centre in centres])
+        targets[explored] += self._sigma * np.concatenate([noise for _, noise in drawn])
+        attempt = self._practice.by_targets([hands for hands, _ in drawn], targets, than)
         last = len(attempt.rewards) - 1
         moves = bool(attempt.rewards[last] > than[last])
         if moves:
-            reached = attempt.reached[last, masks[last]]
-            self.centres[drawn[last][0]] = Centre(masks[last], reached, attempt.rewards[last])
+            reached, reward = attempt.reached[last], attempt.rewards[last]
+            self.centres[drawn[last][0]] = centre_at(reached, centres[last].mask, reward)
         return last + 1, moves
 
     def _draw(self, best: str) -> str:
         """A hand sequence around the best; uniformly random where none has succeeded."""
-        rng, letters = self._rng, self._letters
+        random, integers, letters = self._rng.random, self._rng.integers, self._letters
+        epsilon, count = self._epsilon, len(letters)
         while True:
-            hands = "".join(
-                letters[rng.integers(len(letters))]
-                if not best or rng.random() < self._epsilon
-                else best[goal]
-                for goal in range(self._session.goals_count)
-            )
+            chosen = list(best or letters[:1] * self._session.goals_count)
+            for goal in range(len(chosen)):
+                if not best or random() < epsilon:
+                    chosen[goal] = letters[integers(count)]
+            hands = "".join(chosen)
             if hands not in self._hopeless:
                 return hands
+
+
+def centre_at(reached: Array, mask: NDArray[np.bool_], reward: float) -> Centre:
+    """A centre where the goals were hit, shape ``(G, dof)``."""
+    return Centre(mask, int(mask.sum()), np.where(mask, reached, np.nan), reward)

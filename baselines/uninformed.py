@@ -8,7 +8,6 @@ goals were hit are known afterwards.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -56,28 +55,30 @@ class Practice:
 
     def by_correction(self, hands: str) -> Trials:
         """One trial by **A** alone."""
-        return self.by_targets([hands], [self.explored(hands)], [np.array(np.nan)])
+        shape = (1, self._session.goals_count, self._session.dof)
+        return self.by_targets(hands, np.full(shape, np.nan))
+
+    def around(self, hands: str, mask: NDArray[np.bool_], values: Array) -> Trials:
+        """Trials with one hand sequence and targets ``(N, n)`` for the n joints in its mask; the
+        others keep still."""
+        targets = np.full((len(values), *mask.shape), np.nan)
+        targets[:, mask] = values
+        return self.by_targets(hands, targets)
 
     def by_targets(
-        self,
-        hands: list[str],
-        masks: list[NDArray[np.bool_]],
-        values: Iterable[Array],
-        until: Array | None = None,
+        self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Trials with targets for the joints in each one's mask (G, dof); the others keep still.
+        """Trials with one hand sequence or one each, and targets of shape ``(N, G, dof)``.
 
         With ``until`` (N,) the last one is the first whose reward exceeds its entry there. Those
         after it are not made: nothing of them is counted or known.
         """
-        targets = np.full((len(hands), *masks[0].shape), np.nan)
-        for target, mask, value in zip(targets, masks, values, strict=True):
-            target[mask] = value
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
-            self.reward, self.hands = float(rewards[best]), hands[best]
+            self.reward = float(rewards[best])
+            self.hands = hands if isinstance(hands, str) else hands[best]
             self._best_trial, self._targets = self.trials_made + best, trials.targets[best]
         self.trials_made += len(rewards)
         self.left -= len(rewards)

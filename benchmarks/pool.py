@@ -185,7 +185,7 @@ class Worker:
     """A worker process: the jobs that it has, in its order, and what it says of them."""
 
     def __init__(self, folder: str, workers: int, tasks: list[tuple[Task, bool]]) -> None:
-        context = worker_context()
+        context = worker_context("coartic.motion.compiler")  # once for all workers
         theirs, self._orders = context.Pipe(duplex=False)
         self._answers, answers = context.Pipe(duplex=False)
         self._prints, prints = context.Pipe(duplex=False)
@@ -399,10 +399,11 @@ class WorkerProcess(_Ordinary):  # type: ignore[misc]
             sys.modules["__main__"] = main
 
 
-def worker_context() -> Any:
-    """How workers begin, and what the server that they are forked from has imported."""
+def worker_context(*imported: str) -> Any:
+    """How workers begin, and what the server that they are forked from has imported beside this
+    module, if it has not begun yet."""
     context: Any = copy(multiprocessing.get_context(_START))
-    context.set_forkserver_preload(["coartic.benchmarks.pool"])
+    context.set_forkserver_preload(["coartic.benchmarks.pool", *imported])
     context.Process = WorkerProcess
     return context
 

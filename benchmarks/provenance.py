@@ -21,7 +21,6 @@ from coartic.threads import ONE_THREAD, threads_for
 _LIBRARIES = (
     "casadi",
     "clarabel",
-    "cma",
     "cvxpy",
     "daqp",
     "llvmlite",

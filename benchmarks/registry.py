@@ -12,7 +12,7 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from importlib import metadata
 from pathlib import Path
 
@@ -76,7 +76,7 @@ def built_in() -> Mapping[str, MethodCard]:
     cards: dict[str, MethodCard] = {}
     for name in MODULES:
         module = importlib.import_module(name)
-        code = code_of(Path(inspect.getfile(module)))  # once for its methods: it takes a while
+        code = cache(partial(code_of, Path(inspect.getfile(module))))  # once for its methods
         cards |= {method.name: card_of(method, BUILT_IN, name, code) for method in module.METHODS}
     return cards
 

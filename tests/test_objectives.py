@@ -19,7 +19,6 @@ from coartic.analysis.topics import objectives
 from coartic.analysis.topics.objectives import advantage, crossing, crossings, less_regret, rewards
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite
-from coartic.runs.run import movements_from
 from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
 from tests.support.made_up import MadeUp, row, study_of
@@ -57,12 +56,11 @@ def study(tmp_path_factory):
 
 def test_a_plan_is_scored_under_penalties_that_it_does_not_know(study):
     frame = rewards(study).set_index(["task", "term", "weight", "who"]).reward
-    movements, _ = study.movements
     for name in (f"one-armed/v1/d00{k}" for k in range(3)):
         (label,) = {label for _, label in study.cells if label.startswith("believed-reward/plan")}
         run = str(study.cells[name, label].good.run_id.iloc[0])
         plain = study.tasks[name]
-        execution = execute(plain, movements_from(plain, movements[run]))
+        execution = execute(plain, study.movements(name, label)[run])
         hits, hands = list(execution.configurations), list(hands_of(execution.hands))
         assert frame[name, "region", 0.0, "ticks"] == -execution.ticks
         for weight in (100.0, 300.0):

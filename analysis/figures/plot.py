@@ -134,6 +134,7 @@ def svg_for_page(plot: Plot) -> str:
     stream = io.StringIO()
     with rc_context({**RC, "svg.fonttype": "none"}):
         plot.figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
+    plot.figure.set_layout_engine("none")  # its file has the layout that it now has
     text = stream.getvalue()
     text = re.sub(rf'<g id="{TIP}([^"]*)">', r"<g><title>\1</title>", text[text.index("<svg") :])
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)

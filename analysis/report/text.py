@@ -9,7 +9,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic.analysis import words
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.paper import sentences as paper
@@ -60,6 +60,7 @@ def shown(text: str) -> str:
     return one_line(text).replace(" %", f"{words.NO_BREAK}%")
 
 
+@cached
 def answers(study: Study) -> list[dict[str, str]]:
     """The answers that a folder gives to the four questions, a dozen words each.
 

@@ -5,6 +5,8 @@ taken as known without error. Intervals are of the BCa bootstrap, and the edge c
 all in :func:`bootstrap_estimate`. Signatures have :func:`student` intervals, shares of runs
 Wilson's. Resampling has one seed, :data:`SEED`, which has nothing to do with the seeds of the runs.
 
+scipy.stats is imported where it is needed: it takes longer than drawing a figure.
+
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
 
@@ -20,7 +22,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy import special, stats
 
 from coartic.robot import Array
 
@@ -41,6 +42,7 @@ FEWER_RESAMPLES = 1_999
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
+_AT_ONCE = 1_000_000  # values of the resamples that are in memory
 NEGLIGIBLE = 1e-9
 """Values that differ by less than this share of their size do not differ: it is rounding."""
 
@@ -158,6 +160,8 @@ def bootstrap_estimate(
         return Estimate(value, value, value, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
+    from scipy import stats
+
     with warnings.catch_warnings():
         # scipy warns where BCa is undefined; that case is dealt with below.
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
@@ -166,7 +170,7 @@ def bootstrap_estimate(
             samples,
             statistic,
             n_resamples=resamples,
-            batch=100 if large else 1_000,
+            batch=max(1, min(100, _AT_ONCE // max(n))) if large else 1_000,
             vectorized=True,
             confidence_level=CONFIDENCE,
             method="percentile" if large else "BCa",
@@ -180,6 +184,8 @@ def bootstrap_estimate(
 
 def student(value: float, error: float, freedom: float, p: float = math.nan) -> Estimate:
     """A value with Student's interval, by its standard error and degrees of freedom."""
+    from scipy import special
+
     half = float(special.stdtrit(freedom, TAILS[1])) * error
     return Estimate(value, value - half, value + half, p)
 
@@ -200,5 +206,7 @@ def standard_deviation(values: Array) -> float:
 @cache
 def wilson(count: int, total: int) -> Estimate:
     """``count`` of ``total`` runs as a share, with Wilson's interval (1927)."""
+    from scipy import stats
+
     ends = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
     return Estimate(count / total, float(ends.low), float(ends.high))

@@ -18,7 +18,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from coartic.analysis.statistics.estimates import (
     NEGLIGIBLE,
@@ -97,6 +96,8 @@ def sign_flip_test(differences: ArrayLike) -> Estimate:
     mean, n = float(values.mean()), (len(values),)
     if len(values) < 2:
         return Estimate(mean, n=n)
+    from scipy import stats  # as in estimates
+
     result = stats.permutation_test(
         (values,),
         np.mean,
@@ -115,6 +116,8 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
 
     The estimate is the share seen less that one.
     """
+    from scipy import stats  # as in estimates
+
     p = float(stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))
 
@@ -138,6 +141,8 @@ def independence_test(
     pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
     *columns, (last, of_first) = sorted(pairs)
     if math.prod(count + 1 for count, _ in columns) > most_tables:
+        from scipy import stats  # as in estimates
+
         method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
         p = float(stats.fisher_exact(rows, method=method).pvalue)
         return Estimate(apart, p=p, n=(n, m))

@@ -20,7 +20,6 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.words import capital, estimate, number
 from coartic.robot import Array
-from coartic.runs.run import movements_from
 from coartic.tasks.task import address_of
 
 Solution = tuple[tuple[Movement, ...], CellRuns]
@@ -107,15 +106,12 @@ def rewards(study: Study) -> pd.DataFrame:
 @cached
 def plans_without_penalty(study: Study) -> dict[str, dict[str, Solution]]:
     """Plans of those that know of no penalty, and their runs, by task without a penalty."""
-    movements, waypoints = study.movements
     plans: dict[str, dict[str, Solution]] = {}
     for (name, label), cell in study.cells.items():
         who = WITHOUT_PENALTY.get(label.partition(" ")[0])
         if who and study.tasks[name].penalty is None and len(cell.good):
             run = str(cell.good.run_id.iloc[0])
-            task = study.tasks[name]
-            solution = movements_from(task, movements[run], waypoints.get(run))
-            plans.setdefault(name, {})[who] = solution, cell
+            plans.setdefault(name, {})[who] = study.movements(name, label)[run], cell
     return plans
 
 

@@ -24,7 +24,22 @@ from coartic.text import error_line, plain
 BUILT_IN = "built in"
 """Origin of this project's methods."""
 _LOADED: dict[tuple[str, str, str], type[Method]] = {}
-"""Methods that this process has imported, by :attr:`MethodCard.where`, name and code."""
+"""Methods that this process has imported, by :attr:`MethodCard.key`."""
+
+
+class Late:
+    """A text that may be given as a function, which is called when the text is first asked for."""
+
+    def __get__(self, card: MethodCard | None, _: object) -> str:
+        if card is None:
+            raise AttributeError  # it has no default
+        text = vars(card)["code"]
+        if callable(text):
+            text = vars(card)["code"] = text()
+        return str(text)
+
+    def __set__(self, card: MethodCard, text: str | Callable[[], str]) -> None:
+        vars(card)["code"] = text
 
 
 @dataclass(frozen=True)
@@ -42,22 +57,30 @@ class MethodCard:
     """Its parameters; None for one that has no default."""
     origin: str
     """``built in``, the distribution of a plug-in, or the path of a method file."""
-    code: str
-    """Hash of the code that its results come from."""
+    code: str = Late()  # type: ignore[assignment]
+    """Hash of the code that its results come from. It takes a while, and names need none."""
     where: str = field(default="", compare=False)
     """What a worker imports: the name of a module, or the path of a method file. Not stored."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: with the hash."""
+        return vars(self) | {"code": self.code}
 
     @property
     def is_ours(self) -> bool:
         """Whether it is one of this project's methods."""
         return self.origin == BUILT_IN
 
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Where it is imported from, its name and, as a file may change, its code."""
+        return self.where, self.name, "" if self.is_ours else self.code
+
     def load(self) -> type[Method]:
         """The method itself, imported once a process, unless its code has changed since."""
-        key = self.where, self.name, self.code
-        if key not in _LOADED:
-            _LOADED[key] = load_method(self.where, self.name)
-        return _LOADED[key]
+        if self.key not in _LOADED:
+            _LOADED[self.key] = load_method(self.where, self.name)
+        return _LOADED[self.key]
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
         """The method with these parameters."""
@@ -120,15 +143,16 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         ) from None
 
 
-def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodCard:
+def card_of(
+    method: type[Method], origin: str, where: str, code: str | Callable[[], str]
+) -> MethodCard:
     """The card of a method that is imported from ``where``."""
-    _LOADED[where, method.name, code] = method
     fields = method.Parameters.model_fields.items()
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in fields
     }
-    return MethodCard(
+    card = MethodCard(
         name=method.name,
         title=method.title,
         citation=method.citation,
@@ -137,9 +161,11 @@ def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodC
         stochastic=method.stochastic,
         defaults=json.loads(json.dumps(defaults, default=str)),
         origin=origin,
-        code=code,
+        code=code,  # type: ignore[arg-type]
         where=where,
     )
+    _LOADED[card.key] = method
+    return card
 
 
 def load_method(where: str, name: str) -> type[Method]:

@@ -262,19 +262,32 @@ def movements_from(
 
     ``paths`` holds the run's rows of ``paths``, for movements of kind ``path``.
     """
-    joints, rows = list(task.robot.joint_names), rows.sort_values("order")
+    alone = None if paths is None else paths.assign(run_id="")
+    return movements_by_run(task, rows.assign(run_id=""), alone).get("", ())
+
+
+def movements_by_run(
+    task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
+) -> dict[str, tuple[Movement, ...]]:
+    """The movements of each of several runs of a task, by run id, from their rows of ``solutions``
+    and of ``paths``."""
+    joints, rows = list(task.robot.joint_names), rows.sort_values(["run_id", "order"])
     targets = rows[joints].to_numpy(dtype=np.float64, copy=True)
-    columns = (rows[name].tolist() for name in ("order", "goal", "hand", "kind", "ticks"))
-    movements = []
-    for target, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):
-        waypoints = None
+    waypoints: dict[Any, Any] = {}
+    if paths is not None:
+        for key, points in paths.sort_values("waypoint").groupby(["run_id", "order"]):
+            waypoints[key] = points[joints].to_numpy(dtype=np.float64)
+    columns = (rows[name].tolist() for name in ("run_id", "order", "goal", "hand", "kind", "ticks"))
+    movements: dict[str, list[Movement]] = {}
+    for target, run_id, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):
+        path = None
         if kind == "path":
             if paths is None:
                 raise ValueError("a movement of kind 'path' needs its waypoints")
-            path = paths[paths["order"] == order].sort_values("waypoint")
-            waypoints = path[joints].to_numpy(dtype=np.float64)
-        movements.append(Movement(int(goal), hand, kind, target, int(ticks), waypoints))
-    return tuple(movements)
+            path = waypoints.get((run_id, order), np.empty((0, len(joints))))
+        movement = Movement(int(goal), hand, kind, target, int(ticks), path)
+        movements.setdefault(run_id, []).append(movement)
+    return {run_id: tuple(of_run) for run_id, of_run in movements.items()}
 
 
 def execute_all(

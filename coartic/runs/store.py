@@ -91,6 +91,9 @@ _ASKED_FOR = """
     FROM cells JOIN settings ON settings.id = cells.setting
     JOIN results ON results.setting = cells.setting
         AND results.suite_seed = (SELECT seed FROM suite) AND results.run < cells.runs"""
+_FIRST = f"""results.id IN (SELECT id FROM (
+    SELECT results.id, row_number() OVER (PARTITION BY cells.position ORDER BY run) AS place
+    {_ASKED_FOR} WHERE status = 'ok') WHERE place <= ?)"""
 _VIEWS = f"""
 DROP VIEW IF EXISTS runs;
 DROP VIEW IF EXISTS solutions;
@@ -164,6 +167,7 @@ class _Environment(_Stored):
     cores: int
 
 
+_ROWS = 2_000  # that are read at once
 _WAIT_S = 1.0  # for another program, before more is done about it
 _LOCK_TRIES = 20
 
@@ -377,12 +381,20 @@ class Store:
         table = self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
         return check_runs(table) if view == "runs" else table
 
-    def movements(self, part: str) -> pd.DataFrame:
-        """Movements of one part (:data:`PARTS`) of each run asked for, as view ``solutions``."""
+    def movements(self, part: str, most: int) -> pd.DataFrame:
+        """Movements of one part (:data:`PARTS`), as view ``solutions``, of the first runs of each
+        cell that are ok, so many at most."""
         query = f"""SELECT results.run_id, movements.* {_ASKED_FOR}
             JOIN movements ON movements.result_id = results.id AND part = ?
-            ORDER BY cells.position, results.run, "order" """
-        return self._table(query, part).drop(columns=["result_id", "part"])
+            WHERE {_FIRST} ORDER BY cells.position, results.run, "order" """
+        return self._table(query, part, most).drop(columns=["result_id", "part"])
+
+    def waypoints(self, most: int) -> pd.DataFrame:
+        """View ``paths`` of the same runs."""
+        query = f"""SELECT results.run_id, waypoints.* {_ASKED_FOR}
+            JOIN waypoints ON waypoints.result_id = results.id
+            WHERE {_FIRST} ORDER BY cells.position, results.run, "order", waypoint"""
+        return self._table(query, most).drop(columns="result_id")
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
@@ -526,14 +538,27 @@ class Store:
 
         rows = self._db.execute(query, values)
         names = [column[0] for column in rows.description]
-        columns = list(zip(*rows, strict=True)) or [() for _ in names]
-        arrays = {}
-        for name, column in zip(names, columns, strict=True):
-            try:
-                arrays[name] = pd.array(list(column), dtype=_DTYPES.get(name, "float64"))  # joints
-            except (ValueError, TypeError, OverflowError) as error:
-                raise ValueError(f"{name}: {error}") from None
-        return pd.DataFrame(arrays)
+        parts = [to_frame(names, [], {})]
+        texts: dict[str, str] = {}
+        while some := rows.fetchmany(_ROWS):
+            parts.append(to_frame(names, some, texts))
+        return parts[-1] if len(parts) < 3 else pd.concat(parts[1:], ignore_index=True)
+
+
+def to_frame(names: list[str], rows: list[Any], texts: dict[str, str]) -> pd.DataFrame:
+    """Rows of a query, with nullable types. Equal ``texts`` of all rows are one in memory."""
+    import pandas as pd
+
+    arrays = {}
+    columns = list(zip(*rows, strict=True)) or [() for _ in names]
+    for name, column in zip(names, columns, strict=True):
+        dtype = _DTYPES.get(name, "float64")  # joints
+        content = [texts.setdefault(v, v) if type(v) is str else v for v in column]
+        try:
+            arrays[name] = pd.array(content, dtype=dtype)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise ValueError(f"{name}: {error}") from None
+    return pd.DataFrame(arrays)
 
 
 def open_store(folder: Path) -> Store:

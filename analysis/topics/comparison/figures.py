@@ -193,9 +193,11 @@ def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
     ``best_high``, ``trials`` (mean over runs and the last ``window`` trials).
     """
-    trials_of = dict(study.rewards())
+    shown = [*cells_with_curve(study)]
+    wanted = {run for key in shown for run in study.cells[key].good.run_id}
+    trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
     curves = [pd.DataFrame()]
-    for task, label in cells_with_curve(study):
+    for task, label in shown:
         ids = map(str, study.cells[task, label].good.run_id)
         runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
         if runs:

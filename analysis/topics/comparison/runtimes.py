@@ -26,12 +26,14 @@ SPENDS = ("trials", "forward_kinematics", "solve_s")
 TARGETS = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
 BUDGET_RESAMPLES = 1_999
+_MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
+_FEWEST_RESAMPLES = 200
 RunningTimes = Sequence[Array]
 """Running times of one method: for each task, which count alike, what every run had spent at every
 target, shape ``(runs, 20)``; infinite where the target is not reached."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BestSoFar:
     """One run as a step function of what it spent.
 
@@ -40,12 +42,20 @@ class BestSoFar:
 
     rewards: Array
     """Best reward after each improvement, rising, shape ``(k,)``; empty without a solution."""
-    spent: dict[str, Array]
-    """Spend at each improvement, by kind, shape ``(k,)`` each."""
+    trials: Array
+    """Number of the trial of each improvement, from 1, shape ``(k,)``."""
+    made: int
+    """Trials made; a planner's step counts as one."""
     total: dict[str, float]
     """Spend of the whole run; NaN where it is not known, as for the time of cold runs."""
     learns: bool
     """Whether it made trials."""
+
+    def spent(self, spend: str) -> Array:
+        """Spend at each improvement, shape ``(k,)``."""
+        if self.learns and spend == "trials":
+            return self.trials
+        return self.total[spend] * (self.trials / self.made)
 
     @property
     def solved(self) -> bool:
@@ -55,12 +65,12 @@ class BestSoFar:
     def best(self, spend: str, budgets: Array) -> Array:
         """Best reward within each budget; -inf where there is no solution yet."""
         steps = np.concatenate([[-np.inf], self.rewards])
-        values: Array = steps[np.searchsorted(self.spent[spend], budgets, side="right")]
+        values: Array = steps[np.searchsorted(self.spent(spend), budgets, side="right")]
         return values
 
     def times(self, spend: str, targets: Array) -> Array:
         """Spend at which each target is reached; infinite where it never is."""
-        values: Array = np.append(self.spent[spend], math.inf)
+        values: Array = np.append(self.spent(spend), math.inf)
         return values[np.searchsorted(self.rewards, targets)]
 
 
@@ -75,7 +85,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`.scores.solve_times`: without building.
     """
-    trials_of = dict(study.rewards())
+    learned = {run_id: improvements(rewards) for run_id, rewards in study.rewards()}
     by_run = {}
     for cell in study.cells.values():
         times = scores.solve_times(cell.good).reindex(cell.runs.index)
@@ -83,26 +93,21 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
         totals = zip(*(scores.floats(runs[name]).tolist() for name in SPENDS), strict=True)
         rows = zip(map(str, runs.run_id), totals, runs.status, runs.reward, strict=True)
         for run_id, spent, status, reward in rows:
-            total, trials = dict(zip(SPENDS, spent, strict=True)), trials_of.get(run_id)
+            total = dict(zip(SPENDS, spent, strict=True))
             if status != "ok":
-                none = np.empty(0)
-                steps = none, dict.fromkeys(SPENDS, none)
-            elif trials is None:
-                spent_at_once = {name: np.array([value]) for name, value in total.items()}
-                steps = np.array([float(reward)]), spent_at_once
+                steps = np.empty(0), np.empty(0), 1
             else:
-                steps = improvements(trials, total)
-            by_run[run_id] = BestSoFar(*steps, total, learns=trials is not None)
+                steps = learned.get(run_id, (np.array([float(reward)]), np.ones(1), 1))
+            by_run[run_id] = BestSoFar(*steps, total, learns=run_id in learned)
     return by_run
 
 
-def improvements(rewards: Array, total: dict[str, float]) -> tuple[Array, dict[str, Array]]:
-    """Rewards and spends of a run's steps, from the reward of each of its trials, NaN if failed."""
+def improvements(rewards: Array) -> tuple[Array, Array, int]:
+    """Rewards and trials of a run's steps and the number of trials, from the reward of each of
+    them, NaN if failed."""
     best = np.maximum.accumulate(np.where(np.isnan(rewards), -np.inf, rewards))
     steps = np.flatnonzero(best > np.concatenate([[-np.inf], best[:-1]]))
-    number = (steps + 1).astype(np.float64)
-    spent = {name: total[name] * (number / len(rewards)) for name in SPENDS}
-    return best[steps], spent | {"trials": number}
+    return best[steps], (steps + 1).astype(np.float64), len(rewards)
 
 
 def steps_of(study: Study, cell: CellRuns) -> list[BestSoFar]:
@@ -153,16 +158,21 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
     targets = np.ceil(initial + shares * (optimum - initial) - 1e-9)
     runs = steps_of(study, cell)
     known = [run for run in runs if not run.solved or np.isfinite(run.total[spend])]
-    return np.array([run.times(spend, targets) for run in known])
+    times = np.empty((len(known), len(targets)))
+    for row, run in zip(times, known, strict=True):
+        row[:] = run.times(spend, targets)
+    return times
 
 
-def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int64]]:
+def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
     """Running times of all pairs of run and target in ascending order, their weights, which sum to
     1, and the number of the run of each."""
     values = np.concatenate([of_task.ravel() for of_task in times])
-    weights = [np.full(of_task.size, 1 / of_task.size / len(times)) for of_task in times]
     order = np.argsort(values, kind="stable")
-    return values[order], np.concatenate(weights)[order], order // times[0].shape[1]
+    values = values[order]
+    weights = [np.full(of_task.size, 1 / of_task.size / len(times)) for of_task in times]
+    runs = (order // times[0].shape[1]).astype(np.int32)  # of very many runs
+    return values, np.concatenate(weights)[order], runs
 
 
 def ecdf(times: RunningTimes) -> tuple[Array, Array]:
@@ -198,18 +208,19 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     if min(sizes) < FEWEST:
         return Estimate(budget(weights))
     rng = np.random.default_rng(SEED)
-    drawn = np.concatenate([times_drawn(size, rng) for size in sizes], axis=1)
+    resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
+    drawn = np.concatenate([times_drawn(size, resamples, rng) for size in sizes], axis=1)
     budgets = [budget(weights * counts[runs]) for counts in drawn]
     low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
     return Estimate(budget(weights), float(low), float(high))
 
 
-def times_drawn(size: int, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """How often each of so many runs is drawn in each resample, ``(BUDGET_RESAMPLES, size)``.
+def times_drawn(size: int, resamples: int, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """How often each of so many runs is drawn in each resample, shape ``(resamples, size)``.
 
     A byte each, as there may be many runs: none is drawn 256 times.
     """
-    shares, drawn = np.full(size, 1 / size), np.empty((BUDGET_RESAMPLES, size), dtype=np.uint8)
+    shares, drawn = np.full(size, 1 / size), np.empty((resamples, size), dtype=np.uint8)
     for row in drawn:
         row[:] = rng.multinomial(size, shares)
     return drawn

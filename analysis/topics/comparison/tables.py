@@ -186,7 +186,7 @@ def learning(study: Study) -> Rows:
         best = np.array([run.best("trials", budgets) for run in runs])
         best[~np.isfinite(best)] = math.nan
         initial = initial_reward(study.tasks[task], study.model)
-        halves = [half_gain(initial, run.rewards, run.spent["trials"]) for run in runs]
+        halves = [half_gain(initial, run.rewards, run.spent("trials")) for run in runs]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {
             "task": marked(study.tasks[task].label, study.tasks[task]),
