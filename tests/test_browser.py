@@ -220,11 +220,13 @@ STATE = """[...document.querySelectorAll("select[id], input[id]")].map(each => e
 def test_the_address_holds_the_view(opened, address):
     page = opened(reduced_motion="reduce")
     untouched = page.evaluate(STATE)
+    names = "#next-goal-moved", "#next-goal-place", "#player-tick"
+    moved, at, first = (page.locator(name).input_value() for name in names)
     assert page.url == address
     page.focus("#next-goal-moved")
     page.select_option("#next-goal-moved", "2")
     page.locator("#next-goal-place").fill("5")
-    page.wait_for_url("**?next-goal-moved=2&next-goal-place=5#next-goal")
+    page.wait_for_url("**?next-goal-moved=2&next-goal-place=5#*")
     # A link is not changed by what moves by itself, and by being scrolled to.
     moving = opened(link=page.url, reduced_motion="no-preference")
     moving.locator("#player").scroll_into_view_if_needed()
@@ -250,10 +252,10 @@ def test_the_address_holds_the_view(opened, address):
     # Back at the beginning nothing is left of it.
     page.evaluate("scrollTo(0, 0)")
     page.select_option("#claims-verdict", "")
-    page.select_option("#next-goal-moved", untouched[0])
-    page.locator("#next-goal-place").fill(untouched[1])
+    page.select_option("#next-goal-moved", moved)
+    page.locator("#next-goal-place").fill(at)
     page.select_option("#player-view", "0")
-    page.locator("#player-tick").fill(untouched[5])
+    page.locator("#player-tick").fill(first)
     page.wait_for_url(address)
     # What an old link names and the page does not have is left out.
     odd = opened(link=f"{address}?player-0=nobody&player-tick=x&nothing=1", reduced_motion="reduce")
@@ -282,11 +284,41 @@ def test_printing_shows_every_picture_once(opened):
     figures = page.locator("figure").all()
     assert figures
     for figure in figures:
-        assert [svg.is_visible() for svg in figure.locator("svg").all()] == [True]
+        drawn = figure.locator(".drawn svg")
+        assert [svg.is_visible() for svg in drawn.all()].count(True) == 1
     ids = [figure.get_attribute("id") for figure in figures]
     assert len(ids) == len(set(ids))
     ink = page.evaluate("getComputedStyle(document.body).color")
     assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
+
+
+OVERFLOWS = """[...document.querySelectorAll("main *")].filter(each => each.checkVisibility()
+    && !each.closest("svg") && getComputedStyle(each).display != "inline"
+    && (each.scrollHeight > each.clientHeight + 1 || each.scrollWidth > each.clientWidth + 1))
+    .map(each => each.outerHTML.slice(0, 80))"""
+
+
+def test_in_print_nothing_leaves_its_box_and_no_film_is_there(opened):
+    page = opened(688)  # A4 within its margins
+    page.emulate_media(media="print")
+    assert page.evaluate(OVERFLOWS) == []
+    assert not page.locator("#player").is_visible()
+
+
+def test_panels_stack_on_a_narrow_screen_and_their_curves_go_by_the_key(opened):
+    page = opened(390)
+    figure = page.locator("#figure-learning-curves")
+    panels = [box.bounding_box() for box in figure.locator(".pieces svg").all()]
+    assert len(panels) == 3  # tasks
+    assert len({round(box["x"]) for box in panels}) == 1
+    assert all(box["x"] + box["width"] <= 390 and box["width"] > 250 for box in panels)
+    lines = page.locator("#figure-learning-curves .drawn > svg [data-curve='learner EC1']")
+    shown = "each => each.map(line => getComputedStyle(line).display)"
+    assert set(lines.evaluate_all(shown)) == {"inline"}
+    figure.get_by_role("button", name="learner EC1").click()
+    assert set(lines.evaluate_all(shown)) == {"none"}
+    figure.get_by_role("button", name="learner EC1").press("Enter")
+    assert set(lines.evaluate_all(shown)) == {"inline"}
 
 
 def test_without_scripts_all_is_there(browser, address):

@@ -17,10 +17,10 @@ import pandas as pd
 
 from coartic import CoarticError
 from coartic.analysis.claims.register import CLAIMS, Verdict
-from coartic.analysis.figures.plot import Plot, picture, svg_for_page
+from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
-from coartic.analysis.report.next_goal import next_goal
+from coartic.analysis.report.next_goal import locus_postures, next_goal
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player_json
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
@@ -36,8 +36,7 @@ SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
 LONG = 20
 """Rows of a table above which it scrolls in a box of its own."""
-_MAGNIFIED = 1.3  # figures on the page
-_PHONE = 320 / 72  # inches: a phone scrolls what is wider
+_PHONE = 320 / 72  # inches: a phone stacks panels, or scrolls one that is wider
 
 
 def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
@@ -138,8 +137,9 @@ def sections(study: Study) -> list[dict[str, Any]]:
         inches = plot.figure.get_figwidth() if plot else 0.0
         figure = plot and {
             **{"id": plot.id, "title": plot.title, "caption": plot.caption},
-            **{"svg": svg_for_page(plot), "wide": inches > _PHONE},
-            "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
+            **for_page(plot)._asdict(),
+            "wide": inches > _PHONE,
+            "width": f"{MAGNIFIED * inches * 72 / 12:.0f}",
         }
         words = {"finding": finding(section, study), "rows": table, "figure": figure}
         allowed.append({**vars(section), **words})
@@ -163,6 +163,7 @@ def page(study: Study) -> str:
         description=" ".join(answer["text"] for answer in answers(study)),
         styles="".join((here / f"{name}.css").read_text("utf-8") for name in ("page", "next_goal")),
         next_goal=next_goal(study),
+        is_example=locus_postures(study).empty,
         script=script,
         player=player.replace("<", "\\u003c"),
         answers=[answer for answer in answers(study) if answer["id"] in ids],

@@ -52,12 +52,23 @@ def column_of(name: str) -> Column:
     return COLUMNS.get(name, Column())
 
 
+def header_of(frame: pd.DataFrame, name: str) -> str:
+    """What stands above a column; a task by its name, with † where it is reconstructed."""
+    kind, _, task = name.partition(" ")
+    if kind == "on" and (known := frame.attrs.get("tasks", {}).get(task)):
+        return f"{known} (%)"
+    return column_of(name).header or name.replace("_", " ")
+
+
 def columns_of(frame: pd.DataFrame) -> dict[str, str]:
     """Columns of a table that the page and LaTeX show, with their headers."""
     headers = {}
-    for name in frame.columns:
+    names = list(frame.columns)
+    if "verdict" in names:  # it is what one looks for, also where a screen has room for two columns
+        names.insert(1, names.pop(names.index("verdict")))
+    for name in names:
         if not name.endswith(_COMPANIONS) and column_of(name).page:
-            header = column_of(name).header or name.replace("_", " ")
+            header = header_of(frame, name)
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
             interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
             headers[name] = f"{header}{interval}"

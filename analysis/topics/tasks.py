@@ -30,7 +30,7 @@ def tasks(study: Study) -> Rows:
         task, label = study.tasks[name], best_condition(study, name)
         best = study.optima.get(name)
         row: Row = {
-            "task": marked(task.label, task),
+            "task": marked(task),
             "arms": len(task.hands),
             "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
             "optimum": best.reward if best else None,

@@ -122,7 +122,7 @@ def signatures(study: Study) -> Rows:
                 means = values.groupby("signature").value.mean()
                 cell = study.cells[task, label]
                 row: Row = {
-                    "task": marked(study.tasks[task].label, study.tasks[task]),
+                    "task": marked(study.tasks[task]),
                     "method": label,
                     "runs": len(cell.good),
                     **{

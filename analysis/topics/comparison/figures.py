@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from coartic import Task
 from coartic.analysis import methods
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
-from coartic.analysis.words import in_brackets, number
+from coartic.analysis.words import in_brackets, marked, number
 from coartic.robot import Array
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
@@ -49,10 +49,10 @@ def gaps_to_optimum(study: Study) -> Parts:
     groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]
     heights = [len(of_group) + 0.8 for _, of_group in groups]
-    size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
+    size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
-        draw_group(axes, group, of_group, style.looks(rows.method))
+        draw_group(axes, group, of_group, looks_in(study, rows.method))
     farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
@@ -100,14 +100,16 @@ def ecdf_of_runtimes(study: Study) -> Parts:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
-        draw_shares(axes, data[data.spend == spend], style.looks(data.method))
+        draw_shares(axes, data[data.spend == spend], looks_in(study, data.method))
+        axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
-    panels[0].set_ylabel("targets reached (%)")
+        axes.set_ylabel("targets reached (%)")
+        axes.tick_params(labelleft=True)
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
     names = dict(zip(map(methods.name_of, ends.method), ends.share, strict=True))
-    style.label_ends(panels[-1], names, 5.5)
+    style.label_ends(panels[-1], names, 6.2)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
@@ -144,7 +146,9 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
         line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
-        style.tip(drawn, f"{methods.name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
+        name = methods.name_of(str(label))
+        style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
+        style.curve(name, drawn)
     axes.set_xlim(edge, most)
     axes.set_ylim(-2, 102)
 
@@ -165,19 +169,19 @@ def reward_by_trial(study: Study) -> Parts:
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
-    size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
+    size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
     drawing, panels = style.figure_of((rows, columns), size, len(tasks))
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         draw_curves(axes, study, task, data[data.task == task.name], labels)
-        axes.set_title(style.heading(task))
-        axes.set_ylabel("" if place % columns else "reward (ticks)")
+        axes.set_title(marked(task))
+        axes.set_ylabel("reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
         style.entry(methods.name_of(label), linewidth=1.3, **look)
-        for label, look in style.looks(labels).items()
+        for label, look in looks_in(study, labels).items()
     ]
-    handles += [style.entry("initial", **style.INITIAL)]
+    handles += [style.entry("initial solution", **style.INITIAL)]
     handles += [style.entry(scores.optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
@@ -246,22 +250,23 @@ def draw_curves(
     axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
 ) -> None:
     """Curves of the methods on a task, between its initial solution and its optimum."""
-    look_of = style.looks(labels)
+    look_of = looks_in(study, labels)
     for label, rows in data.groupby("method", sort=False):
         look = look_of[str(label)]
-        axes.fill_between(
-            rows.trial, rows.best_low, rows.best_high, color=look["color"], alpha=0.22, linewidth=0
-        )
-        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
-        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+        band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
+        middle_half = axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
+        best = axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+        style.curve(methods.name_of(str(label)), middle_half, *best, *trials)
     floor, top = data.best.min(), data.best_high.max()
     initial = initial_reward(task, study.model)
     if not math.isnan(initial):
-        axes.axhline(initial, **style.INITIAL)
+        style.curve("initial solution", axes.axhline(initial, **style.INITIAL))
         floor, top = initial, max(top, initial)
     optimum = study.optima.get(task.name)
     if optimum is not None:
-        axes.axhline(optimum.reward, **style.OPTIMUM)
+        name = scores.optimum_in_words(study)
+        style.curve(name, axes.axhline(optimum.reward, **style.OPTIMUM))
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)

@@ -58,7 +58,7 @@ def against_learner(study: Study) -> Rows:
         drawn = study.plan.methods[cell.method].stochastic
         rewards = cell.rewards if drawn else float(cell.rewards[0])
         row: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "task": marked(study.tasks[task]),
             "method": label,
             "runs": len(cell.runs),
             "reward": cell.rewards.mean(),
@@ -189,7 +189,7 @@ def learning(study: Study) -> Rows:
         halves = [half_gain(initial, run.rewards, run.spent("trials")) for run in runs]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "task": marked(study.tasks[task]),
             "method": label,
             "runs": len(runs),
             "initial": initial,
@@ -215,5 +215,5 @@ def methods(study: Study) -> Rows:
         task, label = row["task"], row["method"]
         if task in one_by_one(study):
             values = {str(name): value for name, value in row.items()}
-            values["task"] = marked(study.tasks[task].label, study.tasks[task])
+            values["task"] = marked(study.tasks[task])
             yield f"{task} {label}", values | runs_of(study.cells[task, label])
