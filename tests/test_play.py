@@ -209,7 +209,7 @@ SOLVE = """(task, seeds, trials, horizons) => {
   const problem = coartic.problem_of(task);
   const shown = (trial) => ({
     reward: trial.reward,
-    movements: trial.movements.map(({ goal, hand, kind, target }) => ({ goal, hand, kind, target })),
+    movements: trial.movements,
   });
   const found = seeds.map((seed) => {
     const search = new coartic.Search(problem, seed, trials);

@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, new, paper, read, run, share
+from coartic.cli import draw, new, paper, play, read, run, share
 from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
@@ -49,7 +49,7 @@ def _options(
 for command in (
     *(run.run, run.list_, run.check, run.reproduce),
     *(read.report, read.runtimes, read.trace, read.compare, read.verify, read.cite),
-    *(draw.draw, draw.animate),
+    *(draw.draw, draw.animate, play.play),
     *(share.merge, share.standings, share.export),
 ):
     app.command(name=command.__name__.removesuffix("_"))(command)

@@ -898,13 +898,12 @@ class Search {
 
 /* ---- A plan that looks ahead (as coartic/baselines/receding_horizon.py, by a local search) ---- */
 
-/* How the way of a hand to a goal changes with some joints, and that way, once the hand is placed. */
-function pull_of(problem, q, number, hand, joints) {
+/* The way from a point of an arm, its hand or an elbow, to a place, and how that point moves with some joints. */
+function pull_of(problem, q, place, hand, joints, tip = problem.arms[hand].links.length) {
   const arm = problem.arms[hand];
-  const tip = arm.links.length;
   chain(q, arm, xs, ys);
-  const dx = problem.goals[number][0] - xs[tip];
-  const dy = problem.goals[number][1] - ys[tip];
+  const dx = place[0] - xs[tip];
+  const dy = place[1] - ys[tip];
   const rows = joints.map((j) => {
     if (j < BASE_DOF) return j ? [0, 1] : [1, 0];
     const k = j - arm.first;
@@ -913,10 +912,10 @@ function pull_of(problem, q, number, hand, joints) {
   return { dx, dy, distance: Math.sqrt(dx * dx + dy * dy), rows };
 }
 
-/* Move `q` to a near posture, by some joints, with the hand within `radius` of a goal; whether it gets there. */
-function project(problem, q, number, hand, joints, radius) {
+/* Move `q` to a near posture, by some joints, with that point within `radius` of a place; whether it gets there. */
+function project(problem, q, place, hand, joints, radius, tip) {
   for (let round = 0; round < 60; round += 1) {
-    const { dx, dy, distance, rows } = pull_of(problem, q, number, hand, joints);
+    const { dx, dy, distance, rows } = pull_of(problem, q, place, hand, joints, tip);
     if (distance <= radius + 1e-9) return true;
     const share = (distance - radius) / distance;
     let [a, b, c] = [1e-9, 0, 1e-9];
@@ -941,7 +940,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
   const radius = problem.radius * (1 - 1e-3);
   const corners = guess.map((corner) => Float64Array.from(corner));
   const strides = corners.map(() => 1);
-  if (!corners.every((corner, k) => project(problem, corner, from + k, hands[k], joints, radius))) return null;
+  if (!corners.every((corner, k) => project(problem, corner, problem.goals[from + k], hands[k], joints, radius))) return null;
   for (let round = 0; round < rounds && Math.max(...strides) > 1e-3; round += 1) {
     corners.forEach((here, k) => {
       const before = k ? corners[k - 1] : q;
@@ -949,7 +948,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
       const w = 1 / (apart(here, before) + 1e-6);
       const v = after ? 1 / (apart(here, after) + 1e-6) : 0;
       const way = here.map((value, j) => (w * before[j] + (after ? v * after[j] : 0)) / (w + v) - value);
-      const { dx, dy, distance, rows } = pull_of(problem, here, from + k, hands[k], joints);
+      const { dx, dy, distance, rows } = pull_of(problem, here, problem.goals[from + k], hands[k], joints);
       if (distance > radius - 1e-6) { // on the rim it slides along
         const inward = rows.map(([x, y]) => x * dx + y * dy);
         const share = inward.reduce((sum, value, i) => sum + value * way[joints[i]], 0)
@@ -958,7 +957,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
       }
       const there = here.map((value, j) => value + strides[k] * way[j]);
       const around = (corner) => apart(corner, before) + (after ? apart(corner, after) : 0);
-      const shorter = project(problem, there, from + k, hands[k], joints, radius) && around(there) < around(here) - 1e-9;
+      const shorter = project(problem, there, problem.goals[from + k], hands[k], joints, radius) && around(there) < around(here) - 1e-9;
       strides[k] = shorter ? Math.min(1, 1.5 * strides[k]) : strides[k] / 2;
       if (shorter) corners[k] = there;
     });

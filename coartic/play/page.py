@@ -2,8 +2,127 @@
 
 from __future__ import annotations
 
+import json
+from functools import cache
 from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+import coartic
+from coartic.learner.learning import learn
+from coartic.robot import Array
+from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
 MODEL = FOLDER / "model.js"
 """The model in JavaScript."""
+SCRIPTS = ("gif.js", "picture.js", "play.js")
+UP_OR_DOWN = ("ascending", "descending")
+"""Tasks that share the start and the first goal: with them the page begins."""
+
+
+def play_page(task: Task | None = None) -> str:
+    """The page as HTML; it begins with a task, or with one first goal before two others."""
+    template = templates().get_template("page.html.jinja")
+    presets = presets_of(shipped_tasks().values())
+    if task is not None:
+        own = preset_of(task)
+        presets = [own, *(preset for preset in presets if preset != own)]
+    else:
+        up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
+        both = {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
+        presets.insert(0, both)
+    return template.render(
+        styles="".join((FOLDER / name).read_text("utf-8") for name in ("page.css", "play.css")),
+        still=still(),
+        data=as_json({"presets": presets}),
+        model=model_script(),
+        script=script(),
+        version=coartic.__version__,
+    )
+
+
+def presets_of(tasks: Any) -> list[dict[str, Any]]:
+    """Tasks as the figure offers them."""
+    return [preset_of(task) for task in tasks]
+
+
+def preset_of(task: Task) -> dict[str, Any]:
+    """A task as the figure offers it."""
+    keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot", "penalty"}
+    mark = "†" if "goals" in task.reconstructed else ""
+    content = task.model_dump(mode="json", include=keys)
+    return {"label": f"{task.label}{mark}", "task": content}
+
+
+def model_script() -> str:
+    """The model and the worker that makes trials by it."""
+    return "\n".join(text_of(name) for name in ("model.js", "worker.js"))
+
+
+def script() -> str:
+    """What shows them, and begins."""
+    return "\n".join(text_of(name) for name in (*SCRIPTS, "begin.js"))
+
+
+def text_of(name: str) -> str:
+    """A script, in a page."""
+    return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
+
+
+def as_json(data: Any) -> str:
+    """Data within a page."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def still() -> str:
+    """The picture where scripts are switched off; :func:`draw_still` has made it."""
+    return (FOLDER / "still.svg").read_text("utf-8")
+
+
+def draw_still() -> str:
+    """Both robots of the first view as they hit goal 1 after learning, as SVG."""
+    tasks = [shipped_tasks()[name] for name in UP_OR_DOWN]
+    shapes = []
+    for name, task in zip(("first", "second"), tasks, strict=True):
+        q = learn(task, "EC1", seed=0).execute().configurations[0]
+        arm = task.robot.joint_positions(q, "right")
+        joints = "".join(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r=".06"/>' for x, y in arm)
+        shapes.append(
+            f'<g style="--own: var(--{name})">'
+            f'<polygon points="{points(task.robot.base_outline(q))}"/><polyline points="{points(arm)}"/>{joints}</g>'
+        )
+        for number, (x, y) in enumerate(task.goals, 1):
+            shapes.append(
+                f'<circle class="goal" cx="{x}" cy="{-y}" r="{task.radius}"/>'
+                f'<text x="{x + 0.2}" y="{-y - 0.2}">{number}</text>'
+            )
+    style = (
+        "svg g{fill:none;stroke:var(--own);stroke-width:.05;stroke-linejoin:round}"
+        "svg g circle{fill:var(--own)}svg .goal{fill:none;stroke:var(--ink);stroke-width:.03}"
+        "svg text{fill:var(--ink);font-size:.35px}"
+    )
+    title = "Two robots hit goal 1; they stand differently, since their next goals differ."
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 -4.5 7.5 9" role="img" '
+        f'aria-label="{title}"><style>{style}</style>{"".join(shapes)}</svg>\n'
+    )
+
+
+def points(of: Array) -> str:
+    """Points as SVG has them, with y downwards."""
+    return " ".join(f"{x:.3f},{-y:.3f}" for x, y in of)
+
+
+@cache
+def templates() -> Environment:
+    """The templates beside this file."""
+    return Environment(
+        loader=FileSystemLoader(FOLDER),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
