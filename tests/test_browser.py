@@ -1,21 +1,12 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
-import os
 import re
-import shutil
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
 
 from coartic import load_task
-
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-BROWSER = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(
-    BROWSER is None, reason="no Chromium is installed; set COARTIC_BROWSER to the one to use"
-)
 
 
 @pytest.fixture(scope="module")
@@ -24,38 +15,14 @@ def address(report):
     return (report / "report.html").as_uri()
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
 @pytest.fixture
-def opened(browser, address):
+def opened(visited, address):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
-    problems, contexts = [], []
 
     def open_page(width=1280, link=address, **options):
-        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: problems.append(message.text))
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.on(
-            "request",
-            lambda asked: (
-                None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
-            ),
-        )
-        page.goto(link)
-        return page
+        return visited(link, width, **options)
 
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert problems == []
+    return open_page
 
 
 IN_SIGHT = """rows => rows.filter(row => row.checkVisibility())

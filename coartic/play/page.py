@@ -89,10 +89,11 @@ def draw_still() -> str:
     for name, task in zip(("first", "second"), tasks, strict=True):
         q = learn(task, "EC1", seed=0).execute().configurations[0]
         arm = task.robot.joint_positions(q, "right")
+        outline, line = points(task.robot.base_outline(q)), points(arm)
         joints = "".join(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r=".06"/>' for x, y in arm)
         shapes.append(
-            f'<g style="--own: var(--{name})">'
-            f'<polygon points="{points(task.robot.base_outline(q))}"/><polyline points="{points(arm)}"/>{joints}</g>'
+            f'<g style="--own: var(--{name})"><polygon points="{outline}"/>'
+            f'<polyline points="{line}"/>{joints}</g>'
         )
         for number, (x, y) in enumerate(task.goals, 1):
             shapes.append(

@@ -11,7 +11,7 @@ const MOST_GOALS = 6;
 const FAR = 12; // length units: no goal is moved farther
 const ROLES = ["first", "second"];
 const NAMES = {
-  alone: "one goal at a time", learner: "the learner", "cma-es": "CMA-ES", plan: "the planner", you: "you",
+  alone: "one goal at a time", learner: "the learner", "cma-es": "evolution (CMA-ES)", plan: "the planner", you: "you",
 };
 const short = (value) => Number(value.toFixed(2)).toString();
 
@@ -21,21 +21,22 @@ const AT_FIRST = {
   tick: 0, speed: 1, pauses: 1, own: null, edited: 1,
 };
 
+/* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
 function written(state) {
-  const said = new URLSearchParams();
-  Object.entries(state).forEach(([name, value]) => {
-    if (JSON.stringify(value) !== JSON.stringify(AT_FIRST[name])) said.set(name, typeof value === "string" ? value : JSON.stringify(value));
-  });
-  return said.toString();
+  const text = (value) => (Array.isArray(value) ? value.map((row) => row.join(",")).join(";") : `${value}`);
+  return Object.entries(state).filter(([name, value]) => value !== AT_FIRST[name])
+    .map(([name, value]) => `${name}=${text(value)}`).join("&");
 }
 
-function read(text) {
+function read(link) {
   const state = { ...AT_FIRST };
-  new URLSearchParams(text).forEach((value, name) => {
-    if (!(name in AT_FIRST)) return;
-    try {
-      state[name] = typeof AT_FIRST[name] === "string" ? value : JSON.parse(value);
-    } catch { /* an old or broken link: as at first */ }
+  new URLSearchParams(link).forEach((text, name) => {
+    if (typeof AT_FIRST[name] === "string") state[name] = text;
+    else if (typeof AT_FIRST[name] === "number" && Number.isFinite(Number(text))) state[name] = Number(text);
+    else if (AT_FIRST[name] === null) {
+      const rows = text.split(";").filter(Boolean).map((row) => row.split(",").map(Number));
+      if (rows.flat().every(Number.isFinite)) state[name] = rows;
+    }
   });
   return state;
 }
@@ -78,6 +79,7 @@ class Play {
     this.worker = new Worker(URL.createObjectURL(new Blob([data.source], { type: "text/javascript" })));
     this.worker.onmessage = ({ data: message }) => this.hear(message);
     this.worker.postMessage({ measure: data.presets[0].task });
+    this.fresh = new Set(); // what answers the present question
     root.classList.add("live");
     this.restore();
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
@@ -125,7 +127,8 @@ class Play {
   }
 
   get budget() {
-    const most = this.rate ? RUN_S * this.rate : BUDGETS[0];
+    const cost = this.state.who === "cma-es" ? 5 : 1; // of a trial, beside that of a trial of the learner
+    const most = (RUN_S * this.rate) / cost;
     return BUDGETS.findLast((trials) => trials <= most) || BUDGETS[0];
   }
 
@@ -149,15 +152,17 @@ class Play {
     const jobs = [];
     this.tasks.forEach((task, k) => {
       const { model } = this.data;
+      if (!this.alone[k].going) return; // a goal is out of reach
       if (learns && !this.stored(who)) {
         const seeds = this.state.others ? SEEDS : 1;
         for (let seed = 0; seed < seeds; seed += 1) {
-          jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: this.budget, turn: seed ? 1 : 0 });
+          jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: this.budget, turn: seed && seed + 1 });
         }
       }
       if (who === "plan") jobs.push({ key: `${k} plan`, task, model, horizon: this.state.ahead, trials: 1 });
-      else if (!this.stored(who)) jobs.push({ key: `${k} far`, task, model, horizon: MOST_GOALS, trials: 1, turn: 2 });
+      else if (!this.stored(who)) jobs.push({ key: `${k} far`, task, model, horizon: MOST_GOALS, trials: 1, turn: 1 });
     });
+    this.asked = jobs.length;
     if (!jobs.length) this.busy = false;
     this.worker.postMessage({ order: this.order, jobs });
   }
@@ -213,7 +218,7 @@ class Play {
     });
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
-    this.plan = this.problems.map((_, k) => this.snapshot(`${k} far`, Infinity));
+    this.plan = this.problems.map((_, k) => (this.stale || !this.fresh.has(`${k} far`) ? null : this.snapshot(`${k} far`, Infinity)));
     this.refresh();
   }
 
@@ -316,7 +321,7 @@ class Play {
     stage.begin(this.view);
     stage.grid(colours.line);
     const tick = Math.min(state.tick, this.last);
-    this.movers.forEach((mover) => {
+    if (!this.editing) this.movers.forEach((mover) => {
       const row = this.row(mover, tick);
       mover.problem.hands.forEach((hand) => stage.trail(mover.trail(hand, row), colours[mover.role], hand === LEFT));
     });
@@ -369,8 +374,9 @@ class Play {
       const runs = [];
       for (let seed = 0; (who === "learner" || who === "cma-es") && seed < SEEDS; seed += 1) {
         const found = this.snapshot(`${k} run ${seed}`);
-        const at = this.results.get(`${k} run ${seed}`);
-        if (found && (seed === 0 || at.done || found.trials >= this.shown)) runs.push(seed ? found.reached[0] : mover.trial.reached[0] || found.reached[0]);
+        const complete = this.fresh.has(`${k} run ${seed}`) && (this.results.get(`${k} run ${seed}`).done || found.trials >= this.shown);
+        if (seed && found && complete) runs.push(found.reached[0]);
+        if (!seed && mover.trial.reached.length) runs.push(mover.trial.reached[0]);
       }
       if (!runs.length && mover.trial.reached.length) runs.push(mover.trial.reached[0]);
       const mean = runs.length ? runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length) : null;
@@ -504,7 +510,13 @@ class Play {
     }
     let finding = "";
     if (missed >= 0) finding = `Goal ${main[missed].trial.reached.length + 1} is out of the robot's reach.`;
-    else if (this.difference) {
+    else if (main.length < 2 && state.who !== "alone") {
+      const saved = main[0].trial.reward - this.alone[0].reward;
+      finding = `${Math.abs(saved)} ticks ${saved < 0 ? "more" : "fewer"} than one goal at a time.`;
+      if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) finding = "You are as fast as the planner!";
+    } else if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) {
+      finding = "They hit goal 1 with different hands.";
+    } else if (this.difference) {
       const { spreads, distance, n, m, chance } = this.difference;
       if (spreads === null) {
         finding = distance < 0.005 ? "At goal 1 the two robots stand alike." : `At goal 1 their postures lie ${short(distance)} apart.`;
@@ -527,8 +539,10 @@ class Play {
     this.find("stage").setAttribute("aria-label", words([
       `${main.length > 1 ? "Two robots" : "A robot"} and ${this.problems[0].goals.length} goals; ${name}.`, finding,
     ]));
+    const open = this.busy || this.stale || !this.rate || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked;
+    this.root.toggleAttribute("data-settled", !open);
     const spoken = words([...this.find("score").children].map((line) => `${line.textContent};`).concat(finding));
-    if (!this.playing && !this.busy && !this.held && spoken !== this.spoken) {
+    if (!this.playing && !open && !this.held && spoken !== this.spoken) {
       this.find("status").textContent = spoken;
       this.spoken = spoken;
     }
@@ -610,7 +624,8 @@ class Play {
       event.preventDefault();
       const by = event.shiftKey ? 0.02 : 0.1;
       this.showMeeting();
-      handle.move([handle.at[0] + by * way[0], handle.at[1] + by * way[1]]);
+      handle.at = [handle.at[0] + by * way[0], handle.at[1] + by * way[1]];
+      handle.move(handle.at);
       this.keep();
     });
   }
@@ -645,7 +660,8 @@ class Play {
     const [trial] = this.alone;
     const { own } = this.state;
     const [problem] = this.problems;
-    if (own && own.length === problem.goals.length) return own.map(({ hand, q }) => ({ hand, q: Float64Array.from(q) }));
+    const fits = own && own.length === problem.goals.length && own.every((row) => row.length === problem.dof + 1);
+    if (fits) return own.map(([hand, ...q]) => ({ hand: problem.hands.includes(hand) ? hand : problem.hands[0], q: Float64Array.from(q) }));
     return problem.goals.map((_, goal) => ({ hand: trial.hands[goal] || problem.hands[0], q: trial.reached[goal] || problem.start }));
   }
 
@@ -653,23 +669,27 @@ class Play {
   bend(part, to) {
     const [problem] = this.problems;
     const goal = this.state.edited - 1;
-    const own = this.own.map(({ hand, q }) => ({ hand, q: Float64Array.from(q) }));
+    const own = this.own.map((each) => ({ ...each, q: Float64Array.from(each.q) }));
     const { hand, q } = own[goal];
     const joints = (arm, from, end) => Array.from({ length: Math.max(0, end - from) }, (_, k) => arm.first + from + k);
     const mine = problem.arms[hand];
-    const settle = (from) => {
+    const free = problem.free.flatMap((each, axis) => (each ? [axis] : []));
+    /* By the joints beyond the part that was moved, or else by all. */
+    const settle = (from) => [joints(mine, from, mine.links.length), [...free, ...joints(mine, 0, mine.links.length)]].some((some) => {
       const kept = Float64Array.from(q);
-      if (!project(problem, q, problem.goals[goal], hand, joints(mine, from, mine.links.length), 0.9 * problem.radius)) q.set(kept);
-    };
+      const holds = project(problem, q, problem.goals[goal], hand, some, 0.9 * problem.radius);
+      if (!holds) q.set(kept);
+      return holds;
+    });
     if (part === "base") {
-      problem.free.forEach((free, axis) => { if (free) q[axis] = to[axis]; });
+      free.forEach((axis) => { q[axis] = to[axis]; });
       settle(0);
     } else {
       const [moved, k] = part;
       project(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
       if (moved === hand) settle(k);
     }
-    this.state.own = own.map((each) => ({ hand: each.hand, q: Array.from(each.q, (value) => Math.round(1e4 * value) / 1e4) }));
+    this.state.own = own.map((each) => [each.hand, ...Array.from(each.q, (value) => Math.round(1e4 * value) / 1e4)]);
     this.answer();
   }
 
@@ -723,8 +743,7 @@ class Play {
     on("fewer", "click", () => count(-1));
     on("posture", "change", (event) => change("edited", Number(event.target.value)));
     on("hand", "change", (event) => {
-      this.state.own = this.own.map((each, goal) => (goal === this.state.edited - 1
-        ? { hand: Number(event.target.value), q: Array.from(each.q) } : { hand: each.hand, q: Array.from(each.q) }));
+      this.state.own = this.own.map(({ hand, q }, goal) => [goal === this.state.edited - 1 ? Number(event.target.value) : hand, ...q]);
       this.bend("base", this.own[this.state.edited - 1].q);
       this.keep();
     });
@@ -772,8 +791,9 @@ class Play {
   restore() {
     const { task, others } = this.preset;
     const { state } = this;
-    if (!Array.isArray(state.goals) || !state.goals.length) [state.goals, state.others] = [task.goals, state.others || others || null];
-    if (state.others === 0) state.others = null;
+    if (!state.goals || !state.goals.length) state.goals = task.goals;
+    if (!state.others) state.others = others || null;
+    else if (!state.others.length) state.others = null;
     this.results.clear();
     this.box = null;
     this.view = null;
@@ -823,10 +843,12 @@ class Play {
   /* ---- To keep: link, picture, film ---- */
 
   get link() {
-    const { preset, goals, others } = this.state;
-    const { task, others: second = null } = this.data.presets[preset] || this.data.presets[0];
-    const same = JSON.stringify([goals, others]) === JSON.stringify([task.goals, second]);
-    return written({ ...this.state, ...(same ? { goals: null, others: null } : { others: others || 0 }) });
+    const { goals, others } = this.state;
+    const { task, others: second = null } = this.preset;
+    const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+    return written({
+      ...this.state, goals: same(goals, task.goals) ? null : goals, others: same(others, second) ? null : others || [],
+    });
   }
 
   keep() {
@@ -879,7 +901,7 @@ class Play {
     context.font = "13px system-ui, sans-serif";
     const words = [...this.find("score").children].map((line) => line.textContent).join("   ");
     context.fillText(words, 8, film.height - 24);
-    context.fillText(this.find("finding").textContent, 8, film.height - 8);
+    context.fillText(this.find("finding").textContent, 8, film.height - 8, film.width - 16);
     if (this.recording === "use" && this.pointer) {
       const box = stage.getBoundingClientRect();
       const scale = film.stage / box.width;
