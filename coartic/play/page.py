@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,35 +18,48 @@ from coartic.tasks.task import Task, shipped_tasks
 FOLDER = Path(__file__).parent
 MODEL = FOLDER / "model.js"
 """The model in JavaScript."""
-SCRIPTS = ("gif.js", "picture.js", "play.js")
 UP_OR_DOWN = ("ascending", "descending")
 """Tasks that share the start and the first goal: with them the page begins."""
 
 
 def play_page(task: Task | None = None) -> str:
     """The page as HTML; it begins with a task, or with one first goal before two others."""
-    template = templates().get_template("page.html.jinja")
-    presets = presets_of(shipped_tasks().values())
-    if task is not None:
+    presets = [preset_of(each) for each in shipped_tasks().values()]
+    if task is None:
+        presets.insert(0, up_or_down())
+    else:
         own = preset_of(task)
         presets = [own, *(preset for preset in presets if preset != own)]
-    else:
-        up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
-        both = {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
-        presets.insert(0, both)
-    return template.render(
-        styles="".join((FOLDER / name).read_text("utf-8") for name in ("page.css", "play.css")),
-        still=still(),
-        data=as_json({"presets": presets}),
-        model=model_script(),
-        script=script(),
-        version=coartic.__version__,
+    return (
+        templates()
+        .get_template("page.html.jinja")
+        .render(
+            styles=text_of("page.css") + text_of("play.css"),
+            figure=figure(presets),
+            version=coartic.__version__,
+        )
     )
 
 
-def presets_of(tasks: Any) -> list[dict[str, Any]]:
-    """Tasks as the figure offers them."""
-    return [preset_of(task) for task in tasks]
+def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -> str:
+    """The figure as a part of a page, which has the styles of ``play.css`` and defines the colours
+    that these name.
+
+    ``presets`` are what it offers (:func:`preset_of`); ``still`` stands where scripts are switched
+    off. ``more`` is for the scripts: the ``page`` to which links lead, or the ``control`` that
+    holds the link; ``model``, the constants of movement; ``first``, what is chosen at first;
+    ``cells`` of the table ``ranking`` that show films: row, column and what to choose.
+    """
+    return (
+        templates()
+        .get_template("figure.html.jinja")
+        .render(
+            still=still or text_of("still.svg"),
+            data=as_json({"presets": presets, **more}),
+            model="\n".join(map(text_of, ("model.js", "worker.js"))),
+            script="\n".join(map(text_of, ("gif.js", "picture.js", "play.js", "begin.js"))),
+        )
+    )
 
 
 def preset_of(task: Task) -> dict[str, Any]:
@@ -56,18 +70,14 @@ def preset_of(task: Task) -> dict[str, Any]:
     return {"label": f"{task.label}{mark}", "task": content}
 
 
-def model_script() -> str:
-    """The model and the worker that makes trials by it."""
-    return "\n".join(text_of(name) for name in ("model.js", "worker.js"))
-
-
-def script() -> str:
-    """What shows them, and begins."""
-    return "\n".join(text_of(name) for name in (*SCRIPTS, "begin.js"))
+def up_or_down() -> dict[str, Any]:
+    """One first goal before two others."""
+    up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
+    return {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
 
 
 def text_of(name: str) -> str:
-    """A script, in a page."""
+    """A file beside this one, as a part of a page."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 
 
@@ -77,13 +87,9 @@ def as_json(data: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def still() -> str:
-    """The picture where scripts are switched off; :func:`draw_still` has made it."""
-    return (FOLDER / "still.svg").read_text("utf-8")
-
-
 def draw_still() -> str:
-    """Both robots of the first view as they hit goal 1 after learning, as SVG."""
+    """``still.svg``, shown where scripts are switched off: both robots of the first view as they
+    hit goal 1 after learning."""
     tasks = [shipped_tasks()[name] for name in UP_OR_DOWN]
     shapes = []
     for name, task in zip(("first", "second"), tasks, strict=True):

@@ -22,14 +22,14 @@ const AT_FIRST = {
 };
 
 /* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
-function written(state) {
-  const text = (value) => (Array.isArray(value) ? value.map((row) => row.join(",")).join(";") : `${value}`);
-  return Object.entries(state).filter(([name, value]) => value !== AT_FIRST[name])
+function written(state, first) {
+  const text = (value) => (Array.isArray(value) ? value.map((row) => row.join(",")).join(";") : encodeURIComponent(value));
+  return Object.entries(state).filter(([name, value]) => value !== first[name])
     .map(([name, value]) => `${name}=${text(value)}`).join("&");
 }
 
-function read(link) {
-  const state = { ...AT_FIRST };
+function read(link, first) {
+  const state = { ...first };
   new URLSearchParams(link).forEach((text, name) => {
     if (typeof AT_FIRST[name] === "string") state[name] = text;
     else if (typeof AT_FIRST[name] === "number" && Number.isFinite(Number(text))) state[name] = Number(text);
@@ -75,29 +75,29 @@ class Play {
     this.curve = new Picture(this.find("curve"));
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     this.listen();
-    this.state = read(saved);
+    this.first = { ...AT_FIRST, ...data.first };
     this.worker = new Worker(URL.createObjectURL(new Blob([data.source], { type: "text/javascript" })));
     this.worker.onmessage = ({ data: message }) => this.hear(message);
     this.worker.postMessage({ measure: data.presets[0].task });
     this.fresh = new Set(); // what answers the present question
     root.classList.add("live");
-    this.restore();
+    this.restore(saved);
+    // Until somebody does something: it plays as soon as it is seen, or, where less motion is asked for, stands at a hit.
+    this.waits = !this.state.tick && this.state.who !== "you";
+    ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
+    this.answer();
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
-    ["(prefers-color-scheme: dark)"].forEach((query) => window.matchMedia(query).addEventListener("change", () => this.refresh()));
-    const seen = new IntersectionObserver((entries) => {
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
+    new IntersectionObserver((entries) => {
       this.inSight = entries.at(-1).isIntersecting;
-      if (this.inSight && this.begins && !this.calm.matches) this.play();
-      this.begins = false;
-    }, { threshold: 0.3 });
-    this.begins = !this.state.tick && this.state.who !== "you";
-    seen.observe(this.find("stage"));
-    if (this.calm.matches && this.begins) this.stopsAt = "first hit";
+      if (this.inSight && this.waits && !this.calm.matches) this.play();
+    }, { threshold: 0.3 }).observe(this.find("stage"));
   }
 
   /* ---- What is asked: tasks, and who answers ---- */
 
   get preset() {
-    return this.data.presets[this.state.preset] || this.data.presets[0];
+    return this.data.presets[this.state.preset];
   }
 
   /* The tasks in view, one or two, which share the start and the first goal. */
@@ -113,9 +113,13 @@ class Play {
     }));
   }
 
-  /* Runs of a results folder, whose goals nobody has moved. */
+  /* Runs of a results folder, as long as nobody has changed the task. */
   stored(who) {
-    return (this.preset.runs || []).find((run) => run.id === who) || null;
+    const run = (this.preset.runs || []).find(({ id }) => id === who);
+    const { goals, others, arms } = this.state;
+    const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+    const kept = !arms && same(goals, this.preset.task.goals) && (!others || same(others, this.preset.others));
+    return run && kept ? run : null;
   }
 
   get rules() {
@@ -134,6 +138,10 @@ class Play {
 
   /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
   ask() {
+    if (!(this.state.who in NAMES || this.stored(this.state.who))) {
+      this.state.who = "learner";
+      this.showControls();
+    }
     this.problems = this.tasks.map((task) => problem_of(task, this.data.model));
     this.alone = this.problems.map((problem) => corrective_trial(problem, initial_hands(problem)));
     this.stale = true;
@@ -202,7 +210,7 @@ class Play {
   solution(k) {
     const { who } = this.state;
     const stored = this.stored(who);
-    if (stored) return stored.movements;
+    if (stored) return stored.films[k].movements;
     if (who === "you") return this.own.map(({ hand, q }, goal) => ({ goal, hand, kind: "learned", target: q }));
     const found = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
     return who === "alone" || !found ? null : found.movements;
@@ -218,6 +226,7 @@ class Play {
     });
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
+    if (this.waits && this.calm.matches) this.state.tick = this.stops[0] || 0;
     this.plan = this.problems.map((_, k) => (this.stale || !this.fresh.has(`${k} far`) ? null : this.snapshot(`${k} far`, Infinity)));
     this.refresh();
   }
@@ -306,13 +315,10 @@ class Play {
   }
 
   draw() {
-    if (this.stopsAt && this.movers) {
-      this.state.tick = this.stops[0] || 0;
-      this.stopsAt = this.results.size && [...this.results.values()].every((each) => each.done) ? null : this.stopsAt;
-    }
     const { stage, state } = this;
-    const colours = Object.fromEntries(["first", "second", "ghost", "ink", "line", "hit", "soft"].map((name) => [name, stage.colour(name)]));
-    Object.assign(this, { colours });
+    const colours = Object.fromEntries(["first", "second", "dim", "ink", "line", "hit", "soft"].map((name) => [name, stage.colour(name)]));
+    colours.ghost = colours.dim;
+    this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
     const wanted = around(points, 0.7);
     if (!this.box || !this.held) this.box = wanted;
@@ -371,8 +377,9 @@ class Play {
     if (this.main.length < 2) return null;
     const { who } = this.state;
     return this.main.map((mover, k) => {
-      const runs = [];
-      for (let seed = 0; (who === "learner" || who === "cma-es") && seed < SEEDS; seed += 1) {
+      const stored = this.stored(who);
+      const runs = stored ? [...stored.films[k].reached] : [];
+      for (let seed = 0; !stored && (who === "learner" || who === "cma-es") && seed < SEEDS; seed += 1) {
         const found = this.snapshot(`${k} run ${seed}`);
         const complete = this.fresh.has(`${k} run ${seed}`) && (this.results.get(`${k} run ${seed}`).done || found.trials >= this.shown);
         if (seed && found && complete) runs.push(found.reached[0]);
@@ -642,9 +649,7 @@ class Play {
     const place = [x, y].map((value) => Math.round(100 * Math.max(-FAR, Math.min(FAR, value))) / 100);
     if (k) this.state.others = this.state.others.map((goal, i) => (i === g - 1 ? place : goal));
     else this.state.goals = this.state.goals.map((goal, i) => (i === g ? place : goal));
-    if (this.stored(this.state.who)) this.state.who = "learner";
     this.state.own = null;
-    this.showControls();
     this.ask();
     if (this.main.length > 1) this.state.tick = this.meeting;
   }
@@ -704,8 +709,9 @@ class Play {
       this.keep();
     };
     on("preset", "change", (event) => {
-      this.state = { ...AT_FIRST, preset: Number(event.target.value), who: this.state.who, reward: this.state.reward };
-      this.restore();
+      const { who, reward } = this.state;
+      const live = who in NAMES ? who : this.first.who;
+      this.restore(written({ ...this.first, preset: Number(event.target.value), who: live, reward }, this.first));
       this.keep();
     });
     on("who", "change", (event) => {
@@ -714,6 +720,7 @@ class Play {
       if (event.target.value === "you") this.state.others = null;
       change("who", event.target.value);
     });
+    on("stored", "change", (event) => { if (event.target.value) change("who", event.target.value); });
     on("reward", "change", (event) => change("reward", event.target.value));
     on("explores", "change", (event) => change("explores", event.target.value));
     on("ahead", "change", (event) => change("ahead", Number(event.target.value)));
@@ -787,8 +794,10 @@ class Play {
     this.find("stage").parentElement.addEventListener("pointermove", (event) => { this.pointer = event; });
   }
 
-  /* Take the goals of the preset where the state has none. */
-  restore() {
+  /* Show what a link holds, with the goals of the preset where it has none. */
+  restore(link) {
+    this.state = read(link, this.first);
+    if (!this.data.presets[this.state.preset]) this.state.preset = this.first.preset;
     const { task, others } = this.preset;
     const { state } = this;
     if (!state.goals || !state.goals.length) state.goals = task.goals;
@@ -814,7 +823,8 @@ class Play {
     fill("preset", this.data.presets.map(({ label }, k) => [k, label]));
     this.find("preset").value = state.preset;
     const runs = preset.runs || [];
-    fill("stored", runs.map(({ id, name, ticks }) => [id, `${name} (${ticks} ticks)`]));
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
+    this.find("stored").value = this.stored(state.who) ? state.who : "";
     this.find("runs").hidden = !runs.length;
     this.root.querySelectorAll('[data-is="who"] input').forEach((input) => { input.checked = input.value === state.who; });
     this.root.querySelectorAll('[data-is="reward"] input').forEach((input) => { input.checked = input.value === state.reward; });
@@ -848,11 +858,20 @@ class Play {
     const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
     return written({
       ...this.state, goals: same(goals, task.goals) ? null : goals, others: same(others, second) ? null : others || [],
-    });
+    }, this.first);
   }
 
   keep() {
-    if (this.data.keep) this.data.keep(this.link);
+    this.data.keep(this.link);
+  }
+
+  /* Show a stored run from its beginning, as a cell of a table asks for it. */
+  film(choice) {
+    this.restore(written({ ...this.first, ...choice }, this.first));
+    this.root.scrollIntoView({ behavior: this.calm.matches ? "auto" : "smooth" });
+    this.find("play").focus({ preventScroll: true });
+    this.keep();
+    this.play();
   }
 
   note(words) {
@@ -861,11 +880,12 @@ class Play {
 
   async copyLink() {
     this.keep();
+    const address = this.data.address(this.link);
     try {
-      await navigator.clipboard.writeText(window.location.href);
+      await navigator.clipboard.writeText(address);
       this.note("The link is in the clipboard.");
     } catch {
-      this.note("The address of this page is the link.");
+      this.note(`The link is ${address}`);
     }
   }
 
