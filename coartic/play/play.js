@@ -88,6 +88,7 @@ class Play {
     this.answer();
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
+    new MutationObserver(() => this.refresh()).observe(document.body, { attributeFilter: ["data-theme"] }); // of the site
     new IntersectionObserver((entries) => {
       this.inSight = entries.at(-1).isIntersecting;
       if (this.inSight && this.waits && !this.calm.matches) this.play();
@@ -320,10 +321,8 @@ class Play {
     colours.ghost = colours.dim;
     this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
-    const wanted = around(points, 0.7);
-    if (!this.box || !this.held) this.box = wanted;
-    else this.box = [Math.min(this.box[0], wanted[0]), Math.min(this.box[1], wanted[1]), Math.max(this.box[2], wanted[2]), Math.max(this.box[3], wanted[3])];
-    this.glide();
+    if (!this.box || !this.held) this.box = around(points, 0.9);
+    if (!this.held) this.glide(); // the place under the pointer stays
     stage.begin(this.view);
     stage.grid(colours.line);
     const tick = Math.min(state.tick, this.last);
@@ -519,7 +518,7 @@ class Play {
     if (missed >= 0) finding = `Goal ${main[missed].trial.reached.length + 1} is out of the robot's reach.`;
     else if (main.length < 2 && state.who !== "alone") {
       const saved = main[0].trial.reward - this.alone[0].reward;
-      finding = `${Math.abs(saved)} ticks ${saved < 0 ? "more" : "fewer"} than one goal at a time.`;
+      finding = `${Math.abs(saved)} tick${Math.abs(saved) === 1 ? "" : "s"} ${saved < 0 ? "more" : "fewer"} than one goal at a time.`;
       if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) finding = "You are as fast as the planner!";
     } else if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) {
       finding = "They hit goal 1 with different hands.";
