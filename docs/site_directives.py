@@ -16,7 +16,9 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
+from coartic.play.page import figure, play_page, preset_of, text_of, up_or_down
 from coartic.tasks.families import Thousandths
+from coartic.tasks.task import shipped_tasks
 
 _IN_PARTS = get_args(Thousandths)[1]  # what reads a figure of a file into thousandths
 _SIMPLE = {bool: "`true` or `false`", int: "integer", float: "number", str: "text"}
@@ -239,14 +241,20 @@ def margins() -> Iterator[str]:
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 
 
-def next_goal() -> Iterator[str]:
-    """The first figure of every report, with its styles and its script."""
-    from coartic.analysis.report.next_goal import STORED, next_goal
-
-    styles, script = (STORED.with_suffix(end).read_text("utf-8") for end in (".css", ".js"))
+def play() -> Iterator[str]:
+    """The figure to play with, its text and its styles; ``play.html`` is its page."""
     yield "```{raw} html"
-    yield f"<style>{styles}</style>{next_goal()}<script>{{{script}}}</script>"
+    yield f"<style>{text_of('play.css')}</style>"
+    yield text_of("try.html.jinja")
+    yield figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
+    yield '<p><a href="play.html">The same on a page of its own</a></p>'
     yield "```"
+
+
+def add_page(app: Sphinx, failure: Exception | None) -> None:
+    """Put the page of the figure beside the index."""
+    if failure is None:
+        (Path(app.outdir) / "play.html").write_text(play_page(), encoding="utf-8")
 
 
 class Made(SphinxDirective):
@@ -284,4 +292,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     add_meanings()
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
+    app.connect("build-finished", add_page)
     return {"parallel_read_safe": True}

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import signal
 
 import pytest
@@ -74,9 +75,52 @@ def report(traced, tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium, driven by Playwright."""
+    from playwright.sync_api import sync_playwright
+
+    names = ("chromium", "chromium-browser", "google-chrome", "chrome")
+    found = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, names)), None)
+    if found is None:
+        pytest.skip("no Chromium is installed; set COARTIC_BROWSER to the one to use")
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def visited(browser):
+    """Opens a page; what it logs, throws or asks the network for fails the test."""
+    problems, contexts = [], []
+
+    def visit(link, width=1280, **options):
+        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: problems.append(message.text))
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.on(
+            "request",
+            lambda asked: (
+                None
+                if asked.url.startswith(("file:", "data:", "blob:"))
+                else problems.append(asked.url)
+            ),
+        )
+        page.goto(link)
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert problems == []
+
+
 FIRST = (
     *("test_conformance", "test_pool", "test_cli", "test_plugins", "test_harness", "test_dask"),
-    *("test_browser", "test_report", "test_figures"),
+    *("test_browser", "test_play_page", "test_report", "test_figures"),
 )
 """Modules that begin: those that start processes, then those that read one report and draw, so that
 one worker does; they take longest, and none is left alone with them at the end."""

@@ -1,21 +1,13 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
-import os
 import re
-import shutil
+from dataclasses import replace
 
-import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
 
-from coartic import load_task
-
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-BROWSER = os.environ.get("COARTIC_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(
-    BROWSER is None, reason="no Chromium is installed; set COARTIC_BROWSER to the one to use"
-)
+from coartic.analysis.study import typical_run
+from coartic.analysis.topics.coarticulation.values import shared_goal
 
 
 @pytest.fixture(scope="module")
@@ -24,38 +16,14 @@ def address(report):
     return (report / "report.html").as_uri()
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
 @pytest.fixture
-def opened(browser, address):
+def opened(visited, address):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
-    problems, contexts = [], []
 
     def open_page(width=1280, link=address, **options):
-        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: problems.append(message.text))
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.on(
-            "request",
-            lambda asked: (
-                None if asked.url.startswith(("file:", "data:")) else problems.append(asked.url)
-            ),
-        )
-        page.goto(link)
-        return page
+        return visited(link, width, **options)
 
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert problems == []
+    return open_page
 
 
 IN_SIGHT = """rows => rows.filter(row => row.checkVisibility())
@@ -99,174 +67,130 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     assert page.locator(f"#{claim} dl").is_visible()
 
 
+def part(page, name):
+    """A part of the figure to play with."""
+    return page.locator(f".play [data-is={name}]")
+
+
 def tick(page):
-    return int(page.locator(".player input[type=range]").input_value())
+    return int(part(page, "tick").input_value())
 
 
-def test_the_player_plays_by_keyboard_and_shows_the_robot_where_the_run_ended(opened, traced):
+def test_the_figure_plays_by_keyboard(opened):
     page = opened(reduced_motion="reduce")
-    play = page.locator(".player .play")
-    slider = page.locator(".player input[type=range]")
+    play, slider = part(page, "play"), part(page, "tick")
     slider.fill("0")
     play.focus()
     page.keyboard.press("Space")
     assert play.inner_text() == "Pause"
-    page.wait_for_function("document.querySelector('.player input[type=range]').value > 20")
+    page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
     page.keyboard.press("Space")
-    assert play.inner_text() == "Play"
+    page.get_by_role("button", name="Play").wait_for()
     stopped = tick(page)
     page.wait_for_timeout(300)
     assert tick(page) == stopped
     page.keyboard.press("Tab")  # one tick back
     page.keyboard.press("Enter")
-    assert tick(page) == stopped - 1
+    page.get_by_text(f"{stopped - 1} of").wait_for()
     page.keyboard.press("Tab")  # one tick on
     page.keyboard.press("Enter")
-    assert tick(page) == stopped
+    page.get_by_text(f"{stopped} of").wait_for()
     page.keyboard.press("Tab")  # the slider
     page.keyboard.press("End")
-    assert "all goals hit" in page.locator(".player .facts").first.inner_text()
-    # The hand that is drawn is the robot module's, by the stored configuration.
-    arms = page.locator(".player .arm.right").all()
-    goals = page.locator(".player .goal").all()
-    task = load_task("ascending")
-    ends = []
-    for task_name in ("ascending", "descending"):
-        cell = traced.trajectories(task_name, "dual-process/EC1")
-        ends += [
-            task.robot.forward_kinematics(run.execution.configurations[-1], "right")
-            for run in cell.runs
-        ]
-    assert arms
-    for arm in arms:
-        x, y = map(float, arm.get_attribute("points").split()[-1].split(","))
-        drawn = np.array([x, -y])
-        assert min(np.linalg.norm(drawn - end) for end in ends) < 2e-3  # the page rounds
-        centres = [
-            [float(goal.get_attribute("cx")), -float(goal.get_attribute("cy"))] for goal in goals
-        ]
-        assert min(np.linalg.norm(drawn - centre) for centre in centres) < task.radius + 2e-3
+    assert tick(page) > stopped
 
 
-def place(page):
-    """The chosen position of the goal that moves, and where the slider says that the bases are."""
-    slider = page.locator("#next-goal-place")
-    heights = re.findall(r"base at height (\S+)\.", slider.get_attribute("aria-valuetext"))
-    return int(slider.input_value()), *map(float, heights)
-
-
-def centre(page):
-    """Of the handle in the second picture."""
-    box = page.locator(".touch .handle:visible").nth(1).bounding_box()
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-@pytest.mark.parametrize(("moved", "least"), [(2, 0.05), (3, 0.3)])
-def test_the_next_goal_moves_by_keyboard_and_pointer_and_only_what_is_learned_follows(
-    opened, moved, least
-):
-    page = opened()
-    page.select_option("#next-goal-moved", str(moved))
-    page.locator("#next-goal-place").focus()
-    page.keyboard.press("Home")
-    seen = [place(page)]
-    for _ in range(5):
-        page.keyboard.press("ArrowRight")
-        seen.append(place(page))
-        chosen = page.locator(".touch svg:visible .shown")
-        assert chosen.count() == 2
-        for goal, arm in zip(
-            chosen.locator(".moved").all(), chosen.locator(".arm").all(), strict=True
+def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, traced):
+    page = opened(reduced_motion="reduce")
+    shared = shared_goal(traced)
+    said = page.locator(".play .beside")
+    said.get_by_text(f"{shared.spreads:.1f} standard deviations apart").wait_for()
+    tasks = {task.label: name for name, task in traced.tasks.items()}
+    options = part(page, "preset").locator("option").all_inner_texts()
+    seen = 0
+    for preset, text in enumerate(options[1:], 1):
+        part(page, "preset").select_option(str(preset))
+        task = tasks[text.removesuffix("†")]
+        for label in (
+            part(page, "stored").locator("option").evaluate_all("all => all.map(o => o.value)")
         ):
-            assert goal.is_visible()
-            x, y = map(float, arm.get_attribute("points").split()[-1].split(","))
-            aim = np.array(load_task("ascending").goals[moved - 2])
-            assert np.linalg.norm([x, -y] - aim) < 0.1 + 2e-3  # the page rounds
-    places, alone, learned = zip(*seen, strict=True)
-    assert places == (0, 1, 2, 3, 4, 5)
-    assert len(set(alone)) == 1
-    assert learned == tuple(sorted(learned))
-    assert learned[-1] > learned[0] + least
-    # The pointer drags the goal down.
-    page.mouse.move(*centre(page))
-    page.mouse.down()
-    page.mouse.move(0, 2000, steps=5)
-    assert place(page) == seen[0]
-    page.mouse.up()
-    page.mouse.move(0, 0)
-    assert place(page) == seen[0]
+            if label:
+                part(page, "stored").select_option(label)
+                good = traced.cells[task, label].good
+                median = good.reward.iloc[
+                    typical_run(replace(traced.cells[task, label], runs=good))
+                ]
+                page.wait_for_function(
+                    "ticks => document.querySelector('[data-is=score]').innerText.includes(ticks)",
+                    arg=f" {-median:.0f} ticks",
+                )
+                seen += 1
+    assert seen >= 8
+    page.get_by_role("button", name="Goal 2").focus()
+    page.keyboard.press("ArrowUp")
+    assert page.get_by_role("radio", name="A learner").is_checked()
+    part(page, "play").press("Tab")
+    assert part(page, "stored").input_value() == ""
+    assert "The learner" in part(page, "score").inner_text()
 
 
-def test_the_next_goal_is_dragged_by_a_finger(opened):
-    page = opened(390, has_touch=True, is_mobile=True)
-    page.locator("#next-goal-place").fill("0")
-    page.locator(".touch svg:visible").nth(1).scroll_into_view_if_needed()
-    before = page.evaluate("scrollY")
-    x, y = centre(page)
-    finger = page.context.new_cdp_session(page)
-    moves = [("touchStart", y), *(("touchMove", y - step) for step in range(5, 300, 5))]
-    for kind, height in moves:
-        points = [{"x": x, "y": height}]
-        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-    assert place(page)[0] == 5
-    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    assert page.evaluate("scrollY") == before  # the page did not scroll instead
+def test_a_cell_of_the_ranking_opens_its_film(opened):
+    page = opened()
+    cells = page.locator("#table-ranking .film-of")
+    assert cells.count() > 5
+    row = page.locator("#table-ranking tr", has=page.get_by_title("row random-search/pure"))
+    row.locator(".film-of").click()
+    assert part(page, "stored").input_value() == "random-search/pure"
+    assert part(page, "preset").locator("option:checked").inner_text() == "Two-armed 1†"
+    assert part(page, "play").inner_text() == "Pause"
+    page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
+    page.wait_for_url("**play-link=**")
+    part(page, "play").click()
+    again = opened(link=page.url, reduced_motion="reduce")
+    assert part(again, "stored").input_value() == "random-search/pure"
 
 
-STATE = """[...document.querySelectorAll("select[id], input[id]")].map(each => each.value)
-    .concat([...document.querySelectorAll(".facts")].map(each => each.innerText))"""
+STATE = (
+    """[...document.querySelectorAll("select, input")].map(each => [each.value, each.checked])"""
+)
 
 
 def test_the_address_holds_the_view(opened, address):
     page = opened(reduced_motion="reduce")
     untouched = page.evaluate(STATE)
-    names = "#next-goal-moved", "#next-goal-place", "#player-tick"
-    moved, at, first = (page.locator(name).input_value() for name in names)
     assert page.url == address
-    page.focus("#next-goal-moved")
-    page.select_option("#next-goal-moved", "2")
-    page.locator("#next-goal-place").fill("5")
-    page.wait_for_url("**?next-goal-moved=2&next-goal-place=5#*")
     # A link is not changed by what moves by itself, and by being scrolled to.
-    moving = opened(link=page.url, reduced_motion="no-preference")
-    moving.locator("#player").scroll_into_view_if_needed()
-    moving.wait_for_function("Number(document.getElementById('player-tick').value) > 20")
-    assert "player" not in moving.url
-    page.focus("#player-view")
-    page.select_option("#player-view", "own")
-    page.select_option("#player-0", "ascending initial")
-    page.select_option("#player-1", "two-armed-1 dual-process/EC4")
-    page.locator("#player-tick").fill("57")
+    moving = opened(reduced_motion="no-preference")
+    moving.locator(".play").scroll_into_view_if_needed()
+    moving.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
+    moving.wait_for_timeout(300)
+    assert "play-link" not in moving.url
+    part(page, "preset").focus()
+    part(page, "preset").select_option("2")
+    part(page, "stored").select_option(index=1)
+    part(page, "tick").fill("57")
     page.get_by_label("One tick back").click()
     page.focus("#claims-verdict")
     page.select_option("#claims-verdict", "undecided")
     page.locator("#runtimes").scroll_into_view_if_needed()
     page.evaluate("document.getElementById('runtimes').scrollIntoView()")
-    page.wait_for_url("**player-tick=56**#runtimes")
-    again = opened(link=page.url, reduced_motion="no-preference")
+    page.wait_for_url("**tick%3D56**#runtimes")
+    again = opened(link=page.url, reduced_motion="reduce")
+    again.get_by_text("56 of").wait_for()
     assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
     again.wait_for_timeout(300)
     assert again.url == page.url
     top = "document.getElementById('runtimes').getBoundingClientRect().top"
     assert abs(again.evaluate(top)) < 2
-    # Back at the beginning nothing is left of it.
-    page.evaluate("scrollTo(0, 0)")
-    page.select_option("#claims-verdict", "")
-    page.select_option("#next-goal-moved", moved)
-    page.locator("#next-goal-place").fill(at)
-    page.select_option("#player-view", "0")
-    page.locator("#player-tick").fill(first)
-    page.wait_for_url(address)
     # What an old link names and the page does not have is left out.
-    odd = opened(link=f"{address}?player-0=nobody&player-tick=x&nothing=1", reduced_motion="reduce")
-    assert odd.evaluate(STATE) == untouched
+    odd = opened(link=f"{address}?play-link=who%3Dx%26preset%3D99&n=1", reduced_motion="reduce")
+    assert part(odd, "preset").input_value() == "0"
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
     page = opened(width, color_scheme=scheme, reduced_motion="reduce")
     page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
-    page.locator(".player select").first.select_option("own")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     # Rows of a table are alike: three of each.
     page.eval_on_selector_all("tbody tr:nth-child(n+4)", "all => all.forEach(row => row.remove())")
@@ -302,7 +226,7 @@ def test_in_print_nothing_leaves_its_box_and_no_film_is_there(opened):
     page = opened(688)  # A4 within its margins
     page.emulate_media(media="print")
     assert page.evaluate(OVERFLOWS) == []
-    assert not page.locator("#player").is_visible()
+    assert not page.locator(".play").is_visible()
 
 
 def test_panels_stack_on_a_narrow_screen_and_their_curves_go_by_the_key(opened):
@@ -325,10 +249,7 @@ def test_without_scripts_all_is_there(browser, address):
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
     page.goto(address)
-    assert page.locator(".without").is_visible()
+    assert page.get_by_text("scripts are switched off here").is_visible()
     assert page.locator("#table-claims tbody tr").count() > 10
-    # Both ends of the way of the goal are drawn, for both goals and methods.
-    assert not page.locator("#next-goal-place").is_visible()
-    assert [goal.is_visible() for goal in page.locator(".touch .moved").all()].count(True) == 8
     assert not page.locator("#claims-search").is_visible()
     context.close()

@@ -5,7 +5,7 @@
   const atStart = new Map(controls.map((control) => [control, control.value]));
   const headings = [...document.querySelectorAll("h2[id]")];
   /* Boxes of controls that the reader used; what moves by itself is not kept. */
-  const boxOf = (element) => element.closest?.(".touch, .player, .tools");
+  const boxOf = (element) => element.closest?.(".play, .tools");
   const used = new Set();
 
   const read = () => {
@@ -25,7 +25,7 @@
     const query = new URLSearchParams(changed.map((control) => [control.id, control.value])).toString();
     const typing = document.activeElement.type === "search" && document.activeElement.closest("section");
     const inView = headings.filter((each) => each.getBoundingClientRect().top < window.innerHeight / 2).at(-1);
-    const heading = (typing && typing.querySelector("h2")) || inView || changed.at(-1)?.closest(".touch, .player");
+    const heading = (typing && typing.querySelector("h2")) || inView || changed.at(-1)?.closest(".play");
     const section = heading && heading.closest("section");
     const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
     const within = target && section && section.contains(target); // as a claim is

@@ -20,9 +20,8 @@ from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
-from coartic.analysis.report.next_goal import locus_postures, next_goal
 from coartic.analysis.report.numbers import numbers_tex
-from coartic.analysis.report.player import player_json
+from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
 from coartic.analysis.report.text import answers, environment
 from coartic.analysis.section import Section
@@ -30,6 +29,7 @@ from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
 from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, check_inside, publish
+from coartic.play.page import text_of
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 SEARCHED = 12
@@ -149,11 +149,9 @@ def sections(study: Study) -> list[dict[str, Any]]:
 def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
-    player = player_json(study)
-    scripts = ["page.js", "next_goal.js", *(["player.js"] if player else []), "address.js"]
     template = environment(escape=True).get_template("page.html.jinja")
     ids = {section.id for section in visible_sections(study)}
-    script = "\n".join(f"{{\n{(here / name).read_text(encoding='utf-8')}}}" for name in scripts)
+    scripts = [(here / name).read_text("utf-8") for name in ("page.js", "address.js")]
     try:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
@@ -161,11 +159,9 @@ def page(study: Study) -> str:
     return template.render(
         title=title(study),
         description=" ".join(answer["text"] for answer in answers(study)),
-        styles="".join((here / f"{name}.css").read_text("utf-8") for name in ("page", "next_goal")),
-        next_goal=next_goal(study),
-        is_example=locus_postures(study).empty,
-        script=script,
-        player=player.replace("<", "\\u003c"),
+        styles=(here / "page.css").read_text("utf-8") + text_of("play.css"),
+        player=player(study),
+        script="\n".join(f"{{\n{script}}}" for script in scripts),
         answers=[answer for answer in answers(study) if answer["id"] in ids],
         sections=sections(study),
         claims=claims_for_page(study),

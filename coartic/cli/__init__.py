@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, new, paper, read, run, share
+from coartic.cli import draw, new, paper, play, read, run, share
 from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
@@ -59,6 +59,7 @@ COMMANDS = (
     (read.cite, "results/comparison --analysis"),
     (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
+    (play.play, "two-armed-1 --out play.html"),
     (share.merge, "results/a results/b --out results/all"),
     (share.standings, "submissions --out standings.csv"),
     (share.export, "results/comparison --ioh --out ioh"),

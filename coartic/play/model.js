@@ -1,0 +1,1020 @@
+"use strict";
+/* coartic's model for browsers and Node: the same numbers as in Python, bit by bit.
+
+   Each function has the name of its counterpart in the Python package and does the same operations
+   in the same order. A comment names the module of the counterpart. A configuration is a
+   Float64Array: x and y of the base, the joints of the left arm, those of the right one. Hands are
+   0 (left) and 1 (right), goals are counted from 0. Without a counterpart are Strategy, which is a
+   smaller CMA-ES than pycma's, and shortest_plan, a local search. */
+
+const HANDS = ["left", "right"];
+const [LEFT, RIGHT, NO_HAND] = [0, 1, 2];
+const BASE_DOF = 2;
+const MOST_LINKS = 100;
+
+/* coartic/model.py */
+const PAPER = {
+  step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
+  corrective_arrival: false, whole_last_step: false, first_step: false,
+};
+
+/* coartic/motion/problem.py; `task` has the content of a task file. */
+function problem_of(task, model = PAPER) {
+  const robot = {
+    left_links: [1, 1, 1, 1], right_links: [1, 1, 1, 1], left_shoulder: [-0.5, 0.1], right_shoulder: [0.5, 0.1],
+    base_size: [1, 0.2], ...task.robot,
+  };
+  const start = Float64Array.from([...(task.start.base || [0, 0]), ...task.start.left, ...task.start.right]);
+  const arm = (first, links, shoulder) => ({
+    first, links: Float64Array.from(links), shoulder_x: shoulder[0], shoulder_y: shoulder[1],
+  });
+  const locked = task.locked_base || [];
+  return {
+    task, robot, start, model, dof: start.length,
+    goals: task.goals, radius: task.radius === undefined ? 0.1 : task.radius,
+    hands: (task.hands || HANDS).map((hand) => HANDS.indexOf(hand)).sort(),
+    arms: [
+      arm(BASE_DOF, robot.left_links, robot.left_shoulder),
+      arm(BASE_DOF + robot.left_links.length, robot.right_links, robot.right_shoulder),
+    ],
+    free: [!locked.includes("x"), !locked.includes("y")],
+    penalty: task.penalty ? terms_of(task) : null,
+  };
+}
+
+/* ---- Kinematics ---- */
+
+/* coartic/motion/trigonometry.py */
+const LARGEST = 1e5;
+const [HIGH, MIDDLE, LOW] = [1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21];
+const PER_QUARTER = 2 / Math.PI;
+const factorial = (n) => (n < 2 ? 1 : n * factorial(n - 1));
+const [S3, S5, S7, S9, S11, S13, S15, S17] = [3, 5, 7, 9, 11, 13, 15, 17].map((n) => ((n - 1) % 4 ? -1 : 1) / factorial(n));
+const [C4, C6, C8, C10, C12, C14, C16] = [4, 6, 8, 10, 12, 14, 16].map((n) => (n % 4 ? -1 : 1) / factorial(n));
+const TO_WHOLE = 6755399441055744; // 1.5 * 2**52: added and taken away it rounds, halves to even
+
+/* coartic/robot.py: fill xs, ys with shoulder, joints and hand. */
+function chain(q, arm, xs, ys) {
+  const { first, links } = arm;
+  let x = q[0] + arm.shoulder_x;
+  let y = q[1] + arm.shoulder_y;
+  let angle = 0;
+  xs[0] = x;
+  ys[0] = y;
+  for (let k = 0; k < links.length; k += 1) {
+    angle += q[first + k];
+    let cosine;
+    let sine;
+    if (Math.abs(angle) < LARGEST) {
+      const quarters = (angle * PER_QUARTER + TO_WHOLE) - TO_WHOLE;
+      const r = ((angle - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW;
+      const z = r * r;
+      const z2 = z * z;
+      const z4 = z2 * z2;
+      let odd = (S3 + z * S5) + z2 * (S7 + z * S9);
+      odd += z4 * ((S11 + z * S13) + z2 * (S15 + z * S17));
+      let even = (C4 + z * C6) + z2 * (C8 + z * C10);
+      even += z4 * ((C12 + z * C14) + z2 * C16);
+      const s = r + (r * z) * odd;
+      const c = 1 - (0.5 * z - z2 * even);
+      const quarter = quarters & 3;
+      cosine = quarter & 1 ? s : c;
+      sine = quarter & 1 ? c : s;
+      if ((quarter + 1) & 2) cosine = -cosine;
+      if (quarter & 2) sine = -sine;
+    } else {
+      cosine = Math.cos(angle);
+      sine = Math.sin(angle);
+    }
+    x += links[k] * cosine;
+    y += links[k] * sine;
+    xs[k + 1] = x;
+    ys[k + 1] = y;
+  }
+}
+
+const xs = new Float64Array(MOST_LINKS + 1);
+const ys = new Float64Array(MOST_LINKS + 1);
+
+/* coartic/robot.py: positions of shoulder, joints and hand, a point each. */
+function joint_positions(problem, q, hand) {
+  const arm = problem.arms[hand];
+  chain(q, arm, xs, ys);
+  return Array.from({ length: arm.links.length + 1 }, (_, k) => [xs[k], ys[k]]);
+}
+
+/* coartic/learner/kernel.py */
+function distance_to_goal(problem, q, number, hand) {
+  const arm = problem.arms[hand];
+  chain(q, arm, xs, ys);
+  const dx = problem.goals[number][0] - xs[arm.links.length];
+  const dy = problem.goals[number][1] - ys[arm.links.length];
+  return Math.sqrt(dx * dx + dy * dy);
+}
+
+/* ---- Movement ---- */
+
+const CLEARANCE = 1e-9;
+const ROUNDING = 1e-15;
+
+/* coartic/motion/movement.py, in double precision: steps during which the hand stays out of a disc. */
+function clear_steps(square, rim, closing, slowness, bend) {
+  const distance = Math.sqrt(square);
+  const gap = distance * (1 - 1e-12) - rim;
+  if (!(gap > 0)) return 0;
+  const turn = bend * distance;
+  const twice = 2 * gap * distance;
+  const root = Math.sqrt(closing * closing + turn * twice);
+  const curved = closing > 0 ? twice / (closing + root) : (root - closing) / (turn + 1e-300);
+  return Math.max(gap * slowness, curved) * (1 - 1e-9);
+}
+
+const rates = new Float64Array(MOST_LINKS);
+let between = new Float64Array(0);
+
+/* coartic/motion/movement.py: move `q` itself; ticks, negative for a miss. */
+function move(problem, q, target, number, hand, stop_on_arrival) {
+  const { model, radius } = problem;
+  const [goal_x, goal_y] = problem.goals[number];
+  const arm = problem.arms[hand];
+  const { first, links } = arm;
+  const tip = links.length;
+  const dof = q.length;
+  if (between.length !== dof) between = new Float64Array(dof);
+  let square = 0;
+  for (let j = 0; j < dof; j += 1) {
+    const delta = target[j] - q[j];
+    square += delta * delta;
+  }
+  const distance = Math.sqrt(square);
+  const last = Math.ceil(distance / model.step);
+  const target_step = model.whole_last_step && last > 0 ? -1 : last;
+  const per_step = distance > 0 ? model.step / distance : 0;
+  const base_x = (target[0] - q[0]) * per_step;
+  const base_y = (target[1] - q[1]) * per_step;
+  let speed = Math.sqrt(base_x * base_x + base_y * base_y);
+  let [reach, rate, bend, most] = [0, 0, 0, model.step * tip];
+  for (let k = 0; k < tip; k += 1) {
+    reach += links[k];
+    rate += (target[first + k] - q[first + k]) * per_step;
+    rates[k] = rate;
+    speed += links[k] * Math.abs(rate);
+    bend += links[k] * rate * rate;
+    most += Math.abs(q[first + k]) + Math.abs(target[first + k]);
+  }
+  const slowness = 1 / speed;
+  const away = reach * (1 + most) + model.step + Math.abs(q[0]) + Math.abs(target[0]) + Math.abs(arm.shoulder_x)
+    + Math.abs(q[1]) + Math.abs(target[1]) + Math.abs(arm.shoulder_y);
+  const clearance = CLEARANCE + ROUNDING * (tip + 1) * away;
+  let [end_x, end_y] = [0, 0];
+  if (stop_on_arrival) {
+    chain(target, arm, xs, ys);
+    end_x = xs[tip];
+    end_y = ys[tip];
+  }
+  let step = 0;
+  for (;;) {
+    const fraction = step === target_step ? 0 : step * model.step / distance;
+    const here = step === target_step ? target : between;
+    if (here === between) {
+      for (let j = 0; j < BASE_DOF; j += 1) between[j] = q[j] + fraction * (target[j] - q[j]);
+      for (let j = first; j < first + tip; j += 1) between[j] = q[j] + fraction * (target[j] - q[j]);
+    }
+    chain(here, arm, xs, ys);
+    let velocity_x = base_x;
+    let velocity_y = base_y;
+    for (let k = 0; k < tip; k += 1) {
+      velocity_x -= rates[k] * (ys[k + 1] - ys[k]);
+      velocity_y += rates[k] * (xs[k + 1] - xs[k]);
+    }
+    let dx = goal_x - xs[tip];
+    let dy = goal_y - ys[tip];
+    const to_goal = dx * dx + dy * dy;
+    let clear = clear_steps(to_goal, radius + clearance, velocity_x * dx + velocity_y * dy, slowness, bend);
+    let stop = step === last;
+    if (stop_on_arrival) {
+      dx = end_x - xs[tip];
+      dy = end_y - ys[tip];
+      const to_end = dx * dx + dy * dy;
+      if (Math.sqrt(to_end) <= model.arrival_tolerance) stop = true;
+      clear = Math.min(
+        clear,
+        clear_steps(to_end, model.arrival_tolerance + clearance, velocity_x * dx + velocity_y * dy, slowness, bend),
+      );
+    }
+    const hit = Math.sqrt(to_goal) <= radius;
+    if ((stop || hit) && !(model.first_step && step === 0 && last > 0)) {
+      for (let j = 0; j < dof; j += 1) q[j] = step === target_step ? target[j] : q[j] + fraction * (target[j] - q[j]);
+      return hit ? step + 1 : -(step + 1);
+    }
+    step = Math.min(step + 1 + Math.floor(Math.min(clear, last)), last);
+  }
+}
+
+/* coartic/motion/corrective.py: change `q` itself; iterations, negative where **A** does not converge. */
+function correct(problem, q, number, hand) {
+  const { model } = problem;
+  const [free_x, free_y] = problem.free;
+  const [goal_x, goal_y] = problem.goals[number];
+  const arm = problem.arms[hand];
+  const tip = arm.links.length;
+  for (let iteration = 0; ; iteration += 1) {
+    chain(q, arm, xs, ys);
+    const error_x = goal_x - xs[tip];
+    const error_y = goal_y - ys[tip];
+    const error = error_x * error_x + error_y * error_y;
+    if (Math.sqrt(error) <= model.correction_tolerance) return iteration;
+    if (iteration >= model.max_iterations || !(error < Infinity)) return -1 - iteration;
+    let moved = false;
+    const turn = (j, by) => {
+      const before = q[j];
+      q[j] = before + by;
+      if (q[j] !== before) moved = true;
+    };
+    if (free_x) turn(0, model.gain * error_x);
+    if (free_y) turn(1, model.gain * error_y);
+    for (let k = 0; k < tip; k += 1) {
+      turn(arm.first + k, model.gain * (-(ys[tip] - ys[k]) * error_x + (xs[tip] - xs[k]) * error_y));
+    }
+    if (!moved) return -2 - iteration; // a stationary point
+  }
+}
+
+/* coartic/motion/movement.py: points of a path, a step each, and its end. */
+function path_points(q, waypoints, model) {
+  const corners = [q, ...waypoints];
+  const lengths = waypoints.map((point, k) => Math.sqrt(point.reduce((sum, value, j) => sum + (value - corners[k][j]) ** 2, 0)));
+  const ends = [0];
+  lengths.forEach((length) => ends.push(ends.at(-1) + length));
+  const count = Math.ceil(ends.at(-1) / model.step);
+  const points = [];
+  let k = 1;
+  for (let step = 0; step < count; step += 1) {
+    const at = step * model.step;
+    while (k < ends.length - 1 && ends[k] <= at) k += 1;
+    const share = ends[k] > ends[k - 1] ? (at - ends[k - 1]) / (ends[k] - ends[k - 1]) : 0;
+    points.push(Float64Array.from(corners[k], (value, j) => corners[k - 1][j] + share * (value - corners[k - 1][j])));
+  }
+  points.push(Float64Array.from(corners.at(-1)));
+  if (model.whole_last_step && count) {
+    const final = lengths.findLastIndex((length) => length > 0);
+    const beyond = (count * model.step - ends.at(-1)) / lengths[final];
+    points[count] = points[count].map((value, j) => value + beyond * (corners[final + 1][j] - corners[final][j]));
+  }
+  return points;
+}
+
+/* coartic/motion/movement.py: follow a path with `q` itself; ticks, negative for a miss. */
+function follow(problem, q, waypoints, number, hand) {
+  const points = path_points(q, waypoints, problem.model);
+  const from = problem.model.first_step && points.length > 1 ? 1 : 0;
+  let k = points.findIndex((point, step) => step >= from && distance_to_goal(problem, point, number, hand) <= problem.radius);
+  const hit = k >= 0;
+  if (!hit) k = points.length - 1;
+  q.set(points[k]);
+  return hit ? k + 1 : -(k + 1);
+}
+
+/* coartic/motion/penalty.py */
+function terms_of(task) {
+  const given = { joints: 0, costly: "arms", region: 0, radius: 1, distinct: 0, apart: 1, ...task.penalty };
+  const mean = (axis) => task.goals.reduce((sum, goal) => sum + goal[axis], 0) / task.goals.length;
+  return { ...given, centre: given.centre || [mean(0), mean(1)] };
+}
+
+/* coartic/motion/penalty.py: what hitting a goal in `q` loses beside ticks. */
+function penalty_at(problem, before, q, hand, first) {
+  const { penalty, arms } = problem;
+  const arm = arms[hand];
+  const change = (from, to) => {
+    let square = 0;
+    for (let j = from; j < to; j += 1) square += (q[j] - before[j]) * (q[j] - before[j]);
+    return Math.sqrt(square);
+  };
+  let ticks = 0;
+  if (penalty.joints > 0) {
+    const [middle, end] = [arms[RIGHT].first, q.length];
+    const bounds = { base: [0, BASE_DOF], arms: [BASE_DOF, end], "left-arm": [BASE_DOF, middle], "right-arm": [middle, end] };
+    ticks += penalty.joints * change(...bounds[penalty.costly]);
+  }
+  if (penalty.region > 0) {
+    chain(q, arm, xs, ys);
+    let deepest = 0;
+    for (let k = 1; k < arm.links.length; k += 1) {
+      const [dx, dy] = [xs[k] - penalty.centre[0], ys[k] - penalty.centre[1]];
+      deepest = Math.max(deepest, 1 - Math.sqrt(dx * dx + dy * dy) / penalty.radius);
+    }
+    ticks += penalty.region * deepest;
+  }
+  if (penalty.distinct > 0 && !first) {
+    ticks += penalty.distinct * Math.max(0, 1 - change(arm.first, arm.first + arm.links.length) / penalty.apart);
+  }
+  return Math.floor(ticks + 0.5);
+}
+
+/* ---- Trials ---- */
+
+/* What happens from the start on: movements as made, and where the goals were hit. */
+class Trial {
+  constructor(problem) {
+    this.problem = problem;
+    this.q = Float64Array.from(problem.start);
+    this.movements = [];
+    this.reached = [];
+    this.hands = [];
+    this.ticks = 0;
+    this.penalty = 0;
+    this.going = true;
+  }
+
+  /* coartic/motion/solution.py: note a movement that was made. */
+  take(goal, hand, kind, target, signed) {
+    const ticks = Math.abs(signed);
+    this.ticks += ticks;
+    this.movements.push({ goal, hand, kind, target: Float64Array.from(target), ticks });
+    return signed > 0;
+  }
+
+  moves(goal, hand, kind, target) {
+    const stops = kind !== "corrective" || this.problem.model.corrective_arrival;
+    return this.take(goal, hand, kind, target, move(this.problem, this.q, target, goal, hand, stops));
+  }
+
+  /* coartic/motion/reach.py: **A** finishes what was missed; whether it hits. */
+  corrects(goal, hand) {
+    const target = Float64Array.from(this.q);
+    this.going = correct(this.problem, target, goal, hand) >= 0;
+    return this.going && this.moves(goal, hand, "corrective", target);
+  }
+
+  looks(goal, hand) {
+    return distance_to_goal(this.problem, this.q, goal, hand) <= this.problem.radius;
+  }
+
+  /* The goal is hit: where, and what it costs. */
+  ends(goal, hand) {
+    if (!this.movements.length || this.movements.at(-1).goal !== goal) {
+      this.movements.push({ goal, hand, kind: "corrective", target: Float64Array.from(this.q), ticks: 0 });
+    }
+    if (this.problem.penalty) {
+      const before = goal ? this.reached[goal - 1] : this.problem.start;
+      this.penalty += penalty_at(this.problem, before, this.q, hand, goal === 0);
+    }
+    this.reached.push(Float64Array.from(this.q));
+    this.hands.push(hand);
+  }
+
+  /* coartic/motion/reach.py: reach for a goal, with a target or by **A** alone. */
+  reaches(goal, hand, target, corrects = true) {
+    const hit = target ? this.moves(goal, hand, "learned", target) : this.looks(goal, hand);
+    this.going = hit || ((corrects || !target) && this.corrects(goal, hand));
+    if (this.going) this.ends(goal, hand);
+  }
+
+  get reward() {
+    return this.going ? -(this.ticks + this.penalty) : -Infinity;
+  }
+}
+
+/* coartic/motion/trials.py, one trial: a joint whose target is NaN keeps its value; a goal without
+   any target (null) is left to **A**. */
+function make_trial(problem, hands, targets) {
+  const trial = new Trial(problem);
+  for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
+    const given = targets[goal];
+    const target = given && Float64Array.from(given, (value, j) => (Number.isNaN(value) ? trial.q[j] : value));
+    trial.reaches(goal, hands[goal], target);
+  }
+  return trial;
+}
+
+/* coartic/motion/initial.py */
+function corrective_trial(problem, hands) {
+  return make_trial(problem, hands, hands.map(() => null));
+}
+
+/* coartic/motion/solution.py: execute movements, each with goal, hand, kind, and target or waypoints. */
+function execute(problem, movements) {
+  const trial = new Trial(problem);
+  for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
+    const due = movements.filter((movement) => movement.goal === goal);
+    const { hand } = due[0];
+    let hit = trial.looks(goal, hand);
+    [...due, { kind: "corrective" }].forEach(({ kind, target, waypoints }, place) => {
+      if (!trial.going || (hit && (place > 0 || kind === "corrective"))) return;
+      if (kind === "path") {
+        hit = trial.take(goal, hand, kind, waypoints.at(-1), follow(problem, trial.q, waypoints, goal, hand));
+        trial.movements.at(-1).waypoints = waypoints;
+      } else hit = target ? trial.moves(goal, hand, kind, target) : trial.corrects(goal, hand);
+    });
+    trial.going = hit;
+    if (trial.going) trial.ends(goal, hand);
+  }
+  return trial;
+}
+
+/* coartic/motion/ticks.py: the configuration at every tick, and the row in which each goal is hit. */
+function trajectory(problem, trial) {
+  const { step } = problem.model;
+  const rows = [];
+  const hits = [];
+  let q = problem.start;
+  trial.movements.forEach(({ goal, kind, target, waypoints, ticks }) => {
+    if (kind === "path") rows.push(...path_points(q, waypoints, problem.model).slice(0, ticks));
+    else if (ticks) {
+      const distance = Math.sqrt(target.reduce((square, value, j) => square + (value - q[j]) ** 2, 0));
+      const last = Math.ceil(distance / step);
+      for (let k = 0; k < ticks; k += 1) {
+        const [from, fraction] = [q, (k * step) / distance];
+        const ends = k === last && !(problem.model.whole_last_step && last);
+        rows.push(ends ? target : target.map((value, j) => from[j] + fraction * (value - from[j])));
+      }
+    }
+    if (rows.length) q = rows.at(-1);
+    hits[goal] = Math.max(rows.length - 1, 0);
+  });
+  if (!trial.going) hits.length = trial.reached.length;
+  return { rows: rows.length ? rows : [problem.start], hits };
+}
+
+/* coartic/motion/initial.py: all hand sequences. */
+function hand_sequences(problem) {
+  return problem.goals.reduce(
+    (sequences) => sequences.flatMap((sequence) => problem.hands.map((hand) => [...sequence, hand])),
+    [[]],
+  );
+}
+
+const letters_of = (hands) => hands.map((hand) => "LR"[hand]).join("");
+
+/* coartic/motion/initial.py: the hands that the task names, or those its policy finds. */
+function initial_hands(problem) {
+  const named = problem.task.initial_hands;
+  if (/^[LR]*$/.test(named) && named.length === problem.goals.length) return [...named].map((letter) => "LR".indexOf(letter));
+  const single = problem.hands.map((hand) => problem.goals.map(() => hand));
+  const changes = (hands) => hands.filter((hand, k) => k && hand !== hands[k - 1]).length;
+  const ranked = (named === "best-of-all" ? hand_sequences(problem) : single)
+    .map((hands) => ({ hands, reward: corrective_trial(problem, hands).reward, changes: changes(hands) }))
+    .sort((a, b) => (b.reward === a.reward ? a.changes - b.changes : b.reward - a.reward));
+  return ranked[0].hands;
+}
+
+/* ---- Random numbers: those of numpy.random.default_rng(seed), so that a seed gives the same run ----
+   Uniform ones to the last bit, normal ones to 5e-15: tables are computed here. */
+
+/* NumPy's SeedSequence, for a seed below 2**128: so many words of 32 bits. */
+function generate_state(seed, count) {
+  const entropy = [];
+  for (let rest = BigInt(seed); rest > 0n || !entropy.length; rest >>= 32n) entropy.push(Number(rest & 0xffffffffn));
+  const shifted = (value) => (value ^ (value >>> 16)) >>> 0;
+  const hashing = (constant, factor) => {
+    let hash = constant;
+    return (value) => {
+      const mixed = value ^ hash;
+      hash = Math.imul(hash, factor);
+      return shifted(Math.imul(mixed, hash));
+    };
+  };
+  const hashed = hashing(0x43b0d7e5, 0x931e8875);
+  const pool = [0, 1, 2, 3].map((k) => hashed(entropy[k] || 0));
+  const mix = (to, value) => { pool[to] = shifted(Math.imul(pool[to], 0xca01f9dd) - Math.imul(hashed(value), 0x4973f715)); };
+  for (let from = 0; from < 4; from += 1) for (let to = 0; to < 4; to += 1) if (from !== to) mix(to, pool[from]);
+  const made = hashing(0x8b51f9dd, 0x58f38ded);
+  return Array.from({ length: count }, (_, k) => made(pool[k % 4]));
+}
+
+/* Ziggurat of 256 layers (Doornik 2005, as in NumPy). */
+const ZIGGURAT_R = 3.6541528853610088;
+const ziggurat = (() => {
+  const area = 0.004928673233974655;
+  const density = (x) => Math.exp(-0.5 * x * x);
+  const x = new Float64Array(256);
+  x[255] = ZIGGURAT_R;
+  x[0] = area / density(ZIGGURAT_R);
+  for (let i = 254; i > 0; i -= 1) x[i] = Math.sqrt(-2 * Math.log(area / x[i + 1] + density(x[i + 1])));
+  const inside = x.map((value, i) => (i === 1 ? 0 : Math.floor((x[(i || 256) - 1] / value) * 2 ** 52)));
+  return { wide: x.map((value) => value * 2 ** -52), inside, height: x.map((value, i) => (i ? density(value) : 1)) };
+})();
+
+const LIMB = 2 ** 24;
+const limbs_of = (value) => [0n, 24n, 48n, 72n, 96n, 120n].map((shift) => Number((value >> shift) & 0xffffffn));
+const PCG_FACTOR = limbs_of(0x2360ed051fc65da44385df649fccf645n);
+
+/* numpy.random.default_rng: PCG64 (O'Neill 2014), its 128 bits in limbs of 24. */
+class Generator {
+  constructor(seed) {
+    const words = generate_state(seed, 8).map(BigInt);
+    const long = (k) => (words[k + 1] << 96n) | (words[k] << 64n) | (words[k + 3] << 32n) | words[k + 2];
+    const mask = (1n << 128n) - 1n;
+    this.increment = limbs_of(((long(4) << 1n) | 1n) & mask);
+    this.state = new Float64Array(6);
+    const sum = (long(0) + ((long(4) << 1n) | 1n)) & mask; // a step from 0, then the seed
+    this.state.set(limbs_of(sum));
+    this.high = 0;
+    this.low = 0;
+    this.next();
+  }
+
+  /* Makes the next 64 bits: `high` and `low`. */
+  next() {
+    const { state, increment } = this;
+    const [f0, f1, f2, f3, f4, f5] = PCG_FACTOR;
+    const [s0, s1, s2, s3, s4, s5] = state;
+    let sum = s0 * f0 + increment[0];
+    let carry = Math.floor(sum / LIMB);
+    const n0 = sum - carry * LIMB;
+    sum = s0 * f1 + s1 * f0 + increment[1] + carry;
+    carry = Math.floor(sum / LIMB);
+    const n1 = sum - carry * LIMB;
+    sum = s0 * f2 + s1 * f1 + s2 * f0 + increment[2] + carry;
+    carry = Math.floor(sum / LIMB);
+    const n2 = sum - carry * LIMB;
+    sum = s0 * f3 + s1 * f2 + s2 * f1 + s3 * f0 + increment[3] + carry;
+    carry = Math.floor(sum / LIMB);
+    const n3 = sum - carry * LIMB;
+    sum = s0 * f4 + s1 * f3 + s2 * f2 + s3 * f1 + s4 * f0 + increment[4] + carry;
+    carry = Math.floor(sum / LIMB);
+    const n4 = sum - carry * LIMB;
+    sum = s0 * f5 + s1 * f4 + s2 * f3 + s3 * f2 + s4 * f1 + s5 * f0 + increment[5] + carry;
+    const n5 = sum - Math.floor(sum / 256) * 256;
+    state[0] = n0;
+    state[1] = n1;
+    state[2] = n2;
+    state[3] = n3;
+    state[4] = n4;
+    state[5] = n5;
+    const top = n4 | (n5 << 24) | 0;
+    const word = (n2 >>> 16) | (n3 << 8); // bits 64 to 95
+    const low = (n0 | (n1 << 24)) ^ word;
+    const high = ((n1 >>> 8) | (n2 << 16)) ^ top;
+    const by = top >>> 26;
+    const [a, b] = by & 32 ? [high, low] : [low, high];
+    const shift = by & 31;
+    this.low = (shift ? (a >>> shift) | (b << (32 - shift)) : a) >>> 0;
+    this.high = (shift ? (b >>> shift) | (a << (32 - shift)) : b) >>> 0;
+  }
+
+  random() {
+    this.next();
+    return (this.high * 2097152 + (this.low >>> 11)) * 2 ** -53;
+  }
+
+  standard_normal() {
+    for (;;) {
+      this.next();
+      const layer = this.low & 0xff;
+      const negative = this.low & 0x100;
+      const whole = (this.high & 0x1fffffff) * 8388608 + (this.low >>> 9);
+      const bit = this.low & 0x20000;
+      const x = negative ? -whole * ziggurat.wide[layer] : whole * ziggurat.wide[layer];
+      if (whole < ziggurat.inside[layer]) return x;
+      if (layer === 0) {
+        for (;;) {
+          const beyond = -Math.log1p(-this.random()) / ZIGGURAT_R;
+          const y = -Math.log1p(-this.random());
+          if (y + y > beyond * beyond) return bit ? -(ZIGGURAT_R + beyond) : ZIGGURAT_R + beyond;
+        }
+      }
+      const { height } = ziggurat;
+      if ((height[layer - 1] - height[layer]) * this.random() + height[layer] < Math.exp(-0.5 * x * x)) return x;
+    }
+  }
+}
+
+/* ---- The learner ---- */
+
+/* coartic/learner/conditions.py */
+const condition = (hands, modify_other, hand_exploration, changes = {}) => ({
+  hands, modify_chosen: true, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, corrects: true,
+  credit: "overall", discount: 0, ...changes,
+});
+const CONDITIONS = {
+  EC1: condition([RIGHT], false, "none"),
+  EC2: condition([LEFT, RIGHT], true, "closest"),
+  EC3: condition([LEFT, RIGHT], false, "random"),
+  EC4: condition([LEFT, RIGHT], true, "random"),
+};
+const VARIANTS = Object.fromEntries(["EC1", "EC4"].flatMap((base) => [
+  [`${base}-uncorrected`, { ...CONDITIONS[base], corrects: false }],
+  [`${base}-subtask`, { ...CONDITIONS[base], credit: "subtask" }],
+]));
+const EQUALLY_NEAR = 1e-9;
+
+/* coartic/learner/kernel.py, under the readings that the package takes by default. */
+class Learner {
+  constructor(problem, rules, seed, first_hands = initial_hands(problem)) {
+    Object.assign(this, { problem, rules, first_hands });
+    this.rng = new Generator(seed);
+    this.trials = 0;
+    this.best = null;
+    this.values = problem.goals.map(() => [LEFT, RIGHT, NO_HAND].map(() => [-Infinity, -Infinity]));
+    this.targets = problem.goals.map(() => [LEFT, RIGHT, NO_HAND].map(() => [null, null]));
+    this.explored = [LEFT, RIGHT].map((chosen) => {
+      const joints = new Array(problem.dof).fill(false);
+      const fill = (hand, whether) => {
+        const arm = problem.arms[hand];
+        joints.fill(whether, arm.first, arm.first + arm.links.length);
+      };
+      problem.free.forEach((free, axis) => { joints[axis] = rules.modify_chosen && free; });
+      fill(chosen, rules.modify_chosen);
+      fill(1 - chosen, rules.modify_other);
+      return joints;
+    });
+    this.target = new Float64Array(problem.dof);
+  }
+
+  random_hand() {
+    return this.rules.hands[Math.floor(this.rng.random() * this.rules.hands.length)];
+  }
+
+  closest_hand(q, number) {
+    const [first, ...others] = this.rules.hands;
+    let nearest = first;
+    let nearest_distance = distance_to_goal(this.problem, q, number, first);
+    let tie = false;
+    others.forEach((hand) => {
+      const distance = distance_to_goal(this.problem, q, number, hand);
+      tie = Math.abs(distance - nearest_distance) <= EQUALLY_NEAR;
+      if (distance < nearest_distance) [nearest, nearest_distance] = [hand, distance];
+    });
+    return tie ? this.random_hand() : nearest;
+  }
+
+  greedy_hand(number, previous) {
+    const values = this.values[number][previous];
+    return this.rules.hands.reduce((best, hand) => (values[hand] > values[best] ? hand : best), this.rules.hands[0]);
+  }
+
+  choose_hand(q, number, previous, explore) {
+    const { hand_exploration, epsilon } = this.rules;
+    if (explore && hand_exploration !== "none" && this.rng.random() < epsilon) {
+      return hand_exploration === "random" ? this.random_hand() : this.closest_hand(q, number);
+    }
+    return this.greedy_hand(number, previous);
+  }
+
+  /* q^t = q*(s, a) + η; null where no target is stored. */
+  set_target(q, number, previous, hand, explore) {
+    const stored = this.targets[number][previous][hand];
+    if (!stored) return null;
+    const { target, rng } = this;
+    const { noise_sd, modify_other } = this.rules;
+    const explored = this.explored[hand];
+    const other = this.problem.arms[1 - hand];
+    for (let j = 0; j < target.length; j += 1) {
+      const follows = !modify_other && j >= other.first && j < other.first + other.links.length;
+      target[j] = follows ? q[j] : stored[j];
+      if (explore && explored[j]) target[j] += noise_sd * rng.standard_normal();
+    }
+    return target;
+  }
+
+  make_trial(explore) {
+    const trial = new Trial(this.problem);
+    const first = this.trials === 0;
+    let previous = NO_HAND;
+    for (let goal = 0; trial.going && goal < this.problem.goals.length; goal += 1) {
+      const hand = first ? this.first_hands[goal] : this.choose_hand(trial.q, goal, previous, explore);
+      const target = first ? null : this.set_target(trial.q, goal, previous, hand, explore);
+      trial.reaches(goal, hand, target, this.rules.corrects);
+      previous = hand;
+    }
+    return trial;
+  }
+
+  update_tables(trial) {
+    let later = 0;
+    for (let goal = this.problem.goals.length - 1; goal >= 0; goal -= 1) {
+      let credit = trial.reward;
+      if (this.rules.credit === "subtask") {
+        let ticks = 0;
+        trial.movements.forEach((movement) => { if (movement.goal === goal) ticks += movement.ticks; });
+        credit = this.rules.discount * later - ticks;
+        later = credit;
+      }
+      const previous = goal ? trial.hands[goal - 1] : NO_HAND;
+      const hand = trial.hands[goal];
+      if (credit > this.values[goal][previous][hand]) {
+        this.values[goal][previous][hand] = credit;
+        this.targets[goal][previous][hand] = trial.reached[goal];
+      }
+    }
+  }
+
+  /* The next trial, and what is learned from it. */
+  step() {
+    const trial = this.make_trial(true);
+    this.trials += 1;
+    if (trial.going) {
+      this.update_tables(trial);
+      if (!this.best || trial.reward > this.best.reward) this.best = trial;
+    }
+    return trial;
+  }
+
+  /* A trial without noise, greedy. */
+  replay() {
+    return this.make_trial(false);
+  }
+
+  /* coartic/learner/run.py: what is learned so far; null for nothing. */
+  learned() {
+    if (this.rules.credit === "overall") return this.best;
+    const replay = this.trials ? this.replay() : null;
+    return replay && replay.going ? replay : null;
+  }
+}
+
+/* coartic/learner/learning.py: a whole run. */
+function learn(problem, rules, seed, trials) {
+  const learner = new Learner(problem, rules, seed);
+  const rewards = [];
+  while (learner.trials < trials) rewards.push(learner.step().reward);
+  return { learner, rewards };
+}
+
+/* ---- CMA-ES on the same trials (coartic/baselines/cma_es.py) ---- */
+
+/* coartic/optimisers.py: entries [goal, joint] that are worth exploring with a hand sequence. */
+function explored_joints(problem, hands) {
+  const entries = [];
+  hands.forEach((_, goal) => {
+    const useful = hands.slice(goal);
+    for (let j = 0; j < problem.dof; j += 1) {
+      const hand = j < problem.arms[RIGHT].first ? LEFT : RIGHT;
+      if (j < BASE_DOF ? problem.free[j] : useful.includes(hand)) entries.push([goal, j]);
+    }
+  });
+  return entries;
+}
+
+/* CMA-ES (Hansen 2016) with a Cholesky factor in place of the matrix's root (Krause, Arbonès & Igel 2016). */
+class Strategy {
+  constructor(search, hands) {
+    Object.assign(this, { search, hands, sigma_0: 0.05, generations: 1, restarts: -1 });
+    this.entries = explored_joints(search.problem, hands);
+    const first = search.try(hands, hands.map(() => null));
+    this.reward = first.reward;
+    if (first.going) this.first = this.entries.map(([goal, j]) => first.reached[goal][j]);
+  }
+
+  restart() {
+    this.restarts += 1;
+    const n = this.entries.length;
+    const size = (4 + Math.floor(3 * Math.log(n))) * 2 ** this.restarts;
+    const raw = Array.from({ length: Math.floor(size / 2) }, (_, i) => Math.log((size + 1) / 2) - Math.log(i + 1));
+    const sum = raw.reduce((a, b) => a + b);
+    const weights = raw.map((w) => w / sum);
+    const mass = 1 / weights.reduce((a, w) => a + w * w, 0);
+    const cs = (mass + 2) / (n + mass + 5);
+    const c1 = 2 / ((n + 1.3) ** 2 + mass);
+    Object.assign(this, {
+      n, size, weights, mass, cs, c1, mean: [...this.first], sigma: this.sigma_0, made: 0, seen: [],
+      cc: (4 + mass / n) / (n + 4 + (2 * mass) / n),
+      cmu: Math.min(1 - c1, (2 * (mass - 2 + 1 / mass)) / ((n + 2) ** 2 + mass)),
+      damps: 1 + 2 * Math.max(0, Math.sqrt((mass - 1) / (n + 1)) - 1) + cs,
+      expected: Math.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n)),
+      ps: new Float64Array(n), pc: new Float64Array(n),
+      C: Array.from({ length: n }, (_, i) => Float64Array.from({ length: n }, (__, j) => (i === j ? 1 : 0))),
+    });
+    this.factorise();
+  }
+
+  factorise() {
+    const { n, C } = this;
+    const A = C.map(() => new Float64Array(n));
+    for (let i = 0; i < n; i += 1) {
+      for (let j = 0; j <= i; j += 1) {
+        let rest = C[i][j];
+        for (let k = 0; k < j; k += 1) rest -= A[i][k] * A[j][k];
+        A[i][j] = i === j ? Math.sqrt(Math.max(rest, 1e-20)) : rest / A[j][j];
+      }
+    }
+    this.A = A;
+  }
+
+  /* As pycma: the best rewards have not changed for so long, or no step is left. */
+  stops() {
+    const recent = this.seen.slice(-(10 + Math.ceil((30 * this.n) / this.size)));
+    return (this.made > recent.length && Math.max(...recent) === Math.min(...recent)) || this.sigma < 1e-9;
+  }
+
+  generation() {
+    if (this.restarts < 0 || this.stops()) this.restart();
+    const { n, A, search, hands, entries } = this;
+    const points = [];
+    for (let i = 0; i < this.size && search.left > 0; i += 1) {
+      const z = Float64Array.from({ length: n }, () => search.rng.standard_normal());
+      const y = new Float64Array(n);
+      for (let r = 0; r < n; r += 1) for (let k = 0; k <= r; k += 1) y[r] += A[r][k] * z[k];
+      const targets = hands.map(() => new Float64Array(search.problem.dof).fill(NaN));
+      entries.forEach(([goal, j], k) => { targets[goal][j] = this.mean[k] + this.sigma * y[k]; });
+      const { reward } = search.try(hands, targets);
+      points.push({ z, y, reward });
+      this.reward = Math.max(this.reward, reward);
+    }
+    this.generations += 1;
+    if (points.length === this.size) this.tell(points.sort((a, b) => b.reward - a.reward));
+  }
+
+  tell(points) {
+    const { n, weights, mass, cs, cc, c1, cmu, ps, pc, C } = this;
+    const best = points.slice(0, weights.length);
+    const combined = (key, k) => best.reduce((sum, point, i) => sum + weights[i] * point[key][k], 0);
+    let norm = 0;
+    const step = new Float64Array(n);
+    for (let k = 0; k < n; k += 1) {
+      step[k] = combined("y", k);
+      this.mean[k] += this.sigma * step[k];
+      ps[k] = (1 - cs) * ps[k] + Math.sqrt(cs * (2 - cs) * mass) * combined("z", k);
+      norm += ps[k] * ps[k];
+    }
+    norm = Math.sqrt(norm);
+    this.made += 1;
+    const heavy = norm / Math.sqrt(1 - (1 - cs) ** (2 * this.made)) < (1.4 + 2 / (n + 1)) * this.expected ? 1 : 0;
+    for (let k = 0; k < n; k += 1) pc[k] = (1 - cc) * pc[k] + heavy * Math.sqrt(cc * (2 - cc) * mass) * step[k];
+    const keep = 1 - c1 - cmu + (1 - heavy) * c1 * cc * (2 - cc);
+    for (let i = 0; i < n; i += 1) {
+      for (let j = 0; j <= i; j += 1) {
+        let rank = 0;
+        for (let p = 0; p < best.length; p += 1) rank += weights[p] * best[p].y[i] * best[p].y[j];
+        C[i][j] = keep * C[i][j] + c1 * pc[i] * pc[j] + cmu * rank;
+        C[j][i] = C[i][j];
+      }
+    }
+    this.sigma *= Math.exp((cs / this.damps) * (norm / this.expected - 1));
+    this.seen.push(points[0].reward);
+    this.factorise();
+  }
+}
+
+/* coartic/baselines/cma_es.py, `Bandit`: a strategy for each hand sequence, the next generation to the
+   one whose upper confidence bound is highest. */
+class Search {
+  constructor(problem, seed, trials) {
+    Object.assign(this, { problem, left: trials, trials: 0, rewards: [], best: null, strategies: [] });
+    this.rng = new Generator(seed);
+    this.exploration = 0.2;
+  }
+
+  try(hands, targets) {
+    const trial = make_trial(this.problem, hands, targets);
+    this.trials += 1;
+    this.left -= 1;
+    this.rewards.push(trial.reward);
+    if (trial.going && (!this.best || trial.reward > this.best.reward)) this.best = trial;
+    return trial;
+  }
+
+  /* The next trial or generation of trials. */
+  step() {
+    if (!this.sequences) {
+      const named = letters_of(initial_hands(this.problem));
+      this.sequences = hand_sequences(this.problem).sort((a, b) => (letters_of(b) === named) - (letters_of(a) === named));
+    }
+    if (this.sequences.length) {
+      this.strategies.push(new Strategy(this, this.sequences.shift()));
+      return;
+    }
+    if (!this.generations) {
+      this.strategies = this.strategies.filter((strategy) => strategy.first);
+      this.generations = this.strategies.length;
+      const first = this.strategies.map((strategy) => strategy.reward);
+      this.width = this.exploration * Math.max(Math.max(...first) - Math.min(...first), 1);
+    }
+    if (!this.strategies.length) {
+      this.left = 0;
+      return;
+    }
+    const bound = (strategy) => strategy.reward + this.width * Math.sqrt((2 * Math.log(this.generations)) / strategy.generations);
+    this.strategies.reduce((a, b) => (bound(b) > bound(a) ? b : a)).generation();
+    this.generations += 1;
+  }
+
+  learned() {
+    return this.best;
+  }
+}
+
+/* ---- A plan that looks ahead (as coartic/baselines/receding_horizon.py, by a local search) ---- */
+
+/* The way from a point of an arm, its hand or an elbow, to a place, and how that point moves with some joints. */
+function pull_of(problem, q, place, hand, joints, tip = problem.arms[hand].links.length) {
+  const arm = problem.arms[hand];
+  chain(q, arm, xs, ys);
+  const dx = place[0] - xs[tip];
+  const dy = place[1] - ys[tip];
+  const rows = joints.map((j) => {
+    if (j < BASE_DOF) return j ? [0, 1] : [1, 0];
+    const k = j - arm.first;
+    return k >= 0 && k < tip ? [-(ys[tip] - ys[k]), xs[tip] - xs[k]] : [0, 0];
+  });
+  return { dx, dy, distance: Math.sqrt(dx * dx + dy * dy), rows };
+}
+
+/* Move `q` to a near posture, by some joints, with that point within `radius` of a place; whether it gets there. */
+function project(problem, q, place, hand, joints, radius, tip) {
+  for (let round = 0; round < 60; round += 1) {
+    const { dx, dy, distance, rows } = pull_of(problem, q, place, hand, joints, tip);
+    if (distance <= radius + 1e-9) return true;
+    const share = (distance - radius) / distance;
+    let [a, b, c] = [1e-9, 0, 1e-9];
+    rows.forEach(([x, y]) => { a += x * x; b += x * y; c += y * y; });
+    const determinant = a * c - b * b;
+    const u = (share * (c * dx - b * dy)) / determinant;
+    const v = (share * (a * dy - b * dx)) / determinant;
+    const size = Math.sqrt(rows.reduce((sum, [x, y]) => sum + (x * u + y * v) ** 2, 0));
+    const limit = Math.min(1, 0.5 / size);
+    rows.forEach(([x, y], i) => { q[joints[i]] += limit * (x * u + y * v); });
+  }
+  return false;
+}
+
+const apart = (a, b) => Math.sqrt(a.reduce((square, value, j) => square + (value - b[j]) ** 2, 0));
+
+/* The shortest joint-space path from `q` through goals `from` to `to` (excluded) with given hands, from
+   guessed postures: a taut string whose corners slide on the discs. Null where it finds none. */
+function pulled_taut(problem, q, from, hands, guess, rounds) {
+  const joints = Array.from({ length: problem.dof }, (_, j) => j).filter((j) => (j < BASE_DOF
+    ? problem.free[j] : problem.hands.includes(j < problem.arms[RIGHT].first ? LEFT : RIGHT)));
+  const radius = problem.radius * (1 - 1e-3);
+  const corners = guess.map((corner) => Float64Array.from(corner));
+  const strides = corners.map(() => 1);
+  if (!corners.every((corner, k) => project(problem, corner, problem.goals[from + k], hands[k], joints, radius))) return null;
+  for (let round = 0; round < rounds && Math.max(...strides) > 1e-3; round += 1) {
+    corners.forEach((here, k) => {
+      const before = k ? corners[k - 1] : q;
+      const after = corners[k + 1];
+      const w = 1 / (apart(here, before) + 1e-6);
+      const v = after ? 1 / (apart(here, after) + 1e-6) : 0;
+      const way = here.map((value, j) => (w * before[j] + (after ? v * after[j] : 0)) / (w + v) - value);
+      const { dx, dy, distance, rows } = pull_of(problem, here, problem.goals[from + k], hands[k], joints);
+      if (distance > radius - 1e-6) { // on the rim it slides along
+        const inward = rows.map(([x, y]) => x * dx + y * dy);
+        const share = inward.reduce((sum, value, i) => sum + value * way[joints[i]], 0)
+          / inward.reduce((sum, value) => sum + value * value, 1e-12);
+        if (share < 0) inward.forEach((value, i) => { way[joints[i]] -= share * value; });
+      }
+      const there = here.map((value, j) => value + strides[k] * way[j]);
+      const around = (corner) => apart(corner, before) + (after ? apart(corner, after) : 0);
+      const shorter = project(problem, there, problem.goals[from + k], hands[k], joints, radius) && around(there) < around(here) - 1e-9;
+      strides[k] = shorter ? Math.min(1, 1.5 * strides[k]) : strides[k] / 2;
+      if (shorter) corners[k] = there;
+    });
+  }
+  const length = corners.reduce((sum, corner, k) => sum + apart(corner, k ? corners[k - 1] : q), 0);
+  return { corners, length, hands };
+}
+
+/* The best of such paths over hand sequences, from the corrective process's postures and others. */
+function shortest_plan(problem, q, from, to, starts) {
+  const window = { ...problem, goals: problem.goals.slice(from, to), start: q, penalty: null };
+  const rng = new Generator(from);
+  let plans = [];
+  hand_sequences(window).forEach((hands) => {
+    const alone = corrective_trial(window, hands);
+    for (let n = 0; alone.going && n < starts; n += 1) {
+      const spread = n ? 0.6 : 0;
+      const guess = alone.reached.map((posture) => posture.map((value) => value + (spread && spread * rng.standard_normal())));
+      problem.free.forEach((free, axis) => { if (!free) guess.forEach((posture) => { posture[axis] = q[axis]; }); });
+      const plan = pulled_taut(problem, q, from, hands, guess, 40);
+      if (plan) plans.push(plan);
+    }
+  });
+  plans = plans.sort((a, b) => a.length - b.length).slice(0, 6)
+    .map((plan) => pulled_taut(problem, q, from, plan.hands, plan.corners, 400)).filter(Boolean);
+  return plans.sort((a, b) => a.length - b.length)[0] || null;
+}
+
+const THROUGH = 0.06; // in joint space
+
+/* coartic/baselines/receding_horizon.py: `horizon` goals in view beyond the one to be hit. */
+function receding_horizon(problem, horizon, starts = 8) {
+  const trial = new Trial(problem);
+  const count = problem.goals.length;
+  while (trial.going && trial.reached.length < count) {
+    const goal = trial.reached.length;
+    const end = Math.min(goal + horizon + 1, count);
+    const plan = shortest_plan(problem, trial.q, goal, end, starts);
+    if (!plan) trial.going = false;
+    else {
+      const followed = end < count ? 1 : end - goal;
+      for (let k = 0; trial.going && k < followed; k += 1) {
+        // Through the rim: the target lies beyond the corner, so that the movement ends with the first step inside.
+        const corner = plan.corners[k];
+        const beyond = THROUGH / (apart(corner, trial.q) + 1e-9);
+        const target = corner.map((value, j) => value + beyond * (value - trial.q[j]));
+        trial.reaches(goal + k, plan.hands[k], target);
+      }
+    }
+  }
+  return trial;
+}
+
+if (typeof module !== "undefined") {
+  module.exports = {
+    CONDITIONS, VARIANTS, PAPER, Generator, Learner, Search, Trial, chain, correct, corrective_trial, distance_to_goal,
+    execute, initial_hands, joint_positions, learn, letters_of, make_trial, move, path_points, problem_of,
+    receding_horizon, trajectory,
+  };
+}

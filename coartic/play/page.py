@@ -1,0 +1,135 @@
+"""The page of `coartic play`: one HTML file, which needs no other and no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+import coartic
+from coartic.learner.learning import learn
+from coartic.robot import Array
+from coartic.tasks.task import Task, shipped_tasks
+
+FOLDER = Path(__file__).parent
+MODEL = FOLDER / "model.js"
+"""The model in JavaScript."""
+UP_OR_DOWN = ("ascending", "descending")
+"""Tasks that share the start and the first goal: with them the page begins."""
+
+
+def play_page(task: Task | None = None) -> str:
+    """The page as HTML; it begins with a task, or with one first goal before two others."""
+    presets = [preset_of(each) for each in shipped_tasks().values()]
+    if task is None:
+        presets.insert(0, up_or_down())
+    else:
+        own = preset_of(task)
+        presets = [own, *(preset for preset in presets if preset != own)]
+    return (
+        templates()
+        .get_template("page.html.jinja")
+        .render(
+            styles=text_of("page.css") + text_of("play.css"),
+            figure=figure(presets),
+            version=coartic.__version__,
+        )
+    )
+
+
+def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -> str:
+    """The figure as a part of a page, which has the styles of ``play.css`` and defines the colours
+    that these name.
+
+    ``presets`` are what it offers (:func:`preset_of`); ``still`` stands where scripts are switched
+    off. ``more`` is for the scripts: the ``page`` to which links lead, or the ``control`` that
+    holds the link; ``model``, the constants of movement; ``first``, what is chosen at first;
+    ``cells`` of the table ``ranking`` that show films: row, column and what to choose.
+    """
+    return (
+        templates()
+        .get_template("figure.html.jinja")
+        .render(
+            still=still or text_of("still.svg"),
+            data=as_json({"presets": presets, **more}),
+            model="\n".join(map(text_of, ("model.js", "worker.js"))),
+            script="\n".join(map(text_of, ("gif.js", "picture.js", "play.js", "begin.js"))),
+        )
+    )
+
+
+def preset_of(task: Task) -> dict[str, Any]:
+    """A task as the figure offers it."""
+    keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot", "penalty"}
+    mark = "†" if "goals" in task.reconstructed else ""
+    content = task.model_dump(mode="json", include=keys)
+    return {"label": f"{task.label}{mark}", "task": content}
+
+
+def up_or_down() -> dict[str, Any]:
+    """One first goal before two others."""
+    up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
+    return {**preset_of(up), "label": "Up or down", "others": down.goals[1:]}
+
+
+def text_of(name: str) -> str:
+    """A file beside this one, as a part of a page."""
+    return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
+
+
+def as_json(data: Any) -> str:
+    """Data within a page."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def draw_still() -> str:
+    """``still.svg``, shown where scripts are switched off: both robots of the first view as they
+    hit goal 1 after learning."""
+    tasks = [shipped_tasks()[name] for name in UP_OR_DOWN]
+    shapes = []
+    for name, task in zip(("first", "second"), tasks, strict=True):
+        q = learn(task, "EC1", seed=0).execute().configurations[0]
+        arm = task.robot.joint_positions(q, "right")
+        outline, line = points(task.robot.base_outline(q)), points(arm)
+        joints = "".join(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r=".06"/>' for x, y in arm)
+        shapes.append(
+            f'<g style="--own: var(--{name})"><polygon points="{outline}"/>'
+            f'<polyline points="{line}"/>{joints}</g>'
+        )
+        for number, (x, y) in enumerate(task.goals, 1):
+            shapes.append(
+                f'<circle class="goal" cx="{x}" cy="{-y}" r="{task.radius}"/>'
+                f'<text x="{x + 0.2}" y="{-y - 0.2}">{number}</text>'
+            )
+    style = (
+        "svg g{fill:none;stroke:var(--own);stroke-width:.05;stroke-linejoin:round}"
+        "svg g circle{fill:var(--own)}svg .goal{fill:none;stroke:var(--ink);stroke-width:.03}"
+        "svg text{fill:var(--ink);font-size:.35px}"
+    )
+    title = "Two robots hit goal 1; they stand differently, since their next goals differ."
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 -4.5 7.5 9" role="img" '
+        f'aria-label="{title}"><style>{style}</style>{"".join(shapes)}</svg>\n'
+    )
+
+
+def points(of: Array) -> str:
+    """Points as SVG has them, with y downwards."""
+    return " ".join(f"{x:.3f},{-y:.3f}" for x, y in of)
+
+
+@cache
+def templates() -> Environment:
+    """The templates beside this file."""
+    return Environment(
+        loader=FileSystemLoader(FOLDER),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

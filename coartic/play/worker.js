@@ -1,0 +1,76 @@
+/* ---- The worker: makes trials in slices, so that it hears a new order at once ---- */
+
+const SLICE_MS = 15;
+const REPORT_MS = 60;
+
+/* A run of the learner, of CMA-ES or of a planner, as an order names it. */
+class Job {
+  constructor({ key, task, model, rules, seed, horizon, trials, turn = 0 }) {
+    const problem = problem_of(task, model);
+    Object.assign(this, { key, trials, turn, made: 0, due: 1, rewards: [], snapshots: [], done: false });
+    if (rules === "cma-es") this.method = new Search(problem, seed, trials);
+    else if (rules) this.method = new Learner(problem, rules, seed);
+    else this.method = { trials: 0, learned: () => receding_horizon(problem, horizon), step: () => { this.trials = 1; } };
+  }
+
+  step() {
+    const { method } = this;
+    const trial = method.step();
+    if (trial) this.rewards.push(trial.reward);
+    this.made = method.trials || 1;
+    this.done = this.made >= this.trials || method.left <= 0;
+    if (this.made >= this.due || this.done) {
+      this.due = Math.max(this.made + 1, Math.ceil(1.1 * this.made));
+      const learned = method.learned();
+      if (learned) this.snapshots.push({ trials: this.made, reward: learned.reward, movements: learned.movements, reached: learned.reached });
+    }
+  }
+
+  /* What is new since the last report. */
+  report() {
+    const { key, made, done, snapshots } = this;
+    const rewards = this.rewards.length ? this.rewards : (this.method.rewards || []).splice(0);
+    [this.snapshots, this.rewards] = [[], []];
+    return { key, made, done, snapshots, rewards: Float64Array.from(rewards) };
+  }
+}
+
+/* Trials a second of this device, by the learner on a task. */
+function trials_a_second(task) {
+  const learner = new Learner(problem_of(task), { ...CONDITIONS.EC4, hands: problem_of(task).hands }, 0);
+  for (const end = performance.now() + 60; performance.now() < end;) learner.step(); // it warms up
+  const [begin, before] = [performance.now(), learner.trials];
+  while (performance.now() < begin + 60) learner.step();
+  return (1000 * (learner.trials - before)) / (performance.now() - begin);
+}
+
+if (typeof document === "undefined" && typeof self !== "undefined" && typeof module === "undefined") {
+  let [order, jobs, reported] = [0, [], 0];
+  const work = (current) => {
+    if (current !== order) return;
+    const open = jobs.filter((job) => !job.done);
+    const turn = Math.min(...open.map((job) => job.turn));
+    const now = open.filter((job) => job.turn === turn);
+    const end = performance.now() + SLICE_MS;
+    const worked = new Set();
+    while (now.some((job) => !job.done) && performance.now() < end) {
+      now.forEach((job) => { if (!job.done) job.step(); });
+    }
+    now.forEach((job) => worked.add(job));
+    if (performance.now() > reported + REPORT_MS || now.every((job) => job.done)) {
+      reported = performance.now();
+      self.postMessage({ order, reports: [...worked].map((job) => job.report()) });
+    }
+    if (jobs.some((job) => !job.done)) setTimeout(work, 0, current);
+  };
+  self.onmessage = ({ data }) => {
+    if (data.measure) {
+      self.postMessage({ rate: trials_a_second(data.measure) });
+      return;
+    }
+    order = data.order;
+    jobs = data.jobs.map((job) => new Job(job));
+    reported = performance.now();
+    work(order);
+  };
+}

@@ -1,0 +1,253 @@
+"""The page of ``coartic play`` in a real browser: what it says is what the package finds."""
+
+import re
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from coartic import Movement, corrective_trial, execute, initial_hands, learn, load_task
+from coartic.analysis.signatures.context import context_dependence
+from coartic.play import page as pages
+from tests.support.strategies import changed
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    file = tmp_path_factory.mktemp("play") / "play.html"
+    file.write_text(pages.play_page(), encoding="utf-8")
+    return file.as_uri()
+
+
+@pytest.fixture
+def opened(visited, address):
+    """Opens the page in a state."""
+
+    def open_page(state="", width=1280, **options):
+        options = {"reduced_motion": "reduce", **options}
+        return visited(f"{address}#{state}", width, **options)
+
+    return open_page
+
+
+def text(page, name):
+    return page.locator(f"[data-is={name}]").inner_text()
+
+
+def ticks(page, who):
+    """What the page says that somebody needs."""
+    (found,) = re.findall(rf"{who} (\d+) ticks", text(page, "score"))
+    return int(found)
+
+
+def settled(page):
+    """Wait until nothing is to come."""
+    page.wait_for_selector(".play[data-settled]")
+    return page
+
+
+def trials_made(page):
+    return int(re.sub(r"\D", "", text(page, "progress")))
+
+
+def test_it_is_one_small_file_without_addresses():
+    html = pages.play_page()
+    assert len(html.encode()) <= 300_000
+    assert not re.findall(r"(?:src|href)=[\"'](?!data:)|url\(|@import", html)
+    assert 50 < len(re.sub(r"<[^>]*>", " ", pages.text_of("try.html.jinja")).split()) <= 150
+    for name, label in (
+        ("two-armed-2", "Two-armed 2†"),
+        ("long/v1/i000", load_task("long/v1/i000").label),
+    ):
+        own = pages.play_page(load_task(name))
+        assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
+
+
+def test_the_still_picture_is_what_the_learner_finds():
+    assert pages.text_of("still.svg") == pages.draw_still()
+
+
+def distance_in_spreads(trials, seeds=5):
+    """Between the postures at the goal that ascending and descending share."""
+    return context_dependence(
+        *(
+            np.array(
+                [
+                    learn(task, "EC1", seed=seed, trials=trials).execute().configurations[0]
+                    for seed in range(seeds)
+                ]
+            )
+            for task in pages.UP_OR_DOWN
+        )
+    )
+
+
+def test_coarticulation_appears_by_the_reward_of_the_whole_and_goes_with_that_of_movements(opened):
+    page = settled(opened())
+    trials = trials_made(page)
+    for role, task in (("Blue", "ascending"), ("Orange", "descending")):
+        assert ticks(page, role) == -learn(task, "EC1", seed=0, trials=trials).reward
+    spreads = distance_in_spreads(trials)
+    assert spreads > 2
+    assert f"postures lie {spreads:.1f} standard deviations apart (5 runs each" in text(
+        page, "finding"
+    )
+    # Earlier, by the slider, there was less of it.
+    slider = page.get_by_role("slider", name="Trials")
+    slider.fill("1")
+    assert "alike" in text(page, "finding")
+    slider.fill("1000")
+    page.get_by_role("radio", name="each movement").check()
+    settled(page)
+    assert "alike" in text(page, "finding")
+
+
+def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
+    page = settled(opened("who=alone&preset=1&others="))
+    handle = page.get_by_role("button", name="Goal 3")
+    handle.focus()
+    for _ in range(7):
+        page.keyboard.press("ArrowDown")
+    page.keyboard.press("Shift+ArrowLeft")
+    task = changed("ascending", goals=[[6.0, 0.1], [6.0, 2.0], [5.98, 3.3]])
+    page.wait_for_url("**goals=6,0.1;6,2;5.98,3.3*")
+    assert ticks(page, "One goal at a time") == -corrective_trial(task, "RRR").reward
+    page.get_by_role("radio", name="learner").check()
+    settled(page)
+    run = learn(task, "EC1", seed=0, trials=trials_made(page))
+    assert ticks(page, "The learner") == -run.reward
+    # By the pointer, too, and out of reach it says so.
+    box = handle.bounding_box()
+    page.mouse.move(box["x"] + 22, box["y"] + 22)
+    page.mouse.down()
+    page.mouse.move(box["x"] - 78, box["y"] + 50, steps=4)
+    page.mouse.up()
+    page.wait_for_url(re.compile(r"goals=6,0.1;6,2;5\.[01234]\d*,[23]"))
+
+
+def test_two_arms_more_goals_and_a_plan(opened):
+    page = settled(opened("preset=3&who=plan&ahead=3"))
+    assert 451 <= ticks(page, "The planner") < 470  # the best known is 451
+    alone = corrective_trial("two-armed-1", initial_hands("two-armed-1"))
+    assert ticks(page, "One goal at a time") == -alone.reward
+    page.get_by_role("button", name="Remove a goal").click()
+    page.get_by_role("radio", name="Evolution").check()
+    settled(page)
+    assert ticks(page, r"Evolution \(CMA-ES\)") < ticks(page, "One goal at a time")
+    page.get_by_role("button", name="Add a goal").click()
+    page.get_by_role("button", name="Goal 4").wait_for()
+    page.get_by_label("two next goals").check()
+    settled(page)
+    assert re.search(r"apart|alike|different hands", text(page, "finding"))
+
+
+def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
+    page = settled(opened("preset=3&who=you"))
+    handle = page.get_by_role("button", name="right arm, elbow 2")
+    box = handle.bounding_box()
+    page.mouse.move(box["x"] + 15, box["y"] + 15)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 35, box["y"] + 45, steps=5)
+    page.mouse.up()
+    page.get_by_label("Drag base and elbows at").select_option("2")
+    page.get_by_label("hit by the").select_option("0")
+    page.get_by_role("button", name="Base").focus()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowUp")  # it is on a rail
+    own = re.search(r"own=([^&]+)", page.url)[1]
+    rows = [[float(value) for value in row.split(",")] for row in own.split(";")]
+    movements = [
+        Movement(goal, ("left", "right")[int(row[0])], "learned", np.array(row[1:]))
+        for goal, row in enumerate(rows, 1)
+    ]
+    done = execute("two-armed-1", movements)
+    assert done.hands.startswith("RL")
+    assert ticks(page, "You") == done.ticks
+    again = settled(opened(page.url.partition("#")[2]))
+    assert text(again, "score") == text(page, "score")
+
+
+def test_the_link_holds_the_whole_state(opened):
+    page = settled(opened())
+    page.get_by_role("radio", name="each movement").check()
+    page.locator("[data-is=arms]").select_option("2")
+    page.get_by_label("It explores").select_option("EC3")
+    page.get_by_label("two next goals").uncheck()
+    page.get_by_label("Speed").select_option("0.5")
+    page.get_by_label("pause at hits").uncheck()
+    page.get_by_role("button", name="Goal 2").focus()
+    page.keyboard.press("ArrowRight")
+    settled(page)
+    page.get_by_role("slider", name="Trials").fill("400")
+    page.get_by_role("slider", name="Tick").fill("123")
+    state = """() => [...document.querySelectorAll('.play :is(select, input, .score, .handle)')]
+        .map(each => [each.value, each.checked, each.innerText, each.ariaLabel])"""
+    again = settled(opened(page.url.partition("#")[2]))
+    assert again.evaluate(state) == page.evaluate(state)
+    assert again.url == page.url
+    # What no state is is left out.
+    odd = settled(opened("who=learner&trials=x&preset=99&goals=1,a&nothing=1"))
+    assert ticks(odd, "Blue") > 0
+
+
+def test_it_plays_holds_at_hits_and_saves_a_film(opened, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    page = settled(opened(reduced_motion="no-preference"))
+    page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("slider", name="Tick").fill("100")
+    page.get_by_role("button", name="One tick on").click()
+    page.get_by_text("101 of").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save GIF").click()
+    download.value.save_as(tmp_path / "film.gif")
+    film = image.open(tmp_path / "film.gif")
+    assert film.n_frames > 60
+    film.seek(film.n_frames - 1)
+    assert len(film.convert("RGB").getcolors(100_000)) > 10
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Record").click()
+        page.get_by_role("slider", name="Tick").fill("30")
+        page.get_by_role("button", name="Stop and save").click()
+    assert download.value.suggested_filename == "coartic-use.gif"
+
+
+def test_a_goal_is_dragged_by_a_finger(opened):
+    page = settled(opened(width=390, has_touch=True, is_mobile=True))
+    page.locator("[data-is=stage]").scroll_into_view_if_needed()
+    before = page.evaluate("scrollY")
+    box = page.get_by_role("button", name="Goal 3 of blue").bounding_box()
+    x, y = box["x"] + 22, box["y"] + 22
+    finger = page.context.new_cdp_session(page)
+    for kind, height in (("touchStart", y), *(("touchMove", y + by) for by in range(5, 60, 5))):
+        points = [{"x": x, "y": height}]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait_for_url("**goals=*")
+    assert float(re.search(r"goals=6,0.1;6,2;[^,]+,([^&]+)", page.url)[1]) < 3.5
+    assert page.evaluate("scrollY") == before  # the page did not scroll instead
+
+
+@pytest.mark.parametrize(
+    ("width", "scheme", "state"),
+    [
+        (1280, "light", ""),
+        (768, "dark", "who=plan"),
+        (390, "dark", "preset=3"),
+        (390, "light", "preset=4&who=you"),
+    ],
+)
+def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, state):
+    page = settled(opened(state, width, color_scheme=scheme))
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    accessibility = Axe().run(page)
+    assert accessibility.violations_count == 0, accessibility.generate_report()
+
+
+def test_without_scripts_there_is_a_picture(browser, address):
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(address)
+    assert page.locator(".still svg").is_visible()
+    assert not page.locator(".stage").is_visible()
+    context.close()
