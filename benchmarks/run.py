@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +23,8 @@ from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
 from coartic.interruption import unbroken
-from coartic.runs.plan import Plan, RunKey
+from coartic.runs.plan import Plan, RunKey, trials_in
+from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
 from coartic.text import counted
 
@@ -48,10 +50,37 @@ class Progress:
     crashed: int = 0
     """Of all runs, those that crashed."""
 
+    waiting: Counter[str] = field(default_factory=Counter)
+    """Runs that are to come, by method."""
+    took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    """Wall time of the runs performed now, by method, s."""
+    timed: Counter[str] = field(default_factory=Counter)
+    """Number of those whose time is known."""
+    workers: int = 1
+
     def count(self, status: str) -> None:
         """Count a run that is there by its status."""
         self.failed += status != "ok"
         self.crashed += status == "crashed"
+
+    def finish(self, run: Run) -> None:
+        """Count a run that is performed now."""
+        method, seconds = run.setting.method, run.times.wall_s
+        self.done += 1
+        self.count(run.status)
+        self.waiting[method] -= 1
+        if seconds is not None:
+            self.timed[method] += 1
+            self.took[method] += seconds
+
+    @property
+    def time_left(self) -> tuple[float, bool]:
+        """Seconds that the runs to come take, judged by earlier ones of their methods, and whether
+        that is all of them: a method of which none is done yet counts nothing."""
+        coming = +self.waiting
+        known = [method for method in coming if self.timed[method]]
+        seconds = sum(coming[m] * self.took[m] / self.timed[m] for m in known)
+        return seconds / self.workers, len(known) == len(coming)
 
 
 Watcher = Callable[[Progress, str], None]
@@ -102,8 +131,11 @@ def perform(
         store.ask(plan, current_environment(), command(), now())
         progress = Progress(plan.size, stale=store.stale())
         missing = missing_runs(plan, store, progress, retry_failed=retry_failed, redo=redo)
+        for batch in missing:
+            progress.waiting[plan.cells[batch.position].method.name] += len(batch.keys)
+        progress.workers = executor.workers
         watch(progress, "")
-        batches = list(split(plan, missing, executor.workers))
+        batches = longest_first(plan, split(plan, missing, executor.workers))
         while batches:
             alone: list[Batch] = []
             jobs = [job_of(plan, batch) for batch in batches]
@@ -117,8 +149,7 @@ def perform(
                     with unbroken:
                         store.write(runs)
                         for run in runs:
-                            progress.done += 1
-                            progress.count(run.status)
+                            progress.finish(run)
                             watch(progress, f"{run.setting.task.name} {run.setting.method}")
             batches = alone
         wall_s = time.perf_counter() - clock
@@ -172,6 +203,20 @@ def split(plan: Plan, batches: Iterable[Batch], workers: int) -> Iterator[Batch]
     yield from parts[: len(parts) - rest]
     for batch in parts[len(parts) - rest :]:
         yield from divide(batch, max(math.ceil(len(batch.keys) * rest / workers), LEAST_BATCH))
+
+
+def longest_first(plan: Plan, batches: Iterable[Batch]) -> list[Batch]:
+    """Batches in the order in which they begin: no long one is alone at the end, and the time left
+    does not go up. Results do not depend on it.
+
+    Methods without a number of trials come first, as a planner's run can take as long as thousands
+    of trials; the others by their trials.
+    """
+
+    def trials(batch: Batch) -> float:
+        return trials_in(plan.cells[batch.position].complete) * len(batch.keys) or math.inf
+
+    return sorted(batches, key=trials, reverse=True)
 
 
 def divide(batch: Batch, size: int) -> Iterator[Batch]:

@@ -91,6 +91,46 @@ def test_rewards_by_trial(results):
         assert (curve[: run.best_trial] < run.reward).all()
 
 
+def test_long_runs_begin_first_and_the_time_left_is_that_of_their_methods(tmp_path):
+    begun, left, planner = [], [], "nullspace-qp/none"
+
+    class Watched(InProcess):
+        workers = 2
+
+        def perform(self, jobs):
+            begun.extend((job.setting.method, len(job.keys)) for job in jobs)
+            for number, outcomes in super().perform(jobs):
+                seconds = 6.0 if jobs[number].setting.method == planner else 1.0
+                times = Times(wall_s=seconds)
+                yield number, [replace(outcome, times=times) for outcome in outcomes]
+
+    cells = suite_of(
+        tmp_path,
+        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nruns = 2',
+        f'tasks = ["ascending", "descending"]\nmethods = ["{planner}"]',
+        'tasks = ["ascending"]\nmethods = ["dual-process/EC1-subtask"]\nruns = 4',
+    )
+    plan = plan_suite("paper", cells=cells)
+    perform(
+        plan,
+        tmp_path / "results",
+        executor=Watched(),
+        watch=lambda progress, what: left.append(progress.time_left),
+    )
+    assert begun == [
+        (planner, 1),
+        (planner, 1),
+        ("dual-process/EC1-subtask", 4),
+        ("dual-process/EC1", 2),
+    ]
+    # Of six short runs, two at once, nothing is known until one of their methods is done.
+    assert left == [
+        *[(0.0, False), (3.0, False), (0.0, False)],
+        *[(1.5, False), (1.0, False), (0.5, False), (0.0, False)],
+        *[(0.5, True), (0.0, True)],
+    ]
+
+
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)

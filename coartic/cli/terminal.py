@@ -99,12 +99,12 @@ class Display:
             progress.BarColumn(),
             progress.MofNCompleteColumn(),
             progress.TextColumn("{task.fields[failed]} failed"),
-            progress.TimeRemainingColumn(),
+            progress.TextColumn("{task.fields[left]}"),
             console=self._console,
             transient=False,
         )
         self._task: TaskID | None = None
-        self._started = self._last = time.monotonic()  # set anew when work begins
+        self._last = time.monotonic()
 
     def __enter__(self) -> Display:
         return self
@@ -134,31 +134,35 @@ class Display:
                 return
             self._bar.start()
             self._task = self._bar.add_task(
-                one_line(self._suite), total=progress.total - progress.present, failed=0
+                one_line(self._suite), total=progress.total - progress.present, failed=0, left=""
             )
         words = what or "starting workers (the first time compiles)"
         self._bar.update(
             self._task,
             completed=progress.done,
             failed=progress.failed,
+            left=time_left(progress),
             description=one_line(words),
         )
 
     def _plain(self, progress: Progress) -> None:
         now = time.monotonic()
-        if progress.done <= 1:  # the workers' start says nothing of the pace
-            self._started = self._last = now
         there = progress.present + progress.done
         finished = there == progress.total
         if not progress.done or (now - self._last < self.EVERY_S and not finished):
             return
         self._last = now
         text = f"{there} of {counted(progress.total, 'run')}, {progress.failed} failed"
-        if not finished:
-            seconds = (now - self._started) / (progress.done - 1) * (progress.total - there)
-            text += f", about {seconds:.0f} s left"
-        self.line(text)
+        self.line(text if finished else f"{text}, {time_left(progress)}")
 
     def line(self, text: str) -> None:
         """Show a line above the progress."""
         self._console.print(one_line(text), soft_wrap=True)
+
+
+def time_left(progress: Progress) -> str:
+    """How long the other runs of a plan take, in words."""
+    seconds, is_all = progress.time_left
+    minutes, rest = divmod(round(seconds), 60)
+    spoken = f"{minutes} min {rest} s" if minutes else f"{rest} s"
+    return f"{'about' if is_all else 'at least'} {spoken} left"
