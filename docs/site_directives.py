@@ -247,7 +247,8 @@ def play() -> Iterator[str]:
     yield f"<style>{text_of('play.css')}</style>"
     yield text_of("try.html.jinja")
     yield figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
-    yield '<p><a href="play.html">The same on a page of its own</a></p>'
+    yield '<p><a href="play.html">On a page of its own</a>; with a task of yours:'
+    yield " <code>coartic play TASK</code></p>"
     yield "```"
 
 

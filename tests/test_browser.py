@@ -82,7 +82,7 @@ def test_the_figure_plays_by_keyboard(opened):
     slider.fill("0")
     play.focus()
     page.keyboard.press("Space")
-    assert play.inner_text() == "Pause"
+    page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
     page.keyboard.press("Space")
     page.get_by_role("button", name="Play").wait_for()
@@ -142,7 +142,7 @@ def test_a_cell_of_the_ranking_opens_its_film(opened):
     row.locator(".film-of").click()
     assert part(page, "stored").input_value() == "random-search/pure"
     assert part(page, "preset").locator("option:checked").inner_text() == "Two-armed 1†"
-    assert part(page, "play").inner_text() == "Pause"
+    page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
     page.wait_for_url("**play-link=**")
     part(page, "play").click()

@@ -283,6 +283,24 @@ def test_animate(coartic, tmp_path):
     assert film.read_bytes().startswith(b"GIF89a")
 
 
+def test_play(coartic, tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr("webbrowser.open", lambda address: not shown.append(address))
+    page = tmp_path / "page.html"
+    assert coartic("play", "descending", "--out", page)[:2] == (0, f"{page}: {kb(page)} kB.\n")
+    assert shown == [page.as_uri()]
+    assert "--replace" in coartic("play", "--out", page)[2]
+    assert "did you mean 'ascending'" in coartic("play", "ascendin")[2]
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert "open it in a browser" in coartic("play", "--no-open")[1]
+    assert len(shown) == 1
+    assert len([*tmp_path.iterdir()]) == 2
+
+
+def kb(file):
+    return len(file.read_bytes()) // 1000
+
+
 def test_entry_points():
     """The installed script and ``python -m coartic``, in processes of their own."""
     for command in (

@@ -64,7 +64,8 @@ def player(study: Study) -> str:
 
 def runs_of(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """Methods with solved runs on all of these tasks: their names, and of each task the movements
-    of the run nearest the median reward, and the postures of all runs at goal 1."""
+    of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
+    which they share."""
     labels = [label for name, label in study.cells if name == tasks[0]]
     ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
     shown = {*CONDITIONS, *main_methods(labels), *ranked}
@@ -72,8 +73,12 @@ def runs_of(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     for label in in_order([label for label in labels if label in shown]):
         cells = [(name, label) for name in tasks]
         if all(cell in study.cells and study.trajectories(*cell).runs for cell in cells):
-            typical = [typical_of(study, cell) for cell in cells]
-            runs.append({"id": label, "name": name_of(label), "films": typical})
+            films = [typical_of(study, cell) for cell in cells]
+            if len(tasks) > 1:
+                films = [
+                    film | postures(study, cell) for film, cell in zip(films, cells, strict=True)
+                ]
+            runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
 
 
@@ -86,8 +91,13 @@ def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
         "run": str(good.run_id.iloc[k]),
         "ticks": runs[k].ticks,
         "movements": [movement_of(movement) for movement in runs[k].execution.movements],
-        "reached": [run.execution.configurations[0].round(4).tolist() for run in runs],
     }
+
+
+def postures(study: Study, cell: CellKey) -> dict[str, Any]:
+    """Where the runs of a cell hit goal 1."""
+    runs = study.trajectories(*cell).runs
+    return {"reached": [run.execution.configurations[0].round(4).tolist() for run in runs]}
 
 
 def movement_of(movement: Movement) -> dict[str, Any]:

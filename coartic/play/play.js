@@ -4,7 +4,7 @@
 
 const SEEDS = 5;
 const BUDGETS = [500, 1000, 2000, 5000, 10000];
-const RUN_S = 1.2; // a run of the learner should take no longer
+const RUN_S = 1.5; // a run of the learner should take no longer
 const PACE = 90; // ticks a second
 const HOLD_S = 0.9; // at a hit
 const MOST_GOALS = 6;
@@ -533,6 +533,7 @@ class Play {
     this.find("finding").textContent = finding;
     const progress = learns ? `${at.toLocaleString("en").replace(",", "\u202f")} trials` : "";
     this.find("progress").textContent = progress;
+    if (state.who === "you") this.find("hand").value = this.own[state.edited - 1].hand;
     const slider = this.find("trials");
     slider.value = at ? (1000 * Math.log(at)) / Math.log(this.budget) : 0;
     slider.setAttribute("aria-valuetext", progress);
@@ -844,7 +845,6 @@ class Play {
     state.edited = Math.min(state.edited, state.goals.length);
     this.find("posture").value = state.edited;
     this.find("by-hand").hidden = hands < 2;
-    if (state.who === "you" && this.problems) this.find("hand").value = this.own[state.edited - 1].hand;
     this.find("speed").value = state.speed;
     this.find("pauses").checked = Boolean(state.pauses);
   }
