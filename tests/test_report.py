@@ -240,6 +240,38 @@ def test_few_runs_say_so(tmp_path):
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
 
 
+def test_a_folder_of_settings_says_which_is_best(tmp_path):
+    suite = tmp_path / "noise.toml"
+    suite.write_text("""
+title = "Noise"
+description = "Noise"
+runs = 4
+trials = 600
+[[cells]]
+tasks = ["ascending", "descending"]
+methods = ["dual-process/EC1"]
+grid = { noise_sd = [0.02, 0.05, 0.1] }
+""")
+    cells = select_cells(load_suite(str(suite)), KNOWN)
+    study = run_and_write(tmp_path / "noise", cells=cells, runs=4, trials=600)
+    labels = {"dual-process/EC1" + variant for variant in ("", " noise_sd=0.02", " noise_sd=0.1")}
+    means = study.runs.groupby(["task", "variant"]).reward.mean().astype(float)
+    rows = TABLES["settings"](study)
+    for task, of_task in rows.groupby("task"):
+        assert of_task.reward.iloc[0] == max(means[task.lower()])
+        assert list(of_task.reward) == sorted(of_task.reward, reverse=True)
+        assert list(of_task.behind) == pytest.approx(list(of_task.reward.iloc[0] - of_task.reward))
+    for name in ("settings", "ranking", "runtimes", "learning", "signatures"):
+        assert set(TABLES[name](study).method) == labels, name
+    for name in ("ranking", "runtimes", "learning-curves"):
+        assert set(FIGURES[name](study).data.method) == labels, name
+    first = answers(study)[0]
+    assert first["id"] == "settings"
+    assert f"{rows.reward.iloc[0]:.1f}".replace("-", "−") in first["text"]
+    (default,) = {text for text in render.texts_of(rows, "method") if "default" in text}
+    assert "0.05" in default
+
+
 def test_sections_name_figures_and_tables():
     for section in SECTIONS:
         assert section.figure in {"", *FIGURES}

@@ -90,7 +90,8 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
     """The values of a column as text, with SDs and intervals that belong to them."""
     column = column_of(name)
     if not is_number(frame[name]):
-        return [word(value, column) for value in frame[name]]
+        known = frame.attrs.get("methods", {}) if column.method else {}
+        return [known.get(value) or word(value, column) for value in frame[name]]
     texts = []
     columns = (figures_of(frame, f"{name}{ending}") for ending in ("", "_low", "_high", "_sd"))
     for values in zip(*columns, strict=True):
