@@ -3,6 +3,7 @@
 import html.parser
 import re
 import shutil
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -270,6 +271,24 @@ grid = { noise_sd = [0.02, 0.05, 0.1] }
     assert f"{rows.reward.iloc[0]:.1f}".replace("-", "−") in first["text"]
     (default,) = {text for text in render.texts_of(rows, "method") if "default" in text}
     assert "0.05" in default
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+def test_tables_compile_and_the_ranking_fits_one_column(tables_by_name, tmp_path):
+    notes = ["The optimum of Two-armed 1 † is not proven."]
+    tables = [name for name, frame in tables_by_name.items() if len(frame)]
+    texts = {name: render.latex_table(tables_by_name[name], name, name, notes) for name in tables}
+    for name, width, inputs in (("one", "89mm", ["ranking"]), ("all", "400cm", tables)):
+        (tmp_path / f"{name}.tex").write_text(
+            "\\documentclass{article}\\usepackage[T1]{fontenc}\\usepackage{booktabs}\n"
+            f"\\setlength\\textwidth{{{width}}}\\begin{{document}}\n"
+            + "\n".join(f"{texts[table]}\\clearpage" for table in inputs)
+            + "\n\\end{document}\n"
+        )
+        command = ["pdflatex", "-draftmode", "-interaction=nonstopmode", "-halt-on-error", name]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout[-2000:]
+        assert "Overfull \\hbox" not in done.stdout
 
 
 def test_sections_name_figures_and_tables():
