@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from coartic.analysis.settings import names_of_settings
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.words import marked, read_beside
 
@@ -41,7 +42,8 @@ def table(
     ``columns`` are those of the CSV file in their order: ``gap[]`` has an interval (``gap_low``
     and ``gap_high``), ``ours±`` a standard deviation (``ours_sd``), and ``on *`` stands for all
     columns that begin so. Every table ends with the ids of the runs behind each row; its
-    ``attrs["tasks"]`` has people's names of tasks by id, for headers.
+    ``attrs`` have people's names of tasks by id, for headers, and of methods that go by others in
+    this folder.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
@@ -50,6 +52,7 @@ def table(
         def frame(study: Study) -> pd.DataFrame:
             made = frame_of(rows(study), f"{columns}, run_ids")
             made.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
+            made.attrs["methods"] = names_of_settings(study)
             return made
 
         TABLES[rows.__name__.replace("_", "-")] = frame

@@ -3,6 +3,7 @@
 import html.parser
 import re
 import shutil
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -238,6 +239,56 @@ def test_few_runs_say_so(tmp_path):
     text = files["report.html"].decode()
     assert load_task("ascending").label in text
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
+
+
+def test_a_folder_of_settings_says_which_is_best(tmp_path):
+    suite = tmp_path / "noise.toml"
+    suite.write_text("""
+title = "Noise"
+description = "Noise"
+runs = 4
+trials = 600
+[[cells]]
+tasks = ["ascending", "descending"]
+methods = ["dual-process/EC1"]
+grid = { noise_sd = [0.02, 0.05, 0.1] }
+""")
+    cells = select_cells(load_suite(str(suite)), KNOWN)
+    study = run_and_write(tmp_path / "noise", cells=cells, runs=4, trials=600)
+    labels = {"dual-process/EC1" + variant for variant in ("", " noise_sd=0.02", " noise_sd=0.1")}
+    means = study.runs.groupby(["task", "variant"]).reward.mean().astype(float)
+    rows = TABLES["settings"](study)
+    for task, of_task in rows.groupby("task"):
+        assert of_task.reward.iloc[0] == max(means[task.lower()])
+        assert list(of_task.reward) == sorted(of_task.reward, reverse=True)
+        assert list(of_task.behind) == pytest.approx(list(of_task.reward.iloc[0] - of_task.reward))
+    for name in ("settings", "ranking", "runtimes", "learning", "signatures"):
+        assert set(TABLES[name](study).method) == labels, name
+    for name in ("ranking", "runtimes", "learning-curves"):
+        assert set(FIGURES[name](study).data.method) == labels, name
+    first = answers(study)[0]
+    assert first["id"] == "settings"
+    assert f"{rows.reward.iloc[0]:.1f}".replace("-", "−") in first["text"]
+    (default,) = {text for text in render.texts_of(rows, "method") if "default" in text}
+    assert "0.05" in default
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+def test_tables_compile_and_the_ranking_fits_one_column(tables_by_name, tmp_path):
+    notes = ["The optimum of Two-armed 1 † is not proven."]
+    tables = [name for name, frame in tables_by_name.items() if len(frame)]
+    texts = {name: render.latex_table(tables_by_name[name], name, name, notes) for name in tables}
+    for name, width, inputs in (("one", "89mm", ["ranking"]), ("all", "400cm", tables)):
+        (tmp_path / f"{name}.tex").write_text(
+            "\\documentclass{article}\\usepackage[T1]{fontenc}\\usepackage{booktabs}\n"
+            f"\\setlength\\textwidth{{{width}}}\\begin{{document}}\n"
+            + "\n".join(f"{texts[table]}\\clearpage" for table in inputs)
+            + "\n\\end{document}\n"
+        )
+        command = ["pdflatex", "-draftmode", "-interaction=nonstopmode", "-halt-on-error", name]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout[-2000:]
+        assert "Overfull \\hbox" not in done.stdout
 
 
 def test_sections_name_figures_and_tables():

@@ -52,7 +52,9 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
             files[f"tables/{name}.csv"] = csv_table(frame).encode()
             if for_paper:
                 caption = captions.get(name) or name.replace("-", " ").capitalize()
-                files[f"tables/{name}.tex"] = latex_table(frame, name, caption).encode()
+                notes = about.notes_of(study, frame.columns)
+                files[f"tables/{name}.tex"] = latex_table(frame, name, caption, notes).encode()
+    files["tables/notes.txt"] = about.notes_on_tables(study).encode()
     files["numbers.tex"] = numbers_tex(study).encode()
     for name in FIGURES if for_paper else plots(study):
         if plot := plots(study).get(name) or draw_figure(study, name):

@@ -4,7 +4,8 @@ how rewards rise with trials."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.optima import initial_reward
+from coartic.analysis.settings import compares_settings, name_in, shown_methods
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
 from coartic.analysis.words import in_brackets, marked, number
@@ -52,7 +54,7 @@ def gaps_to_optimum(study: Study) -> Parts:
     size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
-        draw_group(axes, group, of_group, looks_in(study, rows.method))
+        draw_group(axes, study, group, of_group, looks_in(study, rows.method))
     farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
@@ -61,7 +63,9 @@ def gaps_to_optimum(study: Study) -> Parts:
     return drawing, rows, alt, study.tasks.values()
 
 
-def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+def draw_group(
+    axes: Axes, study: Study, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]
+) -> None:
     """Methods that know as much of the reward, nearest first."""
     axes.set_title(f"{group[0].upper()}{group[1:]}")
     for place, row in enumerate(rows.to_dict("records")):
@@ -74,10 +78,10 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, s
         shape = "D" if methods.is_learner(row["method"]) else "o"
         (dot,) = axes.plot(row["gap"], -place, shape, **mark)
         words = f"{number(row['gap'], 1)} % {in_brackets(row['low'], row['high'], 1)}".strip()
-        style.tip(dot, f"{methods.name_of(row['method'])}: {words}, {row['runs']} runs")
+        style.tip(dot, f"{name_in(study, row['method'])}: {words}, {row['runs']} runs")
         beside: Any = {"textcoords": "offset points", "va": "center"}
         axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
-    style.name_rows(axes, [methods.name_of(method) for method in rows.method])
+    style.name_rows(axes, [name_in(study, method) for method in rows.method])
     for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
         if methods.is_learner(method):
             name.set_fontweight("bold")
@@ -100,7 +104,8 @@ def ecdf_of_runtimes(study: Study) -> Parts:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
-        draw_shares(axes, data[data.spend == spend], looks_in(study, data.method))
+        of_spend = data[data.spend == spend]
+        draw_shares(axes, of_spend, looks_in(study, data.method), partial(name_in, study))
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
         axes.set_ylabel("targets reached (%)")
@@ -108,8 +113,8 @@ def ecdf_of_runtimes(study: Study) -> Parts:
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    names = dict(zip(map(methods.name_of, ends.method), ends.share, strict=True))
-    style.label_ends(panels[-1], names, 6.2)
+    last = zip(map(str, ends.method), ends.share, strict=True)
+    style.label_ends(panels[-1], {name_in(study, label): share for label, share in last}, 6.2)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
@@ -123,7 +128,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     """
     parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
     times = runtimes.running_times(study)
-    for label in methods.in_order(methods.main_methods(tables.runtimes(study).index)):
+    for label in methods.in_order(shown_methods(study, tables.runtimes(study).index)):
         for spend in PANELS:
             if (label, spend) in times:
                 budget, share = runtimes.ecdf(times[label, spend])
@@ -134,7 +139,12 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+def draw_shares(
+    axes: Axes,
+    data: pd.DataFrame,
+    looks: Mapping[str, style.Look],
+    name_of: Callable[[str], str] = methods.name_of,
+) -> None:
     """A step curve for each method."""
     style.log_axis(axes)
     positive = data.budget[data.budget > 0]
@@ -146,7 +156,7 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
         line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
-        name = methods.name_of(str(label))
+        name = name_of(str(label))
         style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         style.curve(name, drawn)
     axes.set_xlim(edge, most)
@@ -178,7 +188,7 @@ def reward_by_trial(study: Study) -> Parts:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.entry(methods.name_of(label), linewidth=1.3, **look)
+        style.entry(name_in(study, label), linewidth=1.3, **look)
         for label, look in looks_in(study, labels).items()
     ]
     handles += [style.entry("initial solution", **style.INITIAL)]
@@ -223,7 +233,7 @@ def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
         labels = [
             label
             for label in methods.in_order(solved)
-            if label in CURVES or not methods.is_built_in(label)
+            if label in CURVES or not methods.is_built_in(label) or compares_settings(study)
         ]
         two_armed = {*methods.CONDITIONS} & {*labels} - {methods.EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
@@ -257,7 +267,7 @@ def draw_curves(
         middle_half = axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
         best = axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
         trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
-        style.curve(methods.name_of(str(label)), middle_half, *best, *trials)
+        style.curve(name_in(study, str(label)), middle_half, *best, *trials)
     floor, top = data.best.min(), data.best_high.max()
     initial = initial_reward(task, study.model)
     if not math.isnan(initial):

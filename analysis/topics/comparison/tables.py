@@ -53,7 +53,7 @@ def against_learner(study: Study) -> Rows:
         if learner is None or learner is cell or task not in one_by_one(study):
             continue
         both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
-        if not scores.is_compared(label) or not both_solved:
+        if not scores.is_compared(study, label) or not both_solved:
             continue
         drawn = study.plan.methods[cell.method].stochastic
         rewards = cell.rewards if drawn else float(cell.rewards[0])
@@ -175,7 +175,7 @@ def learning(study: Study) -> Rows:
     """Best reward after so many trials, and when half of a run's gain was there."""
     for (task, label), cell in study.cells.items():
         runs = steps_of(study, cell)
-        if task not in one_by_one(study) or not scores.is_compared(label):
+        if task not in one_by_one(study) or not scores.is_compared(study, label):
             continue
         if not runs or not all(run.learns and run.solved for run in runs):
             continue
