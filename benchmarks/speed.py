@@ -59,7 +59,9 @@ def trials_a_second() -> dict[str, float]:
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
     single = [movements_of(hands, target) for target in targets[:100]]
-    many = gymnasium.make_vec("coartic/TwoArmed1-v0", num_envs=1000, around=best)
+    many = gymnasium.make_vec(
+        "coartic/TwoArmed1-v1", num_envs=1000, around=best, hands=None, scale=1.0
+    )
     sides = np.where(np.array([*hands]) == "R", 1.0, -1.0)
     choice = np.broadcast_to(sides[:, None], (1000, len(hands), 1))
     free = noise[..., many.unwrapped.arms.free]
