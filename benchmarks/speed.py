@@ -105,7 +105,8 @@ def environments_over_kernel() -> dict[str, float]:
         for action in actions:  # the robots are at the same goal: one group
             env.step(action)
             asked = [np.array(each) for each in arms._asked]
-            calls.append(Requests(*asked[:4], np.array([0, count]), asked[5][:1]))
+            one_goal = {"bounds": np.array([0, count]), "goals": asked[-1][:1]}
+            calls.append(Requests(*asked)._replace(**one_goal))
 
         def kernel(calls: list[Requests] = calls, arms: Any = arms) -> None:
             for call in calls:

@@ -156,7 +156,7 @@ def aim(i: int, p: int, action: Any, how: Any, table: Any, state: Any, arms: Any
         hand = 1 if action[0] > 0.0 else 0
         if how.middle == _CORRECTIVE:
             nearer = nearer_hand(i, state)
-            hand = nearer if hand == 0 else 1 - nearer
+            hand = 1 - nearer if action[0] > 0.5 else nearer
     arms.hands[p, 0], arms.stops[p, 0] = hand, True
     state.letters[i, row.goal] = _LETTERS[1] if hand == 1 else _LETTERS[0]
     fill_row(arms.starts[p], q)
@@ -373,10 +373,10 @@ class Arms:
     -----
     An action has an entry for the hand, unless the robot has one hand or ``hands`` are given, and
     an entry for each joint that can move. The box is from -1 to 1. The entry for the hand chooses
-    the left one (0 and below) or the right one; with ``around="corrective"`` it chooses the hand
-    for which the corrective process has the shorter way, or the other one. Where the entries of
-    all joints are NaN, no movement is made to a target: the corrective process acts alone, and the
-    step takes 0 ticks if the hand is inside the goal already. With ``hands``, an arm that hits
+    the left one (0 and below) or the right one; with ``around="corrective"`` the hand for which
+    the corrective process has the shorter way (0.5 and below) or the other one. Where the entries
+    of all joints are NaN, no movement is made to a target: the corrective process acts alone, and
+    the step takes 0 ticks if the hand is inside the goal already. With ``hands``, an arm that hits
     neither this goal nor a later one keeps its posture.
 
     An observation of ``"learner"`` has an entry for each goal, 1 for the next goal, and two for the
@@ -418,6 +418,7 @@ class Arms:
         self.tasks: list[Task] = []
         """Tasks that robots were given."""
         self._slots: dict[str, int] = {}
+        self._names = np.full(most, None, dtype=object)
         self._kinds: dict[Any, int] = {}
         self._setups: list[Setup] = []
         self._table = Table(
@@ -543,7 +544,7 @@ class Arms:
             columns = _joint_columns(task.robot, self._frame.links)
             table.entries[place, :dof] = np.searchsorted(self._columns, columns)
         self.tasks.append(task)
-        self._slots[task.name] = place
+        self._slots[task.name], self._names[place] = place, task.name
         return place
 
     def _middle(self, task: Task, hands: str | None) -> Array | None:
@@ -705,8 +706,10 @@ class Arms:
         return np.array(self._state.seen)
 
     def infos(self) -> dict[str, Any]:
-        """Hands used so far (``"RL"``), corrective movements made, whether all goals are hit."""
-        return {
+        """Hands used so far (``"RL"``), corrective movements made, whether all goals are hit; of
+        robots with tasks of their own also the task's name."""
+        given = {} if self._columns is None else {"task": self._names[self.rows["task"]]}
+        return given | {
             "hands": self.hands.copy(),
             "corrections": self.rows["corrections"].copy(),
             "is_success": self.rows["completed"].copy(),

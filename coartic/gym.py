@@ -42,39 +42,39 @@ if TYPE_CHECKING:
     from coartic.agents import RobotEnvs
 
 OPTIONS = ("scale", "around", "observe", "ahead", "hands", "model")
-FAMILY_OPTIONS = ("split", "count", "year", "scale", "ahead", "hands", "model")
-COUNTS: dict[Split, int] = {"development": 1000, "test": 40, "fresh": 40}
-"""Instances of a family, from the first one: of the test split those of suite ``families``."""
+OF_FAMILY = ("family", "split", "count", "year")
+FAMILY_OPTIONS = (*OF_FAMILY, "scale", "ahead", "hands", "model")
+COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
+"""Instances of a family, from the first one: of the test split those whose best known solutions are
+shipped."""
 WORKS = {"around": "hands", "hands": "initial", "scale": 0.5}
 """Options of version 1 of the single tasks."""
 FAMILY = "two-armed/v1"
 
 
-def check_options(given: Mapping[str, Any], known: Sequence[str]) -> None:
-    """Raises TypeError for an option that there is not."""
-    for name in given.keys() - {*known}:
+def make_arms(
+    num_envs: int, task: Task | str | Path | None = None, **options: Any
+) -> tuple[Arms, list[str]]:
+    """Robots with the options of an environment, and the instances that they are given.
+
+    Raises TypeError for an option that there is not.
+    """
+    known = OPTIONS if task is not None else FAMILY_OPTIONS
+    for name in options.keys() - {*known}:
         raise TypeError(unknown("option", name, [*known, "render_mode"]))
-
-
-def task_arms(count: int, task: Task | str | Path, **options: Any) -> Arms:
-    """Robots that all have one task."""
-    check_options(options, OPTIONS)
-    return Arms(count, as_task(task), **options)
-
-
-def family_arms(count: int, names: Sequence[str], *, scale: float = 0.5, **options: Any) -> Arms:
-    """Robots that are given instances of a family, by their names."""
-    family = load_family(names[0].rpartition("/")[0])
+    if task is not None:
+        return Arms(num_envs, as_task(task), **options), []
+    which = {name: options.pop(name) for name in OF_FAMILY if name in options}
+    names, family = instance_names(**which), load_family(which.get("family", FAMILY))
     goals, links = family.goals[1], family.links[1]
     frame = Frame(len(names), goals, links, BASE_DOF + 2 * links, family.hands)
-    options |= {"observe": "ahead", "around": "corrective", "scale": scale}
-    return Arms(count, frame=frame, **options)
+    options = {"scale": 0.5} | options | {"observe": "ahead", "around": "corrective"}
+    return Arms(num_envs, frame=frame, **options), names
 
 
 def instance_names(
-    family: str,
+    family: str = FAMILY,
     split: Split = "development",
-    *,
     count: int | None = None,
     year: int | None = None,
 ) -> list[str]:
@@ -119,37 +119,60 @@ def draw_arms(figure: Figure, arms: Arms, row: int) -> None:
     """Draw a robot and its goals; those that it has hit are filled."""
     from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 
-    task = arms.task
+    task = arms.tasks[arms.rows["task"][row]]
     (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
     figure.clear()
     axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-    draw_robot(axes, task, arms.q[row], weight=1.5)
+    draw_robot(axes, task, arms.q[row, : task.robot.dof], weight=1.5)
     number_goals(axes, task, weight=1.5)
     fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[row])
 
 
 class TaskEnv(gymnasium.Env):
-    """One robot and one task; the options are those of :class:`coartic.arms.Arms`.
+    """One robot and one task, or instances of a family of which each trial has one.
 
     An episode is a trial, of as many steps as there are goals; it ends earlier where the
-    corrective process fails, which costs ``coartic.optimisers.FAILED``. Nothing is random.
-    Actions are clipped to the box.
+    corrective process fails, which costs ``coartic.optimisers.FAILED``. Actions are clipped to the
+    box. Nothing is random but which instance is drawn.
+
+    Parameters
+    ----------
+    task : Task, str or Path, optional
+        The task; without one, instances of a family are drawn.
+    family : str
+        The family with its version; by default ``"two-armed/v1"``.
+    split : {"development", "test", "fresh"}
+        Its instances to train on, to report on, or those of a ``year``. They never mix.
+    count : int, optional
+        How many instances, the first ones of the split; by default 1,000 of the development split
+        and 10 of the others.
+    year : int, optional
+        Of fresh instances.
+    render_mode : {"human", "rgb_array"}, optional
+        As in Gymnasium.
+    **options
+        As in :class:`coartic.arms.Arms`. Of a family the middle of the box is ``"corrective"``,
+        half its width by default 0.5, and ``"ahead"`` is observed.
+
+    Raises
+    ------
+    ValueError, TypeError, TaskError
+        An option is wrong, or there is no such task or family.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}
-    names: Sequence[str] = ()
-    """Instances of which one is drawn for each trial."""
 
     def __init__(
-        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+        self,
+        task: Task | str | Path | None = None,
+        *,
+        render_mode: str | None = None,
+        **options: Any,
     ) -> None:
         self.arguments = {"task": task, **options}
-        self._hold(task_arms(1, task, **options), render_mode)
-
-    def _hold(self, arms: Arms, render_mode: str | None) -> None:
-        self.arms = arms
-        self.action_space = arms.action_space
-        self.observation_space = arms.observation_space
+        self.arms, self.names = make_arms(1, **self.arguments)
+        self.action_space = self.arms.action_space
+        self.observation_space = self.arms.observation_space
         self.render_mode = check_render_mode(render_mode, self.metadata)
         self._figure: Figure | None = None
         self._goes_on = False
@@ -207,7 +230,7 @@ class TaskEnv(gymnasium.Env):
         self._figure = None
 
     def _info(self) -> dict[str, Any]:
-        return {name: values[0].item() for name, values in self.arms.infos().items()}
+        return {name: values.tolist()[0] for name, values in self.arms.infos().items()}
 
 
 class TaskVectorEnv(VectorEnv):
@@ -223,25 +246,18 @@ class TaskVectorEnv(VectorEnv):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
-    names: Sequence[str] = ()
-    """Instances of which one is drawn for each trial."""
-
     def __init__(
         self,
         num_envs: int,
-        task: Task | str | Path,
+        task: Task | str | Path | None = None,
         *,
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **options: Any,
     ) -> None:
         self.arguments = {"task": task, **options}
-        self._hold(task_arms(num_envs, task, **options), render_mode, autoreset_mode)
-
-    def _hold(
-        self, arms: Arms, render_mode: str | None, autoreset_mode: str | AutoresetMode
-    ) -> None:
-        self.num_envs, self.arms = len(arms.rows), arms
+        self.arms, self.names = make_arms(num_envs, **self.arguments)
+        self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode, self.metadata)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]
@@ -342,67 +358,6 @@ def draw(arms: Arms, row: int, names: Sequence[str], rng: np.random.Generator | 
     arms.give(row, name if arms.knows(name) else load_task(name))
 
 
-class FamilyEnv(TaskEnv):
-    """One robot that is given an instance of a family in each trial.
-
-    Parameters
-    ----------
-    family : str
-        The family with its version.
-    split : {"development", "test", "fresh"}
-        Which instances: to train on, to report on, or those of a ``year``. They never mix.
-    count : int, optional
-        How many instances, the first ones of the split; by default 1,000 of the development split
-        and 40 of the others.
-    year : int, optional
-        Of fresh instances.
-    render_mode : {"human", "rgb_array"}, optional
-        As in Gymnasium.
-    **options
-        ``ahead``, ``scale``, ``hands`` and ``model`` as in :class:`coartic.arms.Arms`, with 1 goal
-        in view beyond the next one and half the width 0.5. The middle of the box is
-        ``"corrective"``, and ``"ahead"`` is observed.
-
-    Raises
-    ------
-    ValueError
-        An option is wrong.
-    TaskError
-        There is no such family.
-    """
-
-    def __init__(
-        self, family: str = FAMILY, *, render_mode: str | None = None, **options: Any
-    ) -> None:
-        self.arguments = {"family": family, **options}
-        self.names, chosen = family_options(family, options)
-        self._hold(family_arms(1, self.names, **chosen), render_mode)
-
-
-class FamilyVectorEnv(TaskVectorEnv):
-    """N robots, each given an instance of a family in each trial; options as :class:`FamilyEnv`."""
-
-    def __init__(
-        self,
-        num_envs: int,
-        family: str = FAMILY,
-        *,
-        render_mode: str | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **options: Any,
-    ) -> None:
-        self.arguments = {"family": family, **options}
-        self.names, chosen = family_options(family, options)
-        self._hold(family_arms(num_envs, self.names, **chosen), render_mode, autoreset_mode)
-
-
-def family_options(family: str, options: dict[str, Any]) -> tuple[list[str], dict[str, Any]]:
-    """Names of the instances, and the options of robots."""
-    check_options(options, FAMILY_OPTIONS)
-    which = {name: options.pop(name) for name in ("split", "count", "year") if name in options}
-    return instance_names(family, **which), options
-
-
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     """Robots side by side as environments of Stable-Baselines3.
 
@@ -428,16 +383,12 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     """
     from coartic.agents import RobotEnvs
 
-    kind, given = known_env(env)
-    vector = FamilyVectorEnv if kind == "Family" else TaskVectorEnv
-    return RobotEnvs(vector(num_envs, **given, **{"autoreset_mode": "SameStep"} | options))
+    given = known_env(env) | options
+    return RobotEnvs(TaskVectorEnv(num_envs, **given, autoreset_mode=AutoresetMode.SAME_STEP))
 
 
-def known_env(env: str) -> tuple[str, dict[str, Any]]:
-    """``"Task"`` or ``"Family"``, and the options, of an id of this package.
-
-    Raises ValueError for another one.
-    """
+def known_env(env: str) -> dict[str, Any]:
+    """The options of an id of this package. Raises ValueError for another one."""
     if env not in IDS:
         raise ValueError(unknown("environment", str(env), IDS))
     return IDS[env]
@@ -489,28 +440,22 @@ def score(
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
     if isinstance(env, str):
-        kind, given = known_env(env)
+        given = known_env(env)
     elif isinstance(unwrapped := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
-        kind, given = "Family" if unwrapped.names else "Task", unwrapped.arguments
+        given = unwrapped.arguments
     else:
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    given = {
-        **given,
-        **({"split": "test", "count": None, "year": None} if kind == "Family" else {}),
-    }
+    given = {name: value for name, value in given.items() if name not in ("split", "count", "year")}
+    if given.get("task") is None:
+        given["split"] = "test"
     given |= options
-    if kind == "Family":
-        names, chosen = family_options(given.pop("family", FAMILY), given)
-        tasks = [load_task(name) for name in names]
-    else:
-        names, chosen, tasks = [], {}, [as_task(given["task"])]
+    _, names = make_arms(1, **given)
+    tasks = [load_task(name) for name in names] or [as_task(given["task"])]
 
     def robots(each: int) -> Arms:
-        if kind == "Task":
-            return task_arms(each, **given)
-        arms = family_arms(each * len(tasks), names, **chosen)
+        arms, _ = make_arms(each * len(tasks), **given)
         for row in range(each * len(tasks)):
             arms.give(row, tasks[row // each])
         arms.reset(np.ones(each * len(tasks), dtype=np.bool_))
@@ -630,16 +575,15 @@ TASKS = {
 }
 
 
-IDS: dict[str, tuple[str, dict[str, Any]]] = {"coartic/Family-v0": ("Family", {})}
+IDS: dict[str, dict[str, Any]] = {"coartic/Family-v0": {"family": FAMILY}}
 for _name, _task in TASKS.items():
     _given = {} if _task is None else {"task": _task}
-    IDS[f"coartic/{_name}-v0"] = ("Task", _given)
-    IDS[f"coartic/{_name}-v1"] = ("Task", _given | WORKS)
-for _name, (_kind, _given) in IDS.items():
+    IDS |= {f"coartic/{_name}-v0": _given, f"coartic/{_name}-v1": _given | WORKS}
+for _name, _given in IDS.items():
     if _name not in gymnasium.registry:
         gymnasium.register(
             _name,
-            entry_point=f"coartic.gym:{_kind}Env",
-            vector_entry_point=f"coartic.gym:{_kind}VectorEnv",
+            entry_point="coartic.gym:TaskEnv",
+            vector_entry_point="coartic.gym:TaskVectorEnv",
             kwargs=_given,
         )
