@@ -1,7 +1,8 @@
-"""Agents of Stable-Baselines3 as methods of the benchmark. Needs the extra ``coartic[rl]``.
+"""Agents of Stable-Baselines3. Needs the extra ``coartic[rl]``.
 
-:class:`SessionEnvs` presents the trials of a session as environments. An :class:`Agent` is a method
-that trains on them; its result is one trial of the learned policy without noise.
+:class:`RobotEnvs` presents a vector environment of :mod:`coartic.gym`, :class:`SessionEnvs` the
+trials of a session. An :class:`Agent` is a method that trains on the latter; its result is one
+trial of the learned policy without noise.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from pydantic import Field
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from coartic.gym import LETTERS, Arms
+from coartic.arms import Arms
 from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Outline, Parameters, Result, Session
-from coartic.motion.initial import too_many_sequences
+from coartic.motion.initial import corrective_trial, initial_hands, too_many_sequences
 from coartic.motion.solution import Movement
 from coartic.motion.trials import Trials, movements_of
-from coartic.optimisers import TOLD, Objective
+from coartic.optimisers import FAILED, TOLD, Objective
 from coartic.robot import Array
 
 WORST = -100.0
@@ -48,8 +49,88 @@ class AgentParameters(Parameters):
     """Whether observations have the last action for each joint."""
 
 
-class SessionEnvs(VecEnv):
-    """The robots of :class:`coartic.gym.Arms` as environments of Stable-Baselines3.
+class OneObject(VecEnv):
+    """Environments that are one object, as far as Stable-Baselines3 wants the same of all."""
+
+    def step_async(self, actions: Array) -> None:
+        """Take the actions of the next subtask."""
+        self._actions = actions
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute, once for each environment."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: all environments are one object, so that none can have its own value."""
+        raise NotImplementedError("the environments have no attributes of their own")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
+        """Refused: all environments are one object, so that none can be asked alone."""
+        raise NotImplementedError("the environments have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """They are not."""
+        return [False] * self.num_envs
+
+
+class RobotEnvs(OneObject):
+    """A vector environment of :mod:`coartic.gym` for Stable-Baselines3.
+
+    Actions are clipped to the box. A trial that has ended begins anew in the same step;
+    ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
+    ticks. Rewards are ticks as a share of what the corrective process takes for the whole trial
+    with the task's initial hands: all rewards of a trial that is like it add up to -1. No step
+    loses more than 2, such as one in which the corrective process fails.
+
+    Parameters
+    ----------
+    envs : coartic.gym.TaskVectorEnv
+        The environment, of the mode ``"SameStep"``.
+    """
+
+    def __init__(self, envs: Any) -> None:
+        self.render_mode = envs.render_mode
+        self._envs, self._lost = envs, np.zeros(envs.num_envs)
+        self._steps = np.zeros(envs.num_envs, dtype=np.int64)
+        self._costs: dict[int, float] = {}
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin all trials."""
+        seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
+        self._reset_seeds()
+        self._lost[:], self._steps[:] = 0, 0
+        observations: NDArray[np.float32] = self._envs.reset(seed=seeds)[0]
+        return observations
+
+    def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
+        """Make the next subtask of all trials."""
+        costs = np.array([self._cost(task) for task in self._envs.arms.rows["task"].tolist()])
+        observations, rewards, ended, _, seen = self._envs.step(self._actions)
+        self._lost += rewards
+        self._steps += 1
+        infos: list[dict[str, Any]] = [{} for _ in costs]
+        for row in np.flatnonzero(ended):
+            episode = {"r": float(self._lost[row]), "l": int(self._steps[row]), "t": 0}
+            infos[row] = {"terminal_observation": seen["final_obs"][row], "episode": episode}
+        self._lost[ended], self._steps[ended] = 0, 0
+        return observations, np.maximum(rewards / costs, -2.0).astype(np.float32), ended, infos
+
+    def _cost(self, place: int) -> float:
+        """Ticks of the corrective process alone on a task, or of a failure."""
+        if place not in self._costs:
+            arms = self._envs.arms
+            hands = initial_hands(arms.tasks[place], model=arms.model)
+            reward = corrective_trial(arms.tasks[place], hands, model=arms.model).reward
+            self._costs[place] = float(FAILED if reward is None else -reward)
+        return self._costs[place]
+
+
+class SessionEnvs(OneObject):
+    """The robots of :class:`coartic.arms.Arms` as environments of Stable-Baselines3.
 
     Their trials count as trials of the session. The box of targets is around the configurations in
     which the corrective process alone hits the goals. With ``sees_targets`` an observation also has
@@ -94,10 +175,6 @@ class SessionEnvs(VecEnv):
         self._arms.reset(np.ones(self.num_envs, dtype=np.bool_))
         return self._observations()
 
-    def step_async(self, actions: Array) -> None:
-        """Take the actions of the next subtask."""
-        self._actions = actions
-
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Make the next subtask of all trials. Raises BudgetError where no trial is left."""
         ended = self._step(np.ones(self.num_envs, dtype=np.bool_))
@@ -113,7 +190,7 @@ class SessionEnvs(VecEnv):
             # An agent that looks at the last observation finds that nothing follows.
             last = np.zeros(self.observation_space.shape, dtype=np.float32)
             for row in rows:
-                steps = np.count_nonzero(self._arms.hands[row] >= 0)
+                steps = len(self._arms.hands[row])
                 episode = {"r": float(rewards[row]), "l": steps, "t": 0}
                 infos[row] = {"terminal_observation": last, "episode": episode}
             self._arms.reset(ended)
@@ -131,15 +208,15 @@ class SessionEnvs(VecEnv):
             ended = bool(self._step(first)[0])
             observations = self._observations()
         self._count(np.array([0]))
-        made, given = LETTERS[self._arms.hands[0]], self._first_hands  # of goals after a failure
-        hands = "".join(one or other for one, other in zip(made, given, strict=True))
+        made = str(self._arms.hands[0])
+        hands = made + self._first_hands[len(made) :]  # of goals after a failure
         return movements_of(hands, self._arms.trials.targets[0])
 
     def _step(self, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Make the next subtask of these robots; returns whose trials have ended."""
         actions = self._actions.copy()
         actions[:, -len(self._arms.free) :] *= self._scale
-        return self._arms.step(actions, which)[1]
+        return self._arms.step(actions, which, clips=False)[1]
 
     def _count(self, rows: NDArray[np.int64]) -> Array:
         """Count the trials of these robots; returns their rewards."""
@@ -147,27 +224,6 @@ class SessionEnvs(VecEnv):
         self._session._count_batch(trials)
         self.best_reward = max([self.best_reward, *trials.rewards])
         return trials.rewards
-
-    # What Stable-Baselines3 wants of its environments beside this.
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, once for each environment."""
-        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused: all environments are one object, so that none can have its own value."""
-        raise NotImplementedError("the environments have no attributes of their own")
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Refused: all environments are one object, so that none can be asked alone."""
-        raise NotImplementedError("the environments have no methods of their own")
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """They are not."""
-        return [False] * self.num_envs
 
 
 class Agent(Method):

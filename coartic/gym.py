@@ -1,247 +1,99 @@
-"""Tasks as environments of Gymnasium: a step is a subtask, its reward minus the ticks it took
-(and minus its penalty, where the task has one).
+"""Tasks and families as environments of Gymnasium: a step is a subtask, its reward minus the ticks
+it took (and minus its penalty, where the task has one).
 
-Importing this module registers ``coartic/Ascending-v0``, ``Descending``, ``TwoArmed1`` and
-``TwoArmed2``, and ``coartic/Task-v0`` for any other task. Needs the extra ``coartic[gym]``.
+Importing this module registers ``coartic/Ascending-v1``, ``Descending``, ``TwoArmed1`` and
+``TwoArmed2``, ``coartic/Task-v1`` for any other task, and ``coartic/Family-v0`` for the instances
+of a family. Needs the extra ``coartic[gym]``.
 """
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
+import pandas as pd
 from gymnasium.error import ResetNeeded
-from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
-from coartic.inputs import WIDTHS, check_limits, real_array
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.robot import LARGEST_FIGURE, Array, Hand
+from coartic.arms import Arms, Frame
+from coartic.inputs import MOST_CELLS, brief_value, check_limits
+from coartic.method import Method, MethodError, Session
+from coartic.model import PAPER, MotionModel
+from coartic.motion.initial import corrective_trial, initial_hands
+from coartic.motion.solution import execute
+from coartic.robot import BASE_DOF, Array, Hand
+from coartic.tasks.catalogue import load_task
+from coartic.tasks.families import load_family
+from coartic.tasks.task import Address, Split, Task, as_task
 from coartic.text import unknown
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
 
-    from coartic.tasks.task import Task
+    from coartic.agents import RobotEnvs
 
-MOST_ENVS = 1_000_000
-LETTERS = np.array(["L", "R", ""])  # of hands 0 and 1; -1 is no hand yet
+OPTIONS = ("scale", "around", "observe", "ahead", "hands", "model")
+OF_FAMILY = ("family", "split", "count", "year")
+FAMILY_OPTIONS = (*OF_FAMILY, "scale", "ahead", "hands", "model")
+COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
+"""Instances of a family, from the first one: of the test split those whose best known solutions are
+shipped."""
+WORKS = {"around": "hands", "hands": "initial", "scale": 0.5}
+"""Options of version 1 of the single tasks."""
+FAMILY = "two-armed/v1"
 
 
-class Arms:
-    """N robots, each at a subtask of its own trial.
+def make_arms(
+    num_envs: int, task: Task | str | Path | None = None, **options: Any
+) -> tuple[Arms, list[str]]:
+    """Robots with the options of an environment, and the instances that they are given.
 
-    Parameters
-    ----------
-    count : int
-        Number of robots.
-    task : Task, str or Path
-        A task, the name of a task (``"long/v1/i017"``) or a task file.
-    scale : float
-        Half the width of the box of targets, length unit (base) and rad (joints).
-    around : str or array_like, shape (G, dof), optional
-        Middle of the box: a configuration for each goal, or a hand sequence (``"RLRL"``), which
-        means the configurations in which the corrective process alone hits the goals. By default
-        the present configuration.
-    observe : {"learner", "posture"}
-        What is observed.
-    hands : str, optional
-        Hand sequence of all trials; by default the actions choose.
-    model : MotionModel
-        Constants of movement.
-
-    Raises
-    ------
-    ValueError
-        An option does not fit the task.
-
-    Notes
-    -----
-    An action has an entry that chooses the left hand (below 0) or the right one, unless the robot
-    has one hand or ``hands`` are given, and an entry for each joint that can move. The box is
-    from -1 to 1; the environments clip actions to it. Where the entries of all joints are NaN,
-    no movement is made to a target: the corrective process acts alone, and the step takes 0 ticks
-    if the hand is inside the goal already. With ``hands``, an arm that hits neither this goal nor
-    a later one keeps its posture.
-
-    An observation has an entry for each goal, 1 for the next goal, and two for the hand that hit
-    the goal before; with ``observe="posture"`` also the configuration ``(dof,)`` and the goals
-    ``(G, 2)``.
+    Raises TypeError for an option that there is not.
     """
-
-    def __init__(
-        self,
-        count: int,
-        task: Task | str | Path,
-        *,
-        scale: float = 1.0,
-        around: str | ArrayLike | None = None,
-        observe: Literal["learner", "posture"] = "learner",
-        hands: str | None = None,
-        model: MotionModel = PAPER,
-    ) -> None:
-        from coartic import corrective_trial  # the compiler takes a while
-        from coartic.motion.trials import Trials, hand_codes
-        from coartic.tasks.task import as_task, hands_of
-
-        check_limits("num_envs", count, 1, MOST_ENVS)
-        check_limits("scale", scale, *WIDTHS)
-        self.task = as_task(task)
-        self.scale, self.model = scale, check_model(model, radius=self.task.radius)
-        goals, dof = len(self.task.goals), self.task.robot.dof
-        if isinstance(around, str):
-            if {*around} - {"L", "R"} or len(around) != goals:
-                raise ValueError(
-                    f"around is {around!r}; it must have L or R for each of {goals} goals"
-                )
-            around = corrective_trial(self.task, around, model=model).configurations
-        self.around = None if around is None else real_array("around", around).copy()
-        if self.around is not None and self.around.shape != (goals, dof):
-            raise ValueError(f"around has shape {self.around.shape}; it must be ({goals}, {dof})")
-        if self.around is not None and not (np.abs(self.around) <= LARGEST_FIGURE).all():
-            raise ValueError(f"around has figures that are not finite or beyond {LARGEST_FIGURE:g}")
-        if observe not in ("learner", "posture"):
-            raise ValueError(f"observe is {observe!r}; it is 'learner' or 'posture'")
-        self.sees_posture = observe == "posture"
-        if hands is None and len(self.task.hands) == 1:
-            hands = goals * self.task.hands[0][0].upper()
-        self.chooses_hands = hands is None
-        self._hands = (
-            np.zeros(goals, np.int64) if hands is None else hand_codes(self.task, hands, 1)[0]
-        )
-        self.moves = np.zeros((goals, dof), dtype=np.bool_)
-        """Joints that can move at each goal, shape ``(G, dof)``."""
-        self.moves[:, :2] = [coordinate not in self.task.locked_base for coordinate in "xy"]
-        for goal in range(goals):
-            for hand in self.task.hands if hands is None else hands_of(hands)[goal:]:
-                self.moves[goal, self.task.robot.joints(hand)] = True
-        self.free = np.flatnonzero(self.moves.any(axis=0))
-        """Joints that have an entry in an action."""
-        self.action_space = Box(-1.0, 1.0, (self.chooses_hands + len(self.free),), np.float32)
-        seen = np.ones(goals + 2 + (dof + 2 * goals) * self.sees_posture, dtype=np.float32)
-        seen[goals + 2 :] = LARGEST_FIGURE
-        low = np.where(np.arange(len(seen)) < goals + 2, 0.0, -seen).astype(np.float32)
-        self.observation_space = Box(low, seen, dtype=np.float32)
-        self.q = np.empty((count, dof))
-        self.goal = np.empty(count, dtype=np.int64)
-        self.hands = np.empty((count, goals), dtype=np.int64)
-        counts = np.empty((5, count), dtype=np.int64)
-        places = np.empty((2, count, goals, dof))
-        completed = np.empty(count, dtype=np.bool_)
-        self.trials = Trials._make([counts[0], completed, *counts[1:4], *places, counts[4]])
-        """The trials as far as they are made."""
-        self.reset(np.ones(count, dtype=np.bool_))
-
-    def reset(self, which: NDArray[np.bool_]) -> None:
-        """Put these robots back to the start."""
-        self.q[which] = self.task.q0
-        self.goal[which], self.hands[which] = 0, -1
-        for each in self.trials:
-            each[which] = np.nan if each.dtype.kind == "f" else 0
-
-    def centre(self, rows: NDArray[np.int64]) -> Array:
-        """The middle of the box of targets of these robots, shape ``(n, dof)``."""
-        return self.q[rows] if self.around is None else self.around[self.goal[rows]]
-
-    def step(self, actions: Array, which: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Make the next subtask of these robots: rewards ``(N,)``, and whose trials have ended.
-
-        Raises ValueError for actions of another shape, and for entries that are not finite, unless
-        those of all joints are NaN.
-        """
-        from coartic.motion.penalty import penalties_of_movements
-        from coartic.motion.reach import reach_unchecked
-        from coartic.optimisers import FAILED
-
-        rows = np.flatnonzero(which)
-        chosen = real_array("actions", actions)
-        shape = len(which), *self.action_space.shape
-        if chosen.shape != shape:
-            raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        chosen, goal, trials = chosen[rows], self.goal[rows], self.trials
-        hands, joints = self._hands[goal], chosen[:, int(self.chooses_hands) :]
-        if self.chooses_hands:
-            hands = (chosen[:, 0] > 0).astype(np.int64)
-        targets = np.full((len(rows), self.task.robot.dof), np.nan)
-        targets[:, self.free] = self.centre(rows)[:, self.free] + self.scale * joints
-        without = np.isnan(joints).all(axis=1)
-        no_hand = self.chooses_hands and np.isnan(chosen[:, 0]).any()
-        if no_hand or not (np.abs(targets[~without][:, self.free]) <= LARGEST_FIGURE).all():
-            raise ValueError(
-                "an action is not finite; NaN is for all joints, not for some, and not for the hand"
-            )
-        targets = np.where(self.moves[goal], targets, self.q[rows])
-        targets[without] = np.nan
-        reached = reach_unchecked(
-            self.task.robot,
-            self.q[rows],
-            hands,
-            self.task.goal_array[goal],
-            self.task.radius,
-            targets,
-            locked_base=self.task.locked_base,
-            model=self.model,
-        )
-        penalties = penalties_of_movements(self.task, self.q[rows], reached.q, hands, goal == 0)
-        self.q[rows] = reached.q
-        self.hands[rows, goal] = hands
-        self.goal[rows] += reached.hit
-        trials.targets[rows, goal] = targets
-        trials.reached[rows[reached.hit], goal[reached.hit]] = reached.q[reached.hit]
-        trials.completed[rows] = self.goal[rows] == len(self.task.goals)
-        trials.penalties[rows] += penalties
-        for name in ("ticks", "corrections", "iterations", "evaluations"):
-            getattr(trials, name)[rows] += getattr(reached, name)
-        rewards, ended = np.zeros(len(which)), np.zeros(len(which), dtype=np.bool_)
-        rewards[rows] = np.where(reached.hit, -(reached.ticks + penalties), -FAILED)
-        ended[rows] = trials.completed[rows] | ~reached.hit
-        return rewards, ended
-
-    def observations(self) -> NDArray[np.float32]:
-        """Observations ``(N, O)``."""
-        count, goals = self.hands.shape
-        seen = np.zeros((count, *self.observation_space.shape), dtype=np.float32)
-        rows = np.flatnonzero(self.goal < goals)
-        seen[rows, self.goal[rows]] = 1.0
-        rows = np.flatnonzero(self.goal > 0)
-        seen[rows, goals + self.hands[rows, self.goal[rows] - 1]] = 1.0
-        if self.sees_posture:
-            seen[:, goals + 2 :] = np.hstack(
-                [self.q, np.broadcast_to(self.task.goal_array.ravel(), (count, 2 * goals))]
-            )
-        return seen
-
-    def infos(self) -> dict[str, Any]:
-        """Hands used so far (``"RL"``), corrective movements made, whether all goals are hit."""
-        made, letters = self.trials, LETTERS[self.hands]
-        return {
-            "hands": letters.view(f"U{letters.shape[1]}")[:, 0],
-            "corrections": made.corrections.copy(),
-            "is_success": made.completed.copy(),
-        }
+    known = OPTIONS if task is not None else FAMILY_OPTIONS
+    for name in options.keys() - {*known}:
+        raise TypeError(unknown("option", name, [*known, "render_mode"]))
+    if task is not None:
+        return Arms(num_envs, as_task(task), **options), []
+    which = {name: options.pop(name) for name in OF_FAMILY if name in options}
+    names, family = instance_names(**which), load_family(which.get("family", FAMILY))
+    goals, links = family.goals[1], family.links[1]
+    frame = Frame(len(names), goals, links, BASE_DOF + 2 * links, family.hands)
+    options = {"scale": 0.5} | options | {"observe": "ahead", "around": "corrective"}
+    return Arms(num_envs, frame=frame, **options), names
 
 
-OPTIONS = tuple(inspect.signature(Arms).parameters)[2:]
+def instance_names(
+    family: str = FAMILY,
+    split: Split = "development",
+    count: int | None = None,
+    year: int | None = None,
+) -> list[str]:
+    """Names of the first ``count`` instances of a split of a family.
 
-
-def make_arms(count: int, task: Task | str | Path, options: dict[str, Any]) -> Arms:
-    """Robots with the options of an environment. Raises TypeError for one that there is not."""
-    for name in options.keys() - OPTIONS:
-        raise TypeError(unknown("option", name, [*OPTIONS, "render_mode"]))
-    return Arms(count, task, **options)
-
-
-def clip(actions: Any) -> Array:
-    """Actions within the box; NaN, which is no target, stays."""
-    return np.clip(real_array("actions", actions), -1.0, 1.0)
+    Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
+    instances have no year or others have one; TaskError where there is no such family.
+    """
+    load_family(family)
+    if split not in COUNTS:
+        raise ValueError(f"split is {split!r}; it is one of {', '.join(map(repr, COUNTS))}")
+    if (year is None) == (split == "fresh"):
+        raise ValueError(f"year is {year!r}; fresh instances need one, such as 2027, others none")
+    if year is not None:
+        check_limits("year", year, 1000, 9999)
+    count = COUNTS[split] if count is None else count
+    check_limits("count", count, 1, MOST_CELLS)
+    stream = {"development": "d", "test": "i"}.get(split, f"{year}-")
+    return [str(Address(family, stream, number)) for number in range(count)]
 
 
 def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
@@ -267,41 +119,73 @@ def draw_arms(figure: Figure, arms: Arms, row: int) -> None:
     """Draw a robot and its goals; those that it has hit are filled."""
     from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 
-    task = arms.task
+    task = arms.tasks[arms.rows["task"][row]]
     (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
     figure.clear()
     axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-    draw_robot(axes, task, arms.q[row], weight=1.5)
+    draw_robot(axes, task, arms.q[row, : task.robot.dof], weight=1.5)
     number_goals(axes, task, weight=1.5)
     fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[row])
 
 
 class TaskEnv(gymnasium.Env):
-    """One robot and one task; the options are those of :class:`Arms`.
+    """One robot and one task, or instances of a family of which each trial has one.
 
     An episode is a trial, of as many steps as there are goals; it ends earlier where the
-    corrective process fails, which costs ``coartic.optimisers.FAILED``. Nothing is random.
-    Actions are clipped to the box.
+    corrective process fails, which costs ``coartic.optimisers.FAILED``. Actions are clipped to the
+    box. Nothing is random but which instance is drawn.
+
+    Parameters
+    ----------
+    task : Task, str or Path, optional
+        The task; without one, instances of a family are drawn.
+    family : str
+        The family with its version; by default ``"two-armed/v1"``.
+    split : {"development", "test", "fresh"}
+        Its instances to train on, to report on, or those of a ``year``. They never mix.
+    count : int, optional
+        How many instances, the first ones of the split; by default 1,000 of the development split
+        and 10 of the others.
+    year : int, optional
+        Of fresh instances.
+    render_mode : {"human", "rgb_array"}, optional
+        As in Gymnasium.
+    **options
+        As in :class:`coartic.arms.Arms`. Of a family the middle of the box is ``"corrective"``,
+        half its width by default 0.5, and ``"ahead"`` is observed.
+
+    Raises
+    ------
+    ValueError, TypeError, TaskError
+        An option is wrong, or there is no such task or family.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}
 
     def __init__(
-        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+        self,
+        task: Task | str | Path | None = None,
+        *,
+        render_mode: str | None = None,
+        **options: Any,
     ) -> None:
-        self.arms = make_arms(1, task, options)
+        self.arguments = {"task": task, **options}
+        self.arms, self.names = make_arms(1, **self.arguments)
         self.action_space = self.arms.action_space
         self.observation_space = self.arms.observation_space
         self.render_mode = check_render_mode(render_mode, self.metadata)
         self._figure: Figure | None = None
         self._goes_on = False
+        self._all = np.array([True])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial."""
         super().reset(seed=seed)
-        self.arms.reset(np.array([True]))
+        if self.names:
+            draw(self.arms, 0, self.names, self.np_random)
+        self.arms.reset(self._all)
         self._goes_on = True
         if self.render_mode == "human":
             self.render()
@@ -313,31 +197,16 @@ class TaskEnv(gymnasium.Env):
         """Make the next subtask of the trial. Raises ResetNeeded where it has ended."""
         if not self._goes_on:
             raise ResetNeeded("no trial goes on: reset first")
-        rewards, ended = self.arms.step(clip(action)[None], np.array([True]))
+        rewards, ended = self.arms.step(np.asarray(action)[None], self._all)
         self._goes_on = not ended[0]
         if self.render_mode == "human":
             self.render()
         return self.arms.observations()[0], float(rewards[0]), bool(ended[0]), False, self._info()
 
     def action_for(self, hand: Hand, target: Array | None) -> Array:
-        """The action that moves this hand to a target ``(dof,)``, to replay a solution.
-
-        Without a target, which is None or NaN, the corrective process acts alone: the entries of
-        the joints are NaN. A movement of kind ``"corrective"`` is replayed so. Raises ValueError
-        for a target outside of the box, which no action leads to.
-        """
-        if hand not in self.arms.task.hands:
-            raise ValueError(f"hand is {hand!r}; it must be one of {self.arms.task.hands}")
-        centre = self.arms.centre(np.array([0]))[0]
-        given = np.full_like(centre, np.nan) if target is None else real_array("target", target)
-        if given.shape != centre.shape:
-            raise ValueError(f"target has shape {given.shape}; it must be {centre.shape}")
-        away = (given - centre)[self.arms.free] / self.arms.scale
-        if (far := np.nanmax(np.abs(away), initial=0.0)) > 1.0 + 1e-9:
-            raise ValueError(
-                f"the target is outside of the box: it needs a scale of {far * self.arms.scale:.3g}"
-            )
-        return np.array([-1.0 if hand == "left" else 1.0, *away][not self.arms.chooses_hands :])
+        """The action that moves this hand to a target, to replay a solution: see
+        :meth:`coartic.arms.Arms.action_for`. A movement of kind ``"corrective"`` has no target."""
+        return self.arms.action_for(0, hand, target)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Show the robot and the goals in a window, or as a picture ``(height, width, 3)``."""
@@ -361,11 +230,11 @@ class TaskEnv(gymnasium.Env):
         self._figure = None
 
     def _info(self) -> dict[str, Any]:
-        return {name: values[0].item() for name, values in self.arms.infos().items()}
+        return {name: values.tolist()[0] for name, values in self.arms.infos().items()}
 
 
 class TaskVectorEnv(VectorEnv):
-    """N robots side by side, which takes a fraction of the time; options as :class:`Arms`.
+    """N robots side by side, which takes a fraction of the time; options as :class:`TaskEnv`.
 
     ``autoreset_mode`` is one of Gymnasium's. By default, ``"NextStep"``, an episode that has ended
     begins anew in the next step, whose action is ignored. Actions are clipped to the box.
@@ -380,22 +249,25 @@ class TaskVectorEnv(VectorEnv):
     def __init__(
         self,
         num_envs: int,
-        task: Task | str | Path,
+        task: Task | str | Path | None = None,
         *,
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **options: Any,
     ) -> None:
+        self.arguments = {"task": task, **options}
+        self.arms, self.names = make_arms(num_envs, **self.arguments)
         self.num_envs = num_envs
-        self.arms = make_arms(num_envs, task, options)
         self.render_mode = check_render_mode(render_mode, self.metadata)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]
         self.single_action_space = self.arms.action_space
         self.single_observation_space = self.arms.observation_space
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        self._all = np.ones(self.num_envs, dtype=np.bool_)
+        self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
 
     def reset(
         self,
@@ -405,16 +277,18 @@ class TaskVectorEnv(VectorEnv):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin all trials, or those of ``options["reset_mask"]``, shape ``(num_envs,)``.
 
-        A seed, or one for each environment, is taken as by Gymnasium; nothing is random.
+        A seed, or one for each environment, is taken as by Gymnasium. Nothing is random but which
+        instance of a family is drawn.
         """
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            if len(seed) != self.num_envs:
-                raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
-            for each in seed:
-                seeding.np_random(each)  # raises for what is none
-            seed = seed[0]
-        super().reset(seed=seed)
-        which = np.ones(self.num_envs, dtype=np.bool_)
+        seeds: Sequence[int | None]
+        if isinstance(seed, int | np.integer) or seed is None:
+            seeds = [None if seed is None else seed + row for row in range(self.num_envs)]
+        else:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+        super().reset(seed=seeds[0])
+        which = self._all
         if options is not None and "reset_mask" in options:
             which = options["reset_mask"]
             fits = isinstance(which, np.ndarray) and which.dtype == np.bool_
@@ -423,9 +297,18 @@ class TaskVectorEnv(VectorEnv):
                     f"reset_mask must be an array of {self.num_envs} booleans, at least one of "
                     "them True"
                 )
+        for row in np.flatnonzero(which).tolist():
+            if seeds[row] is not None or self._rngs[row] is None:
+                self._rngs[row] = seeding.np_random(seeds[row])[0]  # raises for what is no seed
+        self._begin(which)
+        return self.arms.observations(), self._infos(which)
+
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        """Begin these trials."""
+        for row in np.flatnonzero(which).tolist() if self.names else ():
+            draw(self.arms, row, self.names, self._rngs[row])
         self._ended[which] = False
         self.arms.reset(which)
-        return self.arms.observations(), self._infos(which)
 
     def step(
         self, actions: Array
@@ -434,22 +317,26 @@ class TaskVectorEnv(VectorEnv):
 
         Raises ResetNeeded where they are not begun by themselves, in the mode ``"Disabled"``.
         """
-        if self._ended.any() and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(
-                f"the trials of environments {np.flatnonzero(self._ended).tolist()} have ended: "
-                "reset them first"
-            )
-        self.arms.reset(self._ended)
-        rewards, ended = self.arms.step(clip(actions), ~self._ended)
-        self._ended, truncated = ended.copy(), np.zeros_like(ended)
-        observations, infos = self.arms.observations(), self._infos(np.ones_like(ended))
-        if ended.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
+        going = ~self._ended
+        if not going.all():
+            if self.autoreset_mode == AutoresetMode.DISABLED:
+                raise ResetNeeded(
+                    f"the trials of environments {np.flatnonzero(self._ended).tolist()} have "
+                    "ended: reset them first"
+                )
+            self._begin(~going)
+        rewards, ended = self.arms.step(actions, going)
+        truncated = np.zeros_like(ended)
+        observations, infos = self.arms.observations(), self._infos(self._all)
+        if self.autoreset_mode != AutoresetMode.SAME_STEP:
+            self._ended = ended.copy()
+        elif ended.any():
             last = np.full(self.num_envs, None, dtype=object)
             for row in np.flatnonzero(ended):
                 last[row] = observations[row]
             final = {"final_obs": last, "final_info": self._infos(ended)}
-            observations, _ = self.reset(options={"reset_mask": ended})
-            infos = self._infos(np.ones_like(ended)) | final
+            self._begin(ended)
+            observations, infos = self.arms.observations(), self._infos(self._all) | final
             infos |= {f"_{name}": ended.copy() for name in final}
         return observations, rewards, ended, truncated, infos
 
@@ -464,6 +351,221 @@ class TaskVectorEnv(VectorEnv):
         return infos | {f"_{name}": which.copy() for name in infos}
 
 
+def draw(arms: Arms, row: int, names: Sequence[str], rng: np.random.Generator | None) -> None:
+    """Give a robot an instance that is drawn among these."""
+    assert rng is not None
+    name = names[int(rng.integers(len(names)))]
+    arms.give(row, name if arms.knows(name) else load_task(name))
+
+
+def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
+    """Robots side by side as environments of Stable-Baselines3.
+
+    Parameters
+    ----------
+    env : str
+        Id of an environment, such as ``"coartic/Family-v0"``.
+    num_envs : int
+        Number of robots.
+    **options
+        As in ``gymnasium.make``.
+
+    Returns
+    -------
+    coartic.agents.RobotEnvs
+        A ``VecEnv``: trials begin anew by themselves, actions are clipped, and rewards are shares
+        of what the corrective process takes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The id is none of coartic's, or an option is wrong.
+    """
+    from coartic.agents import RobotEnvs
+
+    given = known_env(env) | options
+    return RobotEnvs(TaskVectorEnv(num_envs, **given, autoreset_mode=AutoresetMode.SAME_STEP))
+
+
+def known_env(env: str) -> dict[str, Any]:
+    """The options of an id of this package. Raises ValueError for another one."""
+    if env not in IDS:
+        raise ValueError(unknown("environment", str(env), IDS))
+    return IDS[env]
+
+
+Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
+
+
+def score(
+    env: str | gymnasium.Env | VectorEnv,
+    policy: Policy | Mapping[str, Policy] | None = None,
+    *,
+    episodes: int = 20,
+    seed: int = 0,
+    **options: Any,
+) -> pd.DataFrame:
+    """How good policies and planners are, beside random actions and the best known solutions.
+
+    Parameters
+    ----------
+    env : str, Env or VectorEnv
+        An environment of this package, or its id. Of a family the instances of the test split
+        are scored, or those of the ``split`` that is given here.
+    policy : callable, agent, Method or mapping, optional
+        Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
+        ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
+        benchmark, such as a planner, that solves each task. A mapping has several, by their names.
+    episodes : int
+        Trials of random actions on each task.
+    seed : int
+        Of random actions and of methods.
+    **options
+        As in ``gymnasium.make``.
+
+    Returns
+    -------
+    DataFrame
+        A row for each policy, for uniformly random actions, for the corrective process alone with
+        the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
+        over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
+        ``gap_low`` to ``gap_high`` over tasks, or of one task over trials; ``completed``, the share
+        of trials that hit all goals. The others are left out of the means. NaN where nothing is
+        known, or too few trials for an interval.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The environment is none of coartic's, an option is wrong, or the policy is no policy.
+    """
+    check_limits("episodes", episodes, 1, MOST_CELLS)
+    if isinstance(env, str):
+        given = known_env(env)
+    elif isinstance(unwrapped := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+        given = unwrapped.arguments
+    else:
+        raise TypeError(
+            f"env is {brief_value(env)}; it must be an environment of coartic or its id"
+        )
+    given = {name: value for name, value in given.items() if name not in ("split", "count", "year")}
+    if given.get("task") is None:
+        given["split"] = "test"
+    given |= options
+    _, names = make_arms(1, **given)
+    tasks = [load_task(name) for name in names] or [as_task(given["task"])]
+
+    def robots(each: int) -> Arms:
+        arms, _ = make_arms(each * len(tasks), **given)
+        for row in range(each * len(tasks)):
+            arms.give(row, tasks[row // each])
+        arms.reset(np.ones(each * len(tasks), dtype=np.bool_))
+        return arms
+
+    model = robots(1).model
+    rng = np.random.default_rng(seed)
+    best = best_known(tasks) if model == PAPER else np.full(len(tasks), np.nan)
+    alone = [
+        corrective_trial(task, initial_hands(task, model=model), model=model) for task in tasks
+    ]
+    found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
+    rewards = {
+        name: solve_all(tasks, each, seed, model)
+        if isinstance(each, Method)
+        else play(robots(1), policy_of(each))[:, None]
+        for name, each in found.items()
+    }
+    guesses = robots(episodes)
+    size = guesses.action_space.shape
+    rewards["random actions"] = play(
+        guesses, lambda seen: rng.uniform(-1, 1, (len(seen), *size))
+    ).reshape(len(tasks), episodes)
+    rewards["corrective process"] = np.array(
+        [[np.nan if trial.reward is None else trial.reward] for trial in alone]
+    )
+    rewards["best known"] = best[:, None]
+    rows = {name: summary(each, best) for name, each in rewards.items()}
+    rows["best known"]["completed"] = np.nan
+    table = pd.DataFrame.from_dict(rows, orient="index")
+    return table.rename_axis("policy")
+
+
+def summary(rewards: Array, best: Array) -> dict[str, float]:
+    """Means over tasks of rewards ``(K, trials)``, NaN for those that failed."""
+    gaps = 100.0 * (best[:, None] - rewards) / np.abs(best[:, None])
+    values = gaps[0] if len(gaps) == 1 else mean_over(gaps, axis=1)
+    values = values[np.isfinite(values)]
+    mean, half = mean_over(values), np.nan
+    if len(values) > 2:
+        half = stdtrit(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+    return {
+        "reward": float(mean_over(mean_over(rewards, axis=1))),
+        "gap": float(mean),
+        "gap_low": float(mean - half),
+        "gap_high": float(mean + half),
+        "completed": float(np.isfinite(rewards).mean()),
+    }
+
+
+def mean_over(values: Array, axis: int | None = None) -> Any:
+    """The mean of the numbers among these; NaN where there is none."""
+    count = np.isfinite(values).sum(axis=axis)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isfinite(values), values, 0.0).sum(axis=axis) / count
+
+
+def policy_of(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
+    """A policy as a function. Raises TypeError for what is none."""
+    if hasattr(policy, "predict"):
+        return lambda seen: policy.predict(seen, deterministic=True)[0]
+    if not callable(policy):
+        raise TypeError(
+            f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
+            "with predict, or a Method"
+        )
+    return policy  # type: ignore[no-any-return]
+
+
+def play(arms: Arms, policy: Callable[[NDArray[np.float32]], ArrayLike]) -> Array:
+    """Rewards of a trial of each robot, from its start, ``(N,)``; NaN where one failed."""
+    going = np.ones(len(arms.rows), dtype=np.bool_)
+    while going.any():
+        going &= ~arms.step(policy(arms.observations()), going)[1]
+    return np.where(np.isfinite(arms.trials.rewards), arms.trials.rewards, np.nan)
+
+
+def solve_all(tasks: Sequence[Task], method: Method, seed: int, model: MotionModel) -> Array:
+    """Rewards of a method's solutions, ``(K, 1)``; NaN where it has none."""
+    rewards = np.full((len(tasks), 1), np.nan)
+    for place, task in enumerate(tasks):
+        session = Session(task, seed, method.told, model=model, trusted=True)
+        with suppress(MethodError):
+            reward = execute(task, method.solve(session).solution, model=model).reward
+            rewards[place] = np.nan if reward is None else reward
+    return rewards
+
+
+def best_known(tasks: Sequence[Task]) -> Array:
+    """The best reward known of each task ``(K,)``; NaN where none is.
+
+    Of the shipped tasks those of ``analysis/optima.json``, of test instances those of the released
+    results.
+    """
+    optima = import_module("coartic.analysis.optima")
+    shipped = {
+        entry.essence: entry.reward
+        for entry in optima.entries()
+        if (entry.base, entry.other_arm) == (optima.BASE, "free")
+    }
+    known = {task.name: shipped.get(optima.essence(task)) for task in tasks}
+    if any(known[task.name] is None and task.split == "test" for task in tasks):
+        released = import_module("coartic.benchmarks.released")
+        with released.results_folder(released.RELEASED, "families") as folder:
+            study = import_module("coartic.analysis.study").load(folder)
+            known |= {name: found.reward for name, found in study.optima.items() if name in known}
+    rewards = [known[task.name] for task in tasks]
+    return np.array([np.nan if reward is None else reward for reward in rewards], dtype=np.float64)
+
+
 TASKS = {
     "Ascending": "ascending",
     "Descending": "descending",
@@ -471,11 +573,17 @@ TASKS = {
     "TwoArmed2": "two-armed-2",
     "Task": None,
 }
+
+
+IDS: dict[str, dict[str, Any]] = {"coartic/Family-v0": {"family": FAMILY}}
 for _name, _task in TASKS.items():
-    if f"coartic/{_name}-v0" not in gymnasium.registry:
+    _given = {} if _task is None else {"task": _task}
+    IDS |= {f"coartic/{_name}-v0": _given, f"coartic/{_name}-v1": _given | WORKS}
+for _name, _given in IDS.items():
+    if _name not in gymnasium.registry:
         gymnasium.register(
-            f"coartic/{_name}-v0",
+            _name,
             entry_point="coartic.gym:TaskEnv",
             vector_entry_point="coartic.gym:TaskVectorEnv",
-            kwargs={} if _task is None else {"task": _task},
+            kwargs=_given,
         )

@@ -17,6 +17,7 @@ import coartic  # noqa: E402
 import coartic.gym  # noqa: E402
 
 TWO = "coartic/TwoArmed1-v0"
+pytestmark = pytest.mark.filterwarnings("ignore:.*out of date")
 
 
 @pytest.mark.parametrize(

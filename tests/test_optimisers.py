@@ -100,8 +100,8 @@ def test_an_optimum_gets_its_reward_through_every_door(name):
     assert cost(targets[cost.joints]) == -entry.reward
     assert execute(task, cost.solution).reward == entry.reward
     gymnasium, door = pytest.importorskip("gymnasium"), pytest.importorskip("coartic.gym")
-    options = {"task": task, "around": entry.hands, "scale": 4.0}
-    env = gymnasium.make("coartic/Task-v0", **options)
+    options = {"task": task, "around": entry.hands, "scale": 4.0, "hands": None}
+    env = gymnasium.make("coartic/Task-v1", **options)
     env.reset()
     actions, rewards = [], []
     for movement, target in zip(solution, targets, strict=True):
