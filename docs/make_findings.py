@@ -39,6 +39,7 @@ KEPT = {
     "tuning": ("variants", ""),
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
+    "dose": ("dose claims", "dose"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
 }

@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 # These register the claims that they judge.
+import coartic.analysis.topics.dose
 import coartic.analysis.topics.families.claims
 import coartic.analysis.topics.horizon
 import coartic.analysis.topics.objectives
