@@ -196,26 +196,44 @@ class Study:
             self._replays[key] = self._executed(key, self._replayed, {})
         return self._replays[key]
 
+    def hits(self, task: str, label: str, *, replayed: bool = False) -> Array:
+        """Configuration in which each run of a cell hits each goal, shape ``(runs, G, dof)``.
+
+        Of its solution, or of its noiseless trial after learning; without the ticks between.
+        """
+        movements, waypoints = (self._replayed, {}) if replayed else self.movements
+        executions = self._executions((task, label), movements, waypoints)
+        return np.array([execution.configurations for execution in executions])
+
     def _executed(
         self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
     ) -> Trajectories:
+        cell, task = self.cells[key], self.tasks[key[0]]
+        executions = self._executions(key, movements, waypoints)
+        runs = tuple(spell_out(task, execution, self.model) for execution in executions)
+        return Trajectories(task, cell.method, cell.variant, runs, self.model)
+
+    def _executions(
+        self, key: CellKey, movements: dict[str, pd.DataFrame], waypoints: dict[str, pd.DataFrame]
+    ) -> list[Execution]:
         cell, task = self.cells[key], self.tasks[key[0]]
         ids = [run_id for run_id in _executed_of(cell) if run_id in movements]
         with explain_errors(self.folder):
             solutions = [
                 movements_from(task, movements[run_id], waypoints.get(run_id)) for run_id in ids
             ]
-            executions = execute_all(task, solutions, self.model)
-            runs = []
-            for run_id, execution in zip(ids, executions, strict=True):
+            executed = []
+            for run_id, execution in zip(
+                ids, execute_all(task, solutions, self.model), strict=True
+            ):
                 if (
                     not isinstance(execution, Execution)
                     or not execution.completed
                     or execution.ticks != movements[run_id].ticks.sum()
                 ):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
-                runs.append(spell_out(task, execution, self.model))
-        return Trajectories(task, cell.method, cell.variant, tuple(runs), self.model)
+                executed.append(execution)
+        return executed
 
     @cached_property
     def _trajectories(self) -> dict[CellKey, Trajectories]:

@@ -40,6 +40,7 @@ KEPT = {
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
     "dose": ("dose claims", "dose"),
+    "resist": ("resist claims", "resist"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
 }
