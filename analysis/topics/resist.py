@@ -63,13 +63,16 @@ def rank_correlation(first: Array, second: Array) -> Array:
     ranks = [centred_ranks(each) for each in (first, second)]
     lengths = np.prod([np.linalg.norm(each, axis=-1) for each in ranks], axis=0)
     products = (ranks[0] * ranks[1]).sum(axis=-1)
-    return np.divide(products, lengths, out=np.full_like(products, np.nan), where=lengths > 0)
+    rho: Array = np.full_like(products, np.nan)
+    np.divide(products, lengths, out=rho, where=lengths > 0)
+    return rho
 
 
 def centred_ranks(values: Array) -> Array:
     """Ranks along the last axis, less their mean."""
     ranks = np.asarray(stats.rankdata(values, axis=-1), dtype=np.float64)
-    return ranks - ranks.mean(axis=-1, keepdims=True)
+    centred: Array = ranks - ranks.mean(axis=-1, keepdims=True)
+    return centred
 
 
 def slope_size(postures: Array, places: Array) -> Array:
