@@ -197,13 +197,26 @@ class Study:
             self._replays[key] = self._executed(key, "replay")
         return self._replays[key]
 
+    def hits(self, task: str, label: str, *, replayed: bool = False) -> Array:
+        """Configuration in which each run of a cell hits each goal, shape ``(runs, G, dof)``.
+
+        Of its solution, or of its noiseless trial after learning; without the ticks between.
+        """
+        executions = self._executions((task, label), "replay" if replayed else "solution")
+        return np.array([execution.configurations for execution in executions])
+
     def _executed(self, key: CellKey, part: str) -> Trajectories:
+        cell, task = self.cells[key], self.tasks[key[0]]
+        runs = (spell_out(task, execution, self.model) for execution in self._executions(key, part))
+        return Trajectories(task, cell.method, cell.variant, tuple(runs), self.model)
+
+    def _executions(self, key: CellKey, part: str) -> list[Execution]:
         cell, task = self.cells[key], self.tasks[key[0]]
         solutions = self._movements(key, part)
         ids = [run_id for run_id in _executed_of(cell) if run_id in solutions]
         with explain_errors(self.folder):
             executions = execute_all(task, [solutions[run_id] for run_id in ids], self.model)
-            runs = []
+            executed = []
             for run_id, execution in zip(ids, executions, strict=True):
                 if (
                     not isinstance(execution, Execution)
@@ -211,8 +224,8 @@ class Study:
                     or execution.ticks != sum(movement.ticks or 0 for movement in solutions[run_id])
                 ):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
-                runs.append(spell_out(task, execution, self.model))
-        return Trajectories(task, cell.method, cell.variant, tuple(runs), self.model)
+                executed.append(execution)
+        return executed
 
     @cached_property
     def _trajectories(self) -> dict[CellKey, Trajectories]:

@@ -37,6 +37,8 @@ KEPT = {
     "tuning": ("variants", ""),
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "stops": ("stops claims", "stops"),
+    "dose": ("dose claims", "dose"),
+    "resist": ("resist claims", "resist"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
 }

@@ -41,6 +41,9 @@ PINNED = {
     "long/v1/i017": "0c274c3863f2febc",
     "long/v1/d003": "1e66e6a44e109d4d",
     "long/v1/2027-041": "66be010eeaecdab3",
+    "neighbours/v1/i017": "0e79b9c21b5c13a5",
+    "neighbours/v1/d003": "743e924318e9ee41",
+    "neighbours/v1/2027-041": "18c65bdef8d0a624",
     "one-armed/v1/i017": "d045540cec694356",
     "one-armed/v1/d003": "15287e3c04086d4e",
     "one-armed/v1/2027-041": "db6b68237c741b36",
@@ -54,6 +57,7 @@ PINNED = {
 RELEASED = {
     "aligned/v1": "1acc695728233543",
     "long/v1": "bc600910c824b195",
+    "neighbours/v1": "d156eebbc328aa7d",
     "one-armed/v1": "b8ab1125c46640e1",
     "redundancy/v1": "29dd33d58da81c12",
     "two-armed/v1": "421fe30fedfb532a",

@@ -14,6 +14,7 @@ _SPEC.loader.exec_module(make_findings)
 @pytest.mark.parametrize(
     "page",
     [
+        "dose.md",
         "findings.md",
         "ahead.md",
         "foreign.md",

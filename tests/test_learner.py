@@ -97,6 +97,7 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition):
 CREDIT = [
     {}, {"discount": 0.5}, {"discount": 1.0}, {"discount": 0.3, "first_trial": "forgotten"},
     {"discount": 0.9, "state": "goal", "ties": "previous"},
+    {"discount": 0.4, "counted": "all"}, {"discount": 0.9, "counted": "all", "state": "goal"},
 ]  # fmt: skip
 
 
@@ -365,6 +366,29 @@ def test_a_subtask_is_credited_with_its_return(discount):
     assert sum(rewards) == run.rewards[0] == -319
     overall = learn(task, "EC1", seed=0, trials=1)
     assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
+
+
+@pytest.mark.parametrize(("task", "condition"), [("descending", "EC1"), ("two-armed-1", "EC4")])
+def test_the_ends_of_the_dose_are_learners_that_there_are(task, condition):
+    """γ = 0 is the reward of each subtask, γ = 1 that of the whole; 0.5 counts all, as printed."""
+    names = ("rewards", "values", "targets", "replay_reward", "corrections", "counters")
+    subtask = VARIANTS[f"{condition}-subtask"]
+    runs = {
+        end: learn(task, replace(subtask, counted="all", discount=end), seed=3, trials=300)
+        for end in (0.0, 0.5, 1.0)
+    }
+    for end, other in ((0.0, subtask), (1.0, CONDITIONS[condition])):
+        theirs = learn(task, other, seed=3, trials=300)
+        for name in names:
+            np.testing.assert_equal(getattr(runs[end], name), getattr(theirs, name))
+        assert [m.ticks for m in runs[end].replay] == [m.ticks for m in theirs.replay]
+    assert runs[0.0].replay_reward != runs[0.5].replay_reward != runs[1.0].replay_reward
+    first = learn(task, runs[0.5].condition, seed=0, trials=1)
+    rewards = [-sum(m.ticks for m in first.initial if m.goal == g + 1) for g in range(3)]
+    if condition == "EC1":
+        weights = 0.5 ** np.abs(np.subtract.outer(range(3), range(3)))
+        credited = [first.values[0, 2, 1], *first.values[1:, 1, 1]]
+        assert credited == (weights @ rewards).tolist()
 
 
 def test_without_corrective_process_a_missed_goal_ends_the_trial():

@@ -27,11 +27,13 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 # These register the claims that they judge.
+import coartic.analysis.topics.dose
 import coartic.analysis.topics.families.claims
 import coartic.analysis.topics.horizon
 import coartic.analysis.topics.objectives
 import coartic.analysis.topics.paper.claims
 import coartic.analysis.topics.paper.coarticulation
+import coartic.analysis.topics.resist
 import coartic.analysis.topics.stops  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
 from coartic.analysis.claims.ensemble import held_by, rarely_supported

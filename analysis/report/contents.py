@@ -12,7 +12,7 @@ from coartic.analysis import topics
 from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.section import Section
 from coartic.analysis.table import TABLES
-from coartic.analysis.topics import horizon, objectives, settings, stops, tasks
+from coartic.analysis.topics import dose, horizon, objectives, resist, settings, stops, tasks
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.families import sentences as families
@@ -40,6 +40,8 @@ SECTIONS: tuple[Section, ...] = (
     families.EXPLORATION,
     horizon.HORIZON,
     stops.STOPS,
+    dose.DOSE,
+    resist.RESIST,
     objectives.OBJECTIVES,
     families.SIGNS,
     tasks.TASKS,

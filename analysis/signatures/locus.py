@@ -1,7 +1,7 @@
 """Locus slopes: how the posture at one goal follows a neighbouring goal that moves.
 
 In speech, a locus equation regresses the onset of a consonant's formant transition on the
-vowel that follows; its slope measures how far the vowel is anticipated (Lindblom 1963;
+vowel that follows; its slope is taken to measure how far the vowel is anticipated (Lindblom 1963;
 Sussman, McCaffrey & Matthews 1991). Here the posture at goal g is regressed on the position
 of goal g + 1 (anticipatory) or g - 1 (carry-over), over tasks that differ in that goal only.
 

@@ -349,8 +349,10 @@ def lead(contexts: TwoContexts) -> Value:
     meaning="Slope of the mean posture at a goal against the position of a neighbouring goal that "
     "differs between tasks: the next goal (anticipatory) or the previous one (carry-over). The "
     "name is that of locus equations in speech (Lindblom 1963; Sussman, McCaffrey & Matthews "
-    "1991).",
-    sources=("sussman1991",),
+    "1991). Whether such slopes measure coarticulation is disputed there: no articulatory measure "
+    "supported it (Löfqvist 1999), and they are said to encode resistance to it directly "
+    "(Iskarous, Fowler & Whalen 2010). Those are of frequencies; these are of postures.",
+    sources=("sussman1991", "lofqvist1999", "iskarous2010", "recasens2016"),
 )
 def slope_by_joint(beside: BesideMovedGoal) -> list[Value]:
     """b = Σ (x - mean x)(m(x) - mean m) / Σ (x - mean x)², m(x) the mean posture at position x."""

@@ -38,6 +38,7 @@ FirstTrial = Literal["learns", "forgotten"]
 UnknownTarget = Literal["corrects", "explores"]
 Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
+Counted = Literal["later", "all"]
 State = Literal["previous-hand", "goal"]
 Share = Annotated[float, Field(ge=0, le=1)]
 Noise = Annotated[float, Field(ge=0, le=MOST_NOISE)]
@@ -83,11 +84,13 @@ class ExplorationCondition:
     learned: Learned = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
     credit: Credit = "overall"
-    """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return from
-    that goal on, the reward of its own subtask first."""
+    """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return of that
+    goal, the reward of its own subtask first."""
     discount: Share = 0.0
-    """γ: the return is r_g + γ r_{g+1} + γ² r_{g+2} + …, with r_g the reward of the movements to
-    goal g. 0 is the reward of the subtask alone. With credit "subtask" only."""
+    """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0
+    is the reward of the subtask alone. With credit "subtask" only."""
+    counted: Counted = "later"
+    """Goals h of this sum: g and later ones, or all. Of all, γ = 1 is R, for every goal."""
 
     def __post_init__(self) -> None:
         if self.discount and self.credit == "overall":

@@ -4,7 +4,7 @@ The paper's section *The Learning Process* and Figure 3. Per trial and goal: cho
 hand, perturb the stored target configuration, move, and let the corrective process
 finish where the goal was missed. A trial better than any before it that passed
 through the same state and hand replaces what is stored there; better by its whole reward,
-or, in a variant, by the return from that goal on.
+or, in a variant, by the return of that goal.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
 trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy generator of its own
@@ -65,14 +65,16 @@ class Rules(NamedTuple):
     goal_alone: bool
     by_subtask: bool
     discount: float
+    counts_earlier: bool
 
 
 class Log(NamedTuple):
-    """The movements of one trial of each run, and where it stood when each goal was hit."""
+    """The movements of one trial of each run, where it stood when each goal was hit, and the
+    return of each."""
 
     count: Any  # (N,)
     movements: Any  # (N, 2 G) records of goal, hand, kind, ticks and target
-    hits: Any  # (N, G) records of hand, penalty and q
+    hits: Any  # (N, G) records of hand, penalty, reward and credit of the subtask, and q
 
 
 class Kept(NamedTuple):
@@ -141,6 +143,7 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         goal_alone=condition.state == "goal",
         by_subtask=condition.credit == "subtask",
         discount=float(condition.discount),
+        counts_earlier=condition.counted == "all",
     )
 
 
@@ -161,7 +164,8 @@ def empty_log(runs: int, task: Task) -> Log:
     goals, q = len(task.goals), (np.float64, width_of(task.robot))
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
     movement = record_type({**numbers, "target": q})
-    hit = record_type({"hand": np.int64, "penalty": np.int64, "q": q})
+    credit = dict.fromkeys(("reward", "credit"), np.float64)
+    hit = record_type({"hand": np.int64, "penalty": np.int64, **credit, "q": q})
     count = np.zeros(runs, dtype=np.int64)
     return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
@@ -458,19 +462,33 @@ def make_trial(
 
 
 @inlined
+def find_returns(n: int, rules: Any, log: Any) -> None:
+    """Set the return of each goal in the log of a completed trial."""
+    goals, row, earlier, later = log.hits.shape[1], 0, 0.0, 0.0
+    for number in range(goals):
+        hit = log.hits[n, number]
+        ticks = 0
+        while row < log.count[n] and log.movements[n, row].goal == number:
+            ticks += log.movements[n, row].ticks
+            row += 1
+        hit.reward = -(ticks + hit.penalty)
+        hit.credit = earlier
+        if rules.counts_earlier:
+            earlier = rules.discount * (earlier + hit.reward)
+    for number in range(goals - 1, -1, -1):
+        hit = log.hits[n, number]
+        later = hit.reward + rules.discount * later
+        hit.credit += later
+
+
+@inlined
 def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
     """Credit what was visited with the reward of the trial, or each goal with its return."""
-    row = log.count[n]
-    later = 0.0
-    for number in range(log.hits.shape[1] - 1, -1, -1):
-        credit = reward
-        if rules.by_subtask:
-            ticks = 0
-            while row > 0 and log.movements[n, row - 1].goal == number:
-                row -= 1
-                ticks += log.movements[n, row].ticks
-            credit = later = rules.discount * later - (ticks + log.hits[n, number].penalty)
+    if rules.by_subtask:
+        find_returns(n, rules, log)
+    for number in range(log.hits.shape[1]):
         hit = log.hits[n, number]
+        credit = hit.credit if rules.by_subtask else reward
         knows = number > 0 and not rules.goal_alone
         before = log.hits[n, number - 1].hand if knows else NO_HAND
         learned = tables[n, number, before, hit.hand]

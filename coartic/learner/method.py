@@ -19,6 +19,7 @@ from coartic.learner.conditions import (
     METHOD_PREFIX,
     MOST_NOISE,
     VARIANTS,
+    Counted,
     EqualDistance,
     ExplorationCondition,
     FirstTrial,
@@ -74,7 +75,10 @@ class SubtaskParameters(DualProcessParameters):
     """Of the variants that learn from the reward of each subtask."""
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """γ of the return from a goal on; 0 is the reward of its own subtask alone."""
+    """γ of a goal's return; 0 is the reward of its own subtask alone."""
+    counted: Counted = "later"
+    """Subtasks whose rewards the return counts: from the goal on, or all, which with γ = 1 is the
+    total reward."""
     of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "replay"}
 
 

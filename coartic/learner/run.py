@@ -50,7 +50,7 @@ class LearningRun:
     """Its reward; None where it did not hit every goal."""
     values: Array
     """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
-    0: total rewards, or returns from that goal on where the condition credits subtasks; -inf
+    0: total rewards, or returns of the goal where the condition credits subtasks; -inf
     where nothing was learned."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is

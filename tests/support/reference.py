@@ -237,6 +237,10 @@ def learn(
                     credit = 0.0
                     for reward in reversed(subtasks[number:]):
                         credit = reward + condition.discount * credit
+                    earlier = 0.0
+                    for reward in subtasks[:number] if condition.counted == "all" else []:
+                        earlier = condition.discount * (earlier + reward)
+                    credit += earlier
                 value = values.get((state, hand), -math.inf)
                 if credit > value:
                     values[state, hand] = credit
