@@ -427,11 +427,11 @@ def score(
     -------
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process alone with
-        the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
-        over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
-        ``gap_low`` to ``gap_high`` over tasks, or of one task over trials; ``completed``, the share
-        of trials that hit all goals. The others are left out of the means. NaN where nothing is
-        known, or too few trials for an interval.
+        the given hands or the task's initial ones, and for the best solution known. Columns:
+        ``reward``, the mean over tasks, ticks; ``gap`` to the best known reward, per cent, with its
+        95 % interval ``gap_low`` to ``gap_high`` over tasks, or of one task over trials;
+        ``completed``, the share of trials that hit all goals. The others are left out of the means.
+        NaN where nothing is known, or too few trials for an interval.
 
     Raises
     ------
@@ -461,11 +461,13 @@ def score(
         arms.reset(np.ones(each * len(tasks), dtype=np.bool_))
         return arms
 
-    model = robots(1).model
+    first = robots(1)
+    model = first.model
     rng = np.random.default_rng(seed)
     best = best_known(tasks) if model == PAPER else np.full(len(tasks), np.nan)
+    hands = [first.given_hands(task) or initial_hands(task, model=model) for task in tasks]
     alone = [
-        corrective_trial(task, initial_hands(task, model=model), model=model) for task in tasks
+        corrective_trial(task, each, model=model) for task, each in zip(tasks, hands, strict=True)
     ]
     found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
     rewards = {
