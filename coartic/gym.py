@@ -59,11 +59,12 @@ def make_arms(
 
     Raises TypeError for an option that there is not.
     """
-    known = OPTIONS if task is not None else FAMILY_OPTIONS
+    of_family = task is None and "family" in options
+    known = FAMILY_OPTIONS if of_family else OPTIONS
     for name in options.keys() - {*known}:
         raise TypeError(unknown("option", name, [*known, "render_mode"]))
-    if task is not None:
-        return Arms(num_envs, as_task(task), **options), []
+    if not of_family:
+        return Arms(num_envs, as_task(task), **options), []  # type: ignore[arg-type]
     which = {name: options.pop(name) for name in OF_FAMILY if name in options}
     names, family = instance_names(**which), load_family(which.get("family", FAMILY))
     goals, links = family.goals[1], family.links[1]
@@ -83,7 +84,7 @@ def instance_names(
     Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
     instances have no year or others have one; TaskError where there is no such family.
     """
-    load_family(family)
+    load_family(str(family))
     if split not in COUNTS:
         raise ValueError(f"split is {split!r}; it is one of {', '.join(map(repr, COUNTS))}")
     if (year is None) == (split == "fresh"):
@@ -138,9 +139,9 @@ class TaskEnv(gymnasium.Env):
     Parameters
     ----------
     task : Task, str or Path, optional
-        The task; without one, instances of a family are drawn.
+        The task; in its place a family, of which instances are drawn.
     family : str
-        The family with its version; by default ``"two-armed/v1"``.
+        The family with its version, ``"two-armed/v1"``.
     split : {"development", "test", "fresh"}
         Its instances to train on, to report on, or those of a ``year``. They never mix.
     count : int, optional
@@ -281,13 +282,14 @@ class TaskVectorEnv(VectorEnv):
         instance of a family is drawn.
         """
         seeds: Sequence[int | None]
-        if isinstance(seed, int | np.integer) or seed is None:
-            seeds = [None if seed is None else seed + row for row in range(self.num_envs)]
-        else:
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
             seeds = seed
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
-        super().reset(seed=seeds[0])
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+            super().reset(seed=seeds[0])
+        else:
+            super().reset(seed=seed)  # raises for what is no seed
+            seeds = [None if seed is None else seed + row for row in range(self.num_envs)]
         which = self._all
         if options is not None and "reset_mask" in options:
             which = options["reset_mask"]
@@ -427,11 +429,11 @@ def score(
     -------
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process alone with
-        the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
-        over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
-        ``gap_low`` to ``gap_high`` over tasks, or of one task over trials; ``completed``, the share
-        of trials that hit all goals. The others are left out of the means. NaN where nothing is
-        known, or too few trials for an interval.
+        the given hands or the task's initial ones, and for the best solution known. Columns:
+        ``reward``, the mean over tasks, ticks; ``gap`` to the best known reward, per cent, with its
+        95 % interval ``gap_low`` to ``gap_high`` over tasks, or of one task over trials;
+        ``completed``, the share of trials that hit all goals. The others are left out of the means.
+        NaN where nothing is known, or too few trials for an interval.
 
     Raises
     ------
@@ -448,7 +450,7 @@ def score(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
     given = {name: value for name, value in given.items() if name not in ("split", "count", "year")}
-    if given.get("task") is None:
+    if "family" in given:
         given["split"] = "test"
     given |= options
     _, names = make_arms(1, **given)
@@ -461,11 +463,13 @@ def score(
         arms.reset(np.ones(each * len(tasks), dtype=np.bool_))
         return arms
 
-    model = robots(1).model
+    first = robots(1)
+    model = first.model
     rng = np.random.default_rng(seed)
     best = best_known(tasks) if model == PAPER else np.full(len(tasks), np.nan)
+    hands = [first.given_hands(task) or initial_hands(task, model=model) for task in tasks]
     alone = [
-        corrective_trial(task, initial_hands(task, model=model), model=model) for task in tasks
+        corrective_trial(task, each, model=model) for task, each in zip(tasks, hands, strict=True)
     ]
     found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
     rewards = {

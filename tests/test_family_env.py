@@ -195,7 +195,9 @@ def test_a_single_task_is_scored():
 def test_a_wrong_option_is_refused_with_a_sentence(options, error, words):
     for make in (coartic.gym.TaskEnv, lambda **more: coartic.gym.TaskVectorEnv(2, **more)):
         with pytest.raises(error, match=words):
-            make(**options)
+            make(**{"family": "two-armed/v1"} | options)
+    with pytest.raises(TypeError, match="task is None; it must be a Task, the name of one"):
+        gymnasium.make("coartic/Task-v1")
 
 
 def test_what_cannot_be_scored():
