@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.analysis.runtimes import runtimes
+    from coartic.benchmarks.recording import record_run as record_run
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from coartic.motion.movement import MoveResult, move
     from coartic.motion.solution import Execution, Movement, execute
     from coartic.motion.ticks import Trajectory, trajectory
-    from coartic.optimisers import Objective, Optimiser, objective
+    from coartic.optimisers import Objective, Optimiser, objective, problem, problems
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
@@ -67,12 +68,15 @@ __all__ = [
     "move",
     "objective",
     "parse_task",
+    "problem",
+    "problems",
     "runtimes",
     "trajectory",
 ]
 
 _HOMES = {
     "analysis.runtimes": ("runtimes",),
+    "benchmarks.recording": ("record_run",),  # for Objective.record
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
@@ -84,7 +88,7 @@ _HOMES = {
     "motion.movement": ("MoveResult", "move"),
     "motion.solution": ("Execution", "Movement", "execute"),
     "motion.ticks": ("Trajectory", "trajectory"),
-    "optimisers": ("Objective", "Optimiser", "objective"),
+    "optimisers": ("Objective", "Optimiser", "objective", "problem", "problems"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),
