@@ -49,14 +49,7 @@ def record_run(
     if session.model != PAPER:
         raise CoarticError("runs are recorded under the constants of the paper, model=PAPER")
     complete = dict(sorted(parameters.items()))  # as they are stored
-    asked = {
-        key: value
-        for key, value in complete.items()
-        if key != "trials" and value != card.defaults[key]
-    }
-    new = Plan(
-        suite, 0, 1, trials_in(complete), (), None, None, (Cell(task, card, asked, complete),)
-    )
+    new = Plan(suite, 0, 1, trials_in(complete), (), None, None, (Cell(task, card, {}, complete),))
     with writing(out) as store:
         plan = new
         if store.count():

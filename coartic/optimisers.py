@@ -549,7 +549,8 @@ class OptimiserParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best."""
+    """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
+    best."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Of the bounds, length unit (base) and rad (joints)."""
 
@@ -565,7 +566,7 @@ class Optimiser(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        if self.parameters.hands:
+        if self.parameters.hands not in (None, ALL):
             return None
         return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
