@@ -138,7 +138,7 @@ def check_declaration(method: type[Method], origin: str) -> None:
         text = getattr(method, attribute, None)
         if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
             raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    if not _NAME.fullmatch(method.name):
+    if not METHOD_NAME.fullmatch(method.name):
         raise CoarticError(
             f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
         )
@@ -147,4 +147,4 @@ def check_declaration(method: type[Method], origin: str) -> None:
         raise CoarticError(f"{where}: told must be a set of Information, not {told!r}")
 
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
+METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")

@@ -266,6 +266,11 @@ class TaskView:
         return self._task.robot.symbolic_hand(q, hand)
 
     @property
+    def told(self) -> frozenset[Information]:
+        """What was declared."""
+        return self._told
+
+    @property
     def used(self) -> frozenset[Information]:
         """What has been used of what was declared."""
         return frozenset(self._used)
@@ -428,6 +433,11 @@ class Session(TaskView):
     @cached_property
     def _bench(self) -> Bench:
         return Bench(self._task, self.model)
+
+    def hand_codes(self, hands: HandSequences, count: int) -> NDArray[np.int64]:
+        """Hands of trials as indices into HANDS, shape ``(count, G)``; ValueError where they do
+        not fit."""
+        return hand_codes(self._task, hands, count)
 
     def unchecked_trials(
         self, codes: NDArray[np.int64], targets: Array, *, until: Any = None

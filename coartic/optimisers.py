@@ -7,16 +7,17 @@ method of the benchmark that consists of such a function and of what minimises i
 from __future__ import annotations
 
 import itertools
+import time
 from abc import abstractmethod
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from coartic.inputs import WIDTHS, check_limits, real_array
+from coartic.inputs import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
 from coartic.learner.learning import TRIALS
 from coartic.method import (
     BudgetError,
@@ -27,21 +28,29 @@ from coartic.method import (
     Parameters,
     Result,
     Session,
+    UndeclaredError,
 )
 from coartic.model import PAPER, MotionModel
 from coartic.motion.initial import too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.solution import Movement
-from coartic.motion.trials import movements_of
+from coartic.motion.trials import HandSequences, movements_of
 from coartic.robot import HANDS, Array
-from coartic.tasks.task import Task, as_task, hands_of, letters_of
+from coartic.tasks.families import load_family
+from coartic.tasks.optima import ShippedOptimum, best_shipped
+from coartic.tasks.task import SPLITS, Address, Task, TaskLike, as_task, hands_of, letters_of
 from coartic.text import counted
+
+if TYPE_CHECKING:  # workers do without pandas
+    import pandas as pd
 
 TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 """What a method that minimises an :class:`Objective` is told."""
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
+ALL = "all"
+"""In place of a hand sequence: points say which."""
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 
@@ -82,9 +91,15 @@ class Objective:
     acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
     target is always made and takes a tick at least.
 
+    With hands ``"all"`` a point also says with which hand to hit each goal: it has the targets of
+    every joint and then, if the robot has two hands, an entry for each goal, which is above 0 for
+    the right hand.
+
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence, of which the best is kept. No point has other hands than these, so that the
-    lowest cost is that of the best solution with these hands, which other hands may better.
+    hand sequence, of which the best is kept. Unless hands are ``"all"``, no point has other ones
+    than these, so that the lowest cost is that of the best solution with these hands, which other
+    hands may better.
+
     Raises MethodError where the corrective process completes no sequence.
     """
 
@@ -95,11 +110,14 @@ class Objective:
         *,
         half_width: float = HALF_WIDTH,
         trials: int | None = None,
+        task: Task | None = None,
     ) -> None:
         check_limits("half_width", half_width, *WIDTHS)
-        self._session = session
+        self._session, self._task = session, task
+        self._asked: dict[str, Any] = {"hands": hands, "half_width": half_width, "trials": trials}
         self._end = None if trials is None else session.meter.trials + trials
-        sequences = sequences_of(session) if hands is None else [hands]
+        given = hands not in (None, ALL)
+        sequences = [str(hands)] if given else sequences_of(session)
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
         alone = session.trials(sequences, np.full(shape, np.nan))
@@ -107,114 +125,254 @@ class Objective:
         if not alone.completed[best]:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         self.hands = sequences[best]
-        """The hand sequence."""
+        """The hand sequence; the one to begin with, where points say which."""
+        self.searches_hands = hands == ALL and len(session.hands) > 1
+        """Whether a point says with which hand to hit each goal."""
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
+        if self.searches_hands:
+            self.joints = np.tile(self.joints[0], (session.goals_count, 1))
+            for hand in session.hands:
+                self.joints[:, session.joints(hand)] = True
         self.postures: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
-        self.dim = int(self.joints.sum())
+        self._codes = session.hand_codes(self.hands, 1)
+        self._entries = np.flatnonzero(self.joints)
+        self._half_width = half_width
+        self.dim = len(self.x0)
         """Number of parameters."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
+        if self.searches_hands:
+            self.bounds[len(self._entries) :] = -half_width, half_width
         self.evaluations = 0
         """Points evaluated; the first trials are not among them."""
         self.best_cost = float(-alone.rewards[best])
         """Cost of the best trial so far; at the start that of the corrective process alone."""
-        self._best_x = np.full(self.dim, np.nan)
+        self.best_hands = self.hands
+        """Hand sequence of the best trial so far."""
+        self._best_x = self._point(np.full(len(self._entries), np.nan), self._codes[0])
         self._best_targets = alone.targets[best].copy()
-        codes = [HANDS.index(hand) for hand in hands_of(self.hands)]
-        self._codes = np.array([codes])
-        self._entries = np.flatnonzero(self.joints)
+        self._better = [(0, self.best_cost)]
+        self._began = self._ended = 0.0
 
     def __repr__(self) -> str:
-        return (
-            f"Objective({self._session.task_name}, hands {self.hands}, {self.dim} parameters, "
-            f"{counted(self.evaluations, 'evaluation')}, best cost {self.best_cost:g})"
-        )
+        hands = f"any hands, first {self.hands}" if self.searches_hands else f"hands {self.hands}"
+        facts = [
+            f"Objective({self._session.task_name}, {hands}, {self.dim} parameters",
+            counted(self.evaluations, "evaluation"),
+            f"best cost {self.best_cost:g}"
+            + (f" with hands {self.best_hands}" if self.searches_hands else ""),
+        ]
+        shipped = self._shipped
+        if shipped is not None and shipped.reward is not None:
+            facts.append(f"best known {-shipped.reward} with hands {shipped.hands}")
+        return ", ".join(facts) + ")"
+
+    # What is known of the task; nothing of this is for a method.
+
+    @property
+    def task(self) -> Task:
+        """The task. Raises UndeclaredError in a method, which is not told."""
+        if self._task is None:
+            raise UndeclaredError("a method is not told its task, nor what is known of it")
+        return self._task
+
+    @property
+    def _shipped(self) -> ShippedOptimum | None:
+        known = None if self._task is None else best_shipped(self._task)
+        useful = known is not None and known.reward is not None and self._session.model == PAPER
+        return known if useful else None
+
+    @property
+    def best_known(self) -> int | None:
+        """Lowest cost known of the task, ticks, with whatever hands and with goals of no movement.
+
+        None where none is shipped, as for instances of families and for another model.
+        """
+        self.task  # noqa: B018 (refused in a method)
+        shipped = self._shipped
+        return None if shipped is None or shipped.reward is None else -shipped.reward
+
+    @property
+    def proven(self) -> bool:
+        """Whether it is proven that no solution costs less than ``best_known``."""
+        known = self.best_known
+        return known is not None and self._shipped is not None and self._shipped.bound == -known
+
+    # What was found so far.
+
+    @property
+    def history(self) -> pd.DataFrame:
+        """The best cost so far, a row each time it became lower: ``evaluations``, from 0 for the
+        corrective process alone, and ``cost``, ticks."""
+        import pandas as pd  # which a worker does without
+
+        return pd.DataFrame(self._better, columns=["evaluations", "cost"])
+
+    def evaluations_to(self, targets: ArrayLike) -> Any:
+        """Evaluations after which the cost was at or below targets: a float, or an array of the
+        shape of ``targets``, ticks; infinite for targets that are not reached so far."""
+        wanted = real_array("targets", targets)
+        evaluations, costs = np.array([*self._better, (np.inf, -np.inf)]).T
+        found = evaluations[np.searchsorted(-costs, -wanted)]
+        return float(found) if wanted.ndim == 0 else found
 
     @property
     def x0(self) -> Array:
         """A point to begin with, shape ``(dim,)``: the postures in which the corrective process
         alone hits the goals. Moving straight to them can cost more or less than it does."""
-        return self.postures[self.joints]
+        return self._point(self.postures[self.joints], self._codes[0])
+
+    def _point(self, targets: Array, codes: NDArray[np.int64]) -> Array:
+        """The point of targets and hands."""
+        sides = (codes - 0.5) * self._half_width
+        return np.append(targets, sides) if self.searches_hands else targets.copy()
 
     @property
     def best_x(self) -> Array:
-        """The point of the best trial so far, shape ``(dim,)``, whose cost is ``best_cost``; all
-        NaN, the corrective process alone, until a point is better."""
+        """The point of the best trial so far, shape ``(dim,)``, whose cost is ``best_cost``, with
+        ``best_hands`` where hands were given with points. Its targets are all NaN, the corrective
+        process alone, until a point is better."""
         return self._best_x.copy()
 
     @property
     def solution(self) -> tuple[Movement, ...]:
         """The movements of the best trial, for :func:`coartic.execute`."""
-        return movements_of(self.hands, self._best_targets)
+        return movements_of(self.best_hands, self._best_targets)
 
-    def __call__(self, x: ArrayLike) -> Any:
+    def fresh(self) -> Objective:
+        """The same problem with nothing evaluated and its whole budget: for another run.
+
+        Raises UndeclaredError in a method.
+        """
+        session = Session(self.task, 0, TOLD, model=self._session.model)
+        return Objective(session, task=self.task, **self._asked)
+
+    def record(self, folder: str | Path, name: str, *, suite: str = "problems") -> int:
+        """Store what was found, as a run of a method in a results folder; its number, from 0.
+
+        The solution is executed and scored as every method's, so that the report, the ranking and
+        :func:`coartic.runtimes` take the folder; ``suite`` names what it holds. The method has the
+        parameters of this problem, with the budget as ``trials``. Its seconds go from the first
+        evaluation to the end of the last.
+
+        Raises CoarticError for a name that is no method's id, is one of this project's, and for a
+        folder of another suite; UndeclaredError in a method.
+        """
+        from coartic import record_run  # through the package: what stores runs imports this
+
+        return record_run(
+            folder,
+            name,
+            suite,
+            task=self.task,
+            session=self._session,
+            seconds=self._ended - self._began,
+            solution=self.solution,
+            parameters=self._asked,
+        )
+
+    # Evaluation.
+
+    def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
         them; see :meth:`many`, which takes rows, for as many points as they have entries."""
-        points = real_array("x", x)
-        if points.ndim not in (1, 2) or len(points) != self.dim:
-            raise ValueError(
-                f"x has shape {points.shape}; needed is ({self.dim},) or ({self.dim}, N)"
-            )
-        if points.ndim == 2:
-            return self.many(points.T)
-        if not points @ points <= LARGEST_ENTRY:  # NaN, or far away: to be looked at
-            return float(self.many(points[None])[0])
+        point = real_array("x", x)
+        size = self.dim if hands is None else len(self._entries)
+        if point.ndim not in (1, 2) or len(point) != size:
+            raise ValueError(f"x has shape {point.shape}; needed is ({size},) or ({size}, N)")
+        if point.ndim == 2:
+            return self.many(point.T, hands)
+        if hands is not None or not point @ point <= LARGEST_ENTRY:  # NaN, or far: to be looked at
+            return float(self.many(point[None], hands)[0])
         self._trials_left(1)
-        targets = self._targets(points[None])
-        reward = self._session.unchecked_trial(self._codes, targets)
-        cost = FAILED if reward is None else min(-reward, FAILED)
+        self._began = self._began or time.perf_counter()
+        codes, targets = self._trials_of(point[None], None)
+        reward = self._session.unchecked_trial(codes, targets)
+        cost = float(FAILED if reward is None else min(-reward, FAILED))
         self.evaluations += 1
+        self._ended = time.perf_counter()
         if cost < self.best_cost:
-            self._keep(cost, points, targets[0])
-        return float(cost)
+            self._keep(cost, self.evaluations, point, codes[0], targets[0])
+        return cost
 
-    def many(self, points: ArrayLike) -> Array:
-        """Costs ``(N,)`` of points ``(N, dim)``, which are evaluated side by side.
+    def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
+        """Costs ``(N,)`` of points, which are evaluated side by side.
 
-        Entries are finite, or NaN for all joints of a goal (the corrective process alone). Raises
-        BudgetError where trials are not left for all of them, after those that are left are made.
-        Raises ValueError for another shape, for infinite entries and for goals that are NaN in
-        part.
+        Parameters
+        ----------
+        points : array_like, shape (N, dim)
+            Entries are finite, or NaN for all joints of a goal (the corrective process alone).
+        hands : str, sequence of str or ndarray, optional
+            The hand sequence of all points (``"RRLR"``), of each, or an array of shape ``(N, G)``
+            with 0 for left and 1 for right, whatever the hands of this problem are. Points have
+            no entries for hands then, and joints that have none keep still.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Their costs, ticks.
+
+        Raises
+        ------
+        BudgetError
+            Trials are not left for all of them; those that are left are made.
+        ValueError
+            The shape is another one, entries are infinite, a goal is NaN in part, or hands do not
+            fit the task.
         """
         array = real_array("points", points)
-        if array.ndim != 2 or array.shape[1] != self.dim:
-            raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
+        size = self.dim if hands is None else len(self._entries)
+        if array.ndim != 2 or array.shape[1] != size:
+            raise ValueError(f"points of shape {array.shape}: needed is (N, {size})")
         self._check(array)
+        codes = None if hands is None else self._session.hand_codes(hands, len(array))
         left, costs = self._trials_left(len(array)), np.empty(len(array))
+        self._began = self._began or time.perf_counter()
         for first in range(0, left, CHUNK):
-            some = array[first : min(first + CHUNK, left)]
-            targets = self._targets(some)
-            hands = np.repeat(self._codes, len(some), axis=0)
-            trials = self._session.unchecked_trials(hands, targets)
-            found = costs[first : first + len(some)]
+            part = slice(first, min(first + CHUNK, left))
+            some, found = array[part], costs[part]
+            chosen, targets = self._trials_of(some, None if codes is None else codes[part])
+            trials = self._session.unchecked_trials(chosen, targets)
             np.minimum(-trials.rewards, FAILED, out=found)
-            self.evaluations += len(some)
             best = int(found.argmin())
             if found[best] < self.best_cost:
-                self._keep(found[best], some[best], targets[best])
+                lowest = np.minimum.accumulate(found)
+                for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
+                    at = self.evaluations + n + 1
+                    self._keep(float(found[n]), at, some[n], chosen[n], targets[n])
+            self.evaluations += len(some)
+        self._ended = time.perf_counter()
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
 
-    def _keep(self, cost: float, point: Array, targets: Array) -> None:
+    def _keep(
+        self, cost: float, evaluations: int, point: Array, codes: Any, targets: Array
+    ) -> None:
         """Note the best trial so far."""
-        self.best_cost, self._best_x = float(cost), point.copy()
+        self.best_cost, self._best_x = cost, self._point(point[: len(self._entries)], codes)
         self._best_targets = targets.copy()
+        self.best_hands = letters_of([HANDS[code] for code in codes])
+        self._better.append((evaluations, cost))
 
-    def _targets(self, points: Array) -> Array:
-        """Targets ``(N, G, dof)`` of points; NaN for joints that have none."""
+    def _trials_of(self, points: Array, codes: Any) -> tuple[NDArray[np.int64], Array]:
+        """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
         targets = np.full((len(points), self.joints.size), np.nan)
-        targets[:, self._entries] = points
-        return targets.reshape(len(points), *self.joints.shape)
+        targets[:, self._entries] = points[:, : len(self._entries)]
+        if codes is None and self.searches_hands:
+            codes = (points[:, len(self._entries) :] > 0).astype(np.int64)
+        elif codes is None:
+            codes = self._codes if len(points) == 1 else np.repeat(self._codes, len(points), axis=0)
+        return codes, targets.reshape(len(points), *self.joints.shape)
 
     def _check(self, points: Array) -> None:
         """Raises ValueError for goals that are NaN in part, and for entries that are infinite or
         beyond what a trial takes."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
-        targets = self._targets(points)
+        _, targets = self._trials_of(points, self._codes)
         missing = (np.isnan(targets) & self.joints).sum(axis=2)
         in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
         if in_part.any():
@@ -223,6 +381,8 @@ class Objective:
                 f"point {point}: of goal {goal + 1} some entries are NaN; needed are all of them "
                 "(the corrective process alone) or none"
             )
+        if np.isnan(points[:, len(self._entries) :]).any():
+            raise ValueError("an entry for a hand is NaN; needed is a number")
         if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
         if (np.abs(points) > LARGEST_ENTRY).any():
@@ -242,31 +402,146 @@ class Objective:
 
 
 def objective(
-    task: Task | str | Path,
+    task: TaskLike,
     hands: str | None = None,
     *,
     half_width: float = HALF_WIDTH,
     model: MotionModel = PAPER,
+    budget: int | None = None,
 ) -> Objective:
     """The cost of a trial of a task, as a function that scipy and others can minimise.
 
-    ``task`` is a task, the name of one or a file; ``hands`` a hand sequence (``"RRLR"``), by
-    default the one with which the corrective process alone does best; ``half_width`` that of the
-    bounds around ``x0``, length unit (base) and rad (joints). The default hands need not be those
-    of the optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 %
-    of it.
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file.
+    hands : str, optional
+        A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
+        does best; ``"all"`` has points say which hands. The default hands need not be those of the
+        optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 % of
+        it.
+    half_width : float
+        That of the bounds around ``x0``, length unit (base) and rad (joints).
+    model : MotionModel
+        The constants of movement and of the corrective process.
+    budget : int, optional
+        Most trials, those included with which hands are chosen; after them BudgetError is raised.
 
-    Raises TaskError for a task that cannot be used, ValueError for hands that do not fit and for
-    a half width that is not from 1e-9 to 100, TypeError for a model that is none, MethodError where
-    the corrective process completes no sequence, or where there are too many to try.
+    Returns
+    -------
+    Objective
+        The function, which keeps its best point.
+
+    Raises
+    ------
+    TaskError
+        The task cannot be used.
+    ValueError
+        Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
+        10,000,000.
+    TypeError
+        The model is none, or the task is neither a Task nor a text nor a path.
+    MethodError
+        The corrective process completes no sequence, or there are too many to try.
     """
     chosen = as_task(task)
+    if budget is not None:
+        check_limits("budget", budget, 1, MOST_TRIALS)
     goals = len(chosen.goals)
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
-    if hands is None and reason:
+    if hands in (None, ALL) and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
     session = Session(chosen, 0, TOLD, model=model)
-    return Objective(session, hands, half_width=half_width)
+    return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
+
+
+def problem(
+    task: TaskLike,
+    hands: str | None = ALL,
+    *,
+    half_width: float = HALF_WIDTH,
+    model: MotionModel = PAPER,
+    budget: int | None = None,
+) -> Objective:
+    """A task as a problem for an optimiser: :func:`objective` over all hand sequences.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+        The task, its name or its file; also an instance of a family, ``"two-armed/v1/i017"``.
+    hands : str, optional
+        A hand sequence where it is to be given, or None for the one with which the corrective
+        process alone does best; by default each point says which hands.
+    half_width : float
+        That of the bounds around ``x0``, length unit (base) and rad (joints).
+    model : MotionModel
+        The constants of movement and of the corrective process.
+    budget : int, optional
+        Most trials, those included with which hands are chosen.
+
+    Returns
+    -------
+    Objective
+        The problem: ``dim``, ``x0``, ``bounds``, ``best_known`` and ``proven``, and its cost as a
+        function.
+
+    Raises
+    ------
+    TaskError, ValueError, TypeError, MethodError
+        As :func:`objective` does.
+    """
+    return objective(task, hands, half_width=half_width, model=model, budget=budget)
+
+
+def problems(
+    family: str,
+    split: Literal["test", "development"] = "test",
+    count: int = 15,
+    hands: str | None = ALL,
+    *,
+    half_width: float = HALF_WIDTH,
+    model: MotionModel = PAPER,
+    budget: int | None = None,
+) -> list[Objective]:
+    """The first instances of a family of random tasks as problems.
+
+    Parameters
+    ----------
+    family : str
+        Its name with its version, ``"two-armed/v1"``.
+    split : {"test", "development"}
+        Instances to report on, or those to tune on.
+    count : int
+        How many, from 1 to 1,000.
+    hands : str, optional
+        ``"all"``, or None for those with which the corrective process alone does best.
+    half_width : float
+        That of the bounds around ``x0``, length unit (base) and rad (joints).
+    model : MotionModel
+        The constants of movement and of the corrective process.
+    budget : int, optional
+        Most trials of each, those included with which hands are chosen.
+
+    Returns
+    -------
+    list of Objective
+        Instances 0, 1, ... of the split; ``best_known`` of each is None.
+
+    Raises
+    ------
+    TaskError
+        There is no such family.
+    ValueError
+        The split or the count is another one.
+    """
+    streams = {name: stream for stream, name in SPLITS.items()}
+    if split not in streams:
+        raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
+    check_limits("count", count, 1, 1000)
+    load_family(family)
+    names = (str(Address(family, streams[split], number)) for number in range(count))
+    options: dict[str, Any] = {"half_width": half_width, "model": model, "budget": budget}
+    return [objective(name, hands, **options) for name in names]
 
 
 class OptimiserParameters(Parameters):
@@ -274,7 +549,8 @@ class OptimiserParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best."""
+    """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
+    best."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Of the bounds, length unit (base) and rad (joints)."""
 
@@ -290,7 +566,7 @@ class Optimiser(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        if self.parameters.hands:
+        if self.parameters.hands not in (None, ALL):
             return None
         return too_many_sequences(task.name, task.goals_count, len(task.hands))
 

@@ -46,7 +46,7 @@ def test_the_best_point_is_kept_with_its_solution():
     assert execute(task, cost.solution).reward == -319  # the corrective process alone
     assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
     state = "hands RRR, 18 parameters, 2 evaluations, best cost 319"
-    assert repr(cost) == f"Objective(ascending, {state})"
+    assert repr(cost) == f"Objective(ascending, {state}, best known 292 with hands RRR)"
     rng, costs, points = np.random.default_rng(0), [], []
     for _ in range(30):
         points.append(cost.x0 + 0.05 * rng.standard_normal((50, cost.dim)))

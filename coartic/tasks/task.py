@@ -75,7 +75,7 @@ def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
 
 
 Split = Literal["development", "test", "fresh"]
-_SPLITS: dict[str, Split] = {"d": "development", "i": "test"}
+SPLITS: dict[str, Split] = {"d": "development", "i": "test"}
 
 
 class Address(NamedTuple):
@@ -90,7 +90,7 @@ class Address(NamedTuple):
     @property
     def split(self) -> Split:
         """What the instance is for: to tune on, to report on, or drawn after both were done."""
-        return _SPLITS.get(self.stream, "fresh")
+        return SPLITS.get(self.stream, "fresh")
 
     def __str__(self) -> str:
         return f"{self.family}/{self.stream}{self.number:03d}"
