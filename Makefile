@@ -43,8 +43,9 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/check_links.py build/docs
 	@echo "Look at build/docs/index.html."
 
+# make speed LONG=1 adds suite comparison and 50,000 runs.
 speed: $(READY)
-	$(BIN)/python -m coartic.benchmarks.speed
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m coartic.benchmarks.speed $(if $(LONG),--long)
 
 # The wheel and the source distribution of the last commit, each run in an empty environment.
 release-check: $(READY)

@@ -40,6 +40,8 @@ from coartic.benchmarks.worker import (
 )
 from coartic.errors import CoarticError
 from coartic.interruption import at_end, blocked_signals, temporary_folder, unbroken
+from coartic.learner.learning import warm_up
+from coartic.motion.lanes import links_for
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
 from coartic.threads import (
@@ -103,6 +105,7 @@ class Local:
         workers = min(self.workers, len(jobs))
         of_jobs = [(job.setting.task, learns(job.setting.method)) for _, job in jobs]
         tasks = list({(task.robot, learned): (task, learned) for task, learned in of_jobs}.values())
+        robots = {links_for(task.robot): task for task, _ in tasks}.values()
         waiting, crew, lost = deque(jobs), list[Worker](), 0
 
         def kill_crew() -> None:
@@ -118,11 +121,13 @@ class Local:
                 while waiting or crew:
                     while waiting and len(crew) < workers:
                         with unbroken:  # or nobody would end it
-                            crew.append(Worker(folder, workers, tasks))
+                            # Two that compile begin with different kernels.
+                            crew.append(Worker(folder, workers, tasks[:: (-1) ** len(crew)]))
                         crew[-1].give(waiting)
-                    # While a worker compiles the learner: what it hands over is executed here.
+                    # While workers compile theirs: what they hand over is executed here.
                     with contextlib.suppress(Exception):  # workers say the same
-                        prepare((task, False) for task, _ in tasks)
+                        for task in robots:
+                            warm_up(task, "trials")
                     limits = [self.wall_limit(job) for worker in crew for _, job in worker.jobs]
                     connection.wait(
                         [source for worker in crew for source in worker.sources],

@@ -1,8 +1,9 @@
 """How fast trials are, through each public way and in each of the paper's cells; and commands.
 
-    python -m coartic.benchmarks.speed
+    python -m coartic.benchmarks.speed [--long]
 
-Times depend on the machine; compare ratios, and times of one call.
+Times depend on the machine; compare ratios, and times of one call. ``--long`` also runs suite
+``comparison`` and 50,000 runs of a suite, which takes minutes.
 """
 
 from __future__ import annotations
@@ -15,25 +16,27 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 
 import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
-from coartic.baselines.cma_es import Every
+from coartic.baselines.cma_es import Bandit, Every
+from coartic.baselines.random_search import Climbing, Guesses
 from coartic.benchmarks.planning import plan_suite
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
-from coartic.method import Session
+from coartic.method import Method, Session
 from coartic.motion.lanes import LANES
 from coartic.motion.reach import Requests, batch_for, blank, reach_goals
 from coartic.motion.trials import Bench, hand_codes, movements_of
 from coartic.robot import Array
 
 
-def main() -> None:
+def main(*, is_long: bool = False) -> None:
     """Measure and print."""
     rates = trials_a_second()
     print(f"{'way':32}{'trials a second':>18}{'times the kernel':>20}")
@@ -49,7 +52,8 @@ def main() -> None:
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
         print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
-    show_commands()
+    show_methods()
+    show_commands(is_long=is_long)
 
 
 ALONE, TOGETHER = "bare kernel, one by one", "bare kernel, 1000 at once"
@@ -162,12 +166,63 @@ def _us_a_trial(task: Task, condition: str, runs: int) -> float:
     return (time.thread_time() - clock) / runs / TRIALS * 1e6
 
 
-def show_commands() -> None:
+def show_methods() -> None:
+    """Print what a trial of methods that the learner is compared with costs, all but the kernel
+    included."""
+    tasks = ("ascending", "two-armed-1")
+    print(f"{'method':32}{tasks[0]:>12}{tasks[1]:>12}   microseconds of a core a trial")
+    for method in (Bandit, Climbing, Guesses):
+        costs = [_us_of(method, load_task(name)) for name in tasks]
+        print(f"{method.name:32}" + "".join(f"{us:12.1f}" for us in costs), flush=True)
+
+
+def _us_of(method: type[Method], task: Task) -> float:
+    parameters: Any = method.Parameters
+    for trials in (500, TRIALS):  # the first time libraries are imported
+        session = Session(task, 0, method.told, trusted=True)
+        clock = time.thread_time()
+        method(parameters(trials=trials)).solve(session)
+    return (time.thread_time() - clock) / TRIALS * 1e6
+
+
+TINY = """
+title = "Tiny runs"
+description = "Many runs of two trials each."
+runs = 50_000
+trials = 2
+[[cells]]
+tasks = ["ascending"]
+methods = ["dual-process/EC1"]
+"""
+
+
+class Spent(NamedTuple):
+    """What a command takes."""
+
+    cpu_s: float
+    """Of its process and of all that it starts."""
+    wall_s: float
+    peak_mb: float
+    """Memory of its own process."""
+
+
+def show_commands(*, is_long: bool) -> None:
     """Print the CPU time of commands: of a fresh process and of all that it starts."""
-    print(f"{'command':32}{'median':>9}{'least':>9}{'most':>9}   CPU seconds, all processes")
+    print(
+        f"{'command':32}{'median':>9}{'least':>9}{'most':>9}   CPU seconds of all processes"
+        f"{'wall s':>9}{'MB':>7} of its own"
+    )
     with tempfile.TemporaryDirectory() as folder:
-        results = f"{folder}/quick"
-        for name, command, repeats in (
+        results, tiny = f"{folder}/quick", f"{folder}/tiny.toml"
+        Path(tiny).write_text(TINY, encoding="utf-8")
+        compared = f"{folder}/comparison"
+        long = [
+            ("run comparison", ["run", "comparison", "--out", compared], 1),
+            ("report of comparison", ["report", compared], 3),
+            ("verify of comparison", ["verify", compared], 3),
+            ("run, 50,000 runs", ["run", tiny, "--out", f"{folder}/tiny"], 1),
+        ]
+        for name, command, repeats in [
             ("first check, compiling", ["check", "EC4"], 1),
             ("run quick", ["run", "quick", "--redo", "--out", results], 3),
             ("report", ["report", results], 3),
@@ -178,34 +233,42 @@ def show_commands() -> None:
             ("list", ["list"], 5),
             ("cite", ["cite"], 5),
             ("--help", ["--help"], 5),
-        ):
-            times = sorted(cpu_s(command, cache=folder) for _ in range(repeats))
-            columns = "".join(f"{time:9.2f}" for time in (np.median(times), times[0], times[-1]))
-            print(f"{name:32}{columns}", flush=True)
+            *(long if is_long else []),
+        ]:
+            spent = sorted(spent_by(command, cache=folder) for _ in range(repeats))
+            median = spent[len(spent) // 2]
+            seconds = (median.cpu_s, spent[0].cpu_s, spent[-1].cpu_s)
+            columns = "".join(f"{second:9.2f}" for second in seconds)
+            print(f"{name:32}{columns}{median.wall_s:40.1f}{median.peak_mb:7.0f}", flush=True)
 
 
-def cpu_s(command: list[str], cache: str) -> float:
-    """CPU seconds of a command and of the processes that it starts, with kernels kept in a folder.
+def spent_by(command: list[str], cache: str) -> Spent:
+    """What a command takes, with kernels kept in a folder.
 
-    On Linux also of those that end after it, such as the server of worker processes.
+    On Linux also the processes that end after it, such as the server of worker processes.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER: they become our children
-    before = os.times()
-    subprocess.run(
+    before, clock = os.times(), time.perf_counter()
+    process = subprocess.Popen(
         [sys.executable, "-m", "coartic", *command],
         env={**os.environ, "NUMBA_CACHE_DIR": cache},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        check=True,
     )
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    wall_s = time.perf_counter() - clock
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
     with contextlib.suppress(ChildProcessError):  # there are no more
         while True:
             os.wait()
     after = os.times()
     user = after.children_user - before.children_user
-    return user + after.children_system - before.children_system
+    cpu_s = user + after.children_system - before.children_system
+    return Spent(cpu_s, wall_s, usage.ru_maxrss / 1024)
 
 
 if __name__ == "__main__":
-    main()
+    main(is_long="--long" in sys.argv)

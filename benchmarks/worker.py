@@ -31,6 +31,7 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
+from coartic.motion.lanes import links_for
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
@@ -176,12 +177,12 @@ def perform_job(job: Job) -> list[Outcome]:
 
 def prepare(tasks: Iterable[tuple[Task, bool]]) -> None:
     """Compile the kernels for these tasks, or load them, on no run's clock; of each, whether the
-    learner is run on it."""
+    learner is run on it, which has a kernel of its own, or something else."""
     done = set()
     for task, learns in tasks:
-        if (kernels := (task.robot.most_links, learns)) not in done:
+        if (kernels := (links_for(task.robot), learns)) not in done:
             done.add(kernels)
-            warm_up(task, learns=learns)
+            warm_up(task, "learner" if learns else "motion", "trials")
 
 
 def learns(method: str) -> bool:

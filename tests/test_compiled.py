@@ -107,12 +107,14 @@ def reaches(folder, numbers):
 
 
 def test_machine_code_of_several_processes_goes_together(tmp_path):
-    """Each compiles for a number of links; one that loads all of it knows all robots."""
+    """Each compiles for a number of links; one that loads all of it knows all robots. Up to four
+    links share the code of four, in which the others have no length."""
     (tmp_path / "lanes.py").write_text(LANES, encoding="utf-8")
-    for links in (2, 1):
+    for links in (5, 4):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
-    for numbers in ([1, 2], [2, 1]):
+    for numbers in ([4, 5], [5, 4]):
         assert apart(reaches, tmp_path, numbers) == (numbers, 2)
+    assert apart(reaches, tmp_path, [1, 3, 5]) == ([4, 4, 5], 2)
 
 
 def said(folder):

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
 from coartic.motion.initial import initial_hands
-from coartic.motion.lanes import LANES, width_of
+from coartic.motion.lanes import LANES, links_for, width_of
 from coartic.motion.movement import move
 from coartic.motion.outside import note_trials
 from coartic.motion.problem import problem_of
@@ -263,27 +264,33 @@ def learn_together(
     ]
 
 
-def warm_up(task: Task, *, learns: bool = True) -> None:
+Part = Literal["learner", "motion", "trials"]
+
+
+def warm_up(task: Task, *parts: Part) -> None:
     """Compile the kernels, or load them, so that no run's time contains it.
 
-    They are those of the number of links that the task's robot has; the learner's too if it
-    ``learns``.
+    They are those of the number of links that the task's robot has: the learner's, those of single
+    movements and corrections, and that of trials and executions; all, or the ``parts`` named.
     """
     hand, goal = task.hands[0], task.goals[0]
     hands = letters_of([hand] * len(task.goals))
-    if learns:
+    wanted = parts or get_args(Part)
+    if "learner" in wanted:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         compile_learner(task, condition, PAPER, hands)
-    move(task.robot, task.q0, task.q0, hand, goal, task.radius)
-    correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-    make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
+    if "trials" in wanted:
+        make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
+    if "motion" in wanted:
+        move(task.robot, task.q0, task.q0, hand, goal, task.radius)
+        correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
 
 
 def compile_learner(
     task: Task, condition: ExplorationCondition, model: MotionModel, first_hands: str
 ) -> None:
     """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
-    links = task.robot.most_links
+    links = links_for(task.robot)
     if links not in _compiled_for:
         learn_together(task, condition, model, first_hands, [0], 0)
         _compiled_for.add(links)

@@ -40,10 +40,16 @@ class Lanes(NamedTuple):
     """Those of one that moves."""
 
 
+def links_for(robot: Robot) -> int:
+    """Links for which kernels are compiled: those of the longer arm, and four at least, so that
+    robots with fewer have the machine code of the paper's."""
+    return max(robot.most_links, 4)
+
+
 def width_of(robot: Robot) -> int:
     """Figures of a configuration in records: of the robot's, and then zeros, as many as with two
-    arms like the longer one, so that kernels are compiled once for a number of links."""
-    return BASE_DOF + 2 * robot.most_links
+    arms of :func:`links_for`, so that kernels are compiled once for a number of links."""
+    return BASE_DOF + 2 * links_for(robot)
 
 
 def runs_for(count: int, robot: Robot) -> NDArray[np.void]:
@@ -68,8 +74,8 @@ def run_type(width: int) -> np.dtype[np.void]:
 
 
 def lanes_for(robot: Robot) -> Lanes:
-    """Lanes for either arm of a robot; the shorter one ends in links of length 0."""
-    record, corrected, moved = layout(robot.most_links)
+    """Lanes for either arm of a robot; shorter ones end in links of length 0."""
+    record, corrected, moved = layout(links_for(robot))
     at = np.zeros(1, record)
     rows = at.view(np.float64).reshape(-1, LANES)
     return Lanes(at[0], rows[corrected], rows[moved])
