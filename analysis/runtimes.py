@@ -85,7 +85,7 @@ def runtimes(
         groups.setdefault(group, []).append(name)
     if not groups:
         raise CoarticError("no task has a known optimum that is better than its initial solution")
-    compared = [name for name in by_method if scores.is_compared(name)]
+    compared = [name for name in by_method if scores.is_compared(study, name)]
     rows: list[tuple[str, str, str, float, float]] = []
     for group, tasks in groups.items():
         for name in known.in_order(methods or compared):

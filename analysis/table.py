@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from coartic.analysis.settings import names_of_settings
 from coartic.analysis.study import CellRuns, Study, cached
-from coartic.analysis.words import read_beside
+from coartic.analysis.words import marked, read_beside
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -40,14 +41,19 @@ def table(
 
     ``columns`` are those of the CSV file in their order: ``gap[]`` has an interval (``gap_low``
     and ``gap_high``), ``ours±`` a standard deviation (``ours_sd``), and ``on *`` stands for all
-    columns that begin so. Every table ends with the ids of the runs behind each row.
+    columns that begin so. Every table ends with the ids of the runs behind each row; its
+    ``attrs`` have people's names of tasks by id, for headers, and of methods that go by others in
+    this folder.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
         @cached
         @wraps(rows)
         def frame(study: Study) -> pd.DataFrame:
-            return frame_of(rows(study), f"{columns}, run_ids")
+            made = frame_of(rows(study), f"{columns}, run_ids")
+            made.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
+            made.attrs["methods"] = names_of_settings(study)
+            return made
 
         TABLES[rows.__name__.replace("_", "-")] = frame
         return frame

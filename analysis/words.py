@@ -80,8 +80,14 @@ def estimate(value: Estimate, digits: int | None = None, unit: str = "") -> str:
     return f"{number(value.value, digits)}{unit} {interval}".strip()
 
 
-def marked(name: str, task: Task) -> str:
-    """A name with † where its task is reconstructed (:data:`RECONSTRUCTED`)."""
+def marked(task: Task) -> str:
+    """The one name of a task for people, with † where it is reconstructed (:data:`RECONSTRUCTED`).
+
+    Its title; a variant that shares the title of its task has what is particular besides.
+    """
+    base, _, particular = task.name.partition(".")
+    shared = particular and task.label.lower().replace(" ", "-") == base
+    name = f"{task.label}, {particular}" if shared else task.label
     return f"{name} †" if task.reconstructed else name
 
 

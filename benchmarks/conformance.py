@@ -240,7 +240,13 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
             * bool(unsourced),
             "goals and start have a source and a status",
         ),
-        Law("methods", bool(methods), ", ".join(methods) or "no method applies to it"),
+        Law(
+            "methods",
+            bool(methods),
+            f"{counted(len(methods), 'method')} can solve it, such as {', '.join(methods[:2])}"
+            if methods
+            else "no method applies to it",
+        ),
     ]
 
 

@@ -126,7 +126,9 @@ def cards_of_module(
             and value is not Method
         ]  # fmt: skip
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
-        raise CoarticError(f"{origin}: defines no subclass of coartic.method.Method{why}")
+        raise CoarticError(
+            f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
+        )
 
 
 def check_declaration(method: type[Method], origin: str) -> None:

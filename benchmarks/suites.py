@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationError, model_validator
@@ -29,6 +30,7 @@ from coartic.inputs import (
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import Cell
+from coartic.runs.store import RUNS_FILE
 from coartic.tasks.catalogue import members, task_of
 from coartic.tasks.families import named_by
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, Penalty, address_of
@@ -142,6 +144,8 @@ def load_suite(name: str) -> Suite:
     if name.endswith(".toml"):
         return read_suite(Path(name))
     shipped = suites()
+    if (Path(name) / RUNS_FILE).is_file():
+        raise CoarticError(f"{name} is a results folder: coartic report {quote(name)}")
     if name not in shipped:
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
         raise CoarticError(f"{unknown('suite', name, shipped)}{hint}")
@@ -188,9 +192,8 @@ def select_cells(
     extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
     cells = drop_repeats([*cells, *extra])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    for name in wanted:
-        if name not in task_names:
-            raise CoarticError(unknown("task", name, task_names))
+    if wrong := [unknown("task", name, task_names) for name in wanted if name not in task_names]:
+        raise CoarticError("\n".join(wrong))
     chosen = [
         cell
         for cell in cells
@@ -200,8 +203,9 @@ def select_cells(
     busy = {cell.task.name for cell in chosen}
     idle = [name for name in user_tasks if name not in busy and (not wanted or name in wanted)]
     if idle or not chosen:
-        pairs = ", ".join(f"{cell.task.name} x {cell.label}" for cell in cells)
-        why = "; ".join(refusals) if refusals else f"suite {suite.name!r} has {pairs}"
+        of_task = [cell.label for cell in cells if not wanted or cell.task.name in wanted]
+        there = ", ".join(dict.fromkeys(of_task)) or "nothing there"
+        why = "; ".join(refusals) if refusals else f"suite {suite.name!r} has {there}"
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen

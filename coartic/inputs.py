@@ -196,6 +196,8 @@ def explain(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
             if len(detail["loc"]) > 1 and name in keys:
                 return f"{key} is an unknown key; {name!r} belongs above the line [{table}]"
             return f"{key} is an unknown key{did_you_mean(name, keys)}"
+        case "list_type" | "tuple_type" if key == "goals":
+            message = "should be a list of points, such as [[3.0, 2.0]]"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     for wording, plainer in _PLAINER.items():

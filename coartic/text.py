@@ -11,7 +11,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -86,34 +86,57 @@ def shown_fact(value: Any) -> str:
     return plain(repr(value), _LONGEST_FACT)
 
 
-def did_you_mean(name: str, names: Iterable[str]) -> str:
+def did_you_mean(name: str, names: Iterable[str], called: Mapping[str, str] | None = None) -> str:
     """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
 
-    Near are names that differ in small letters and hyphens, begin so, are spelt alike or end in the
-    same word, in this order.
+    Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
+    the same word, in this order. ``called``: names by which people know some of them; either is
+    near, and both are said, ``; did you mean 'cma-es/bandit' (CMA-ES)?``.
     """
-    meant, by_letters = _letters(name), {_letters(each): each for each in reversed([*names])}
-    of_prefix = [each for each in reversed(by_letters) if meant and each.startswith(meant)]
-    close = difflib.get_close_matches(meant, by_letters, n=1)
-    last = meant.rpartition("-")[2]  # of a name in a table, such as "learner EC4"
-    of_last = [each for each in reversed(by_letters) if last and each.endswith(f"-{last}")]
-    hints = [meant] * (meant in by_letters) + of_prefix + close + of_last
-    return f"; did you mean {by_letters[hints[0]]!r}?" if hints else ""
+    ids = dict.fromkeys(names, "") | dict(called or {})
+    said = {each: f"{each!r} ({words})" if words else repr(each) for each, words in ids.items()}
+    known = [(_words(text), each) for each, words in ids.items() for text in (words, each) if text]
+    by_words = dict(reversed(known))
+    meant = _words(name)
+    joined, last = "".join(meant), meant[-1:]
+    spelt = {"".join(words): each for words, each in reversed(by_words.items())}
+    hyphened = {"-".join(words): each for words, each in by_words.items()}
+    near = difflib.get_close_matches("-".join(meant), hyphened, 1)
+    hints = [
+        *(each for text, each in spelt.items() if text == joined),
+        *(each for text, each in spelt.items() if joined and text.startswith(joined)),
+        *(hyphened[text] for text in near),
+        *(each for words, each in reversed(by_words.items()) if last and words[-1:] == last),
+    ]
+    return f"; did you mean {said[hints[0]]}?" if hints and joined else ""
 
 
-def _letters(name: str) -> str:
-    """A name in small letters, with a hyphen for all that is neither letter nor digit."""
-    return re.sub(r"[\W_]+", "-", name.lower()).strip("-")
+def id_named(name: str, names: Mapping[str, str]) -> str:
+    """The id of what people call so, in small letters or large; ``name`` itself for none.
+
+    ``names`` by id; an id goes before a name.
+    """
+    lower = name.casefold()
+    called = [each for each, words in names.items() if words.casefold() == lower]
+    alike = [each for each in names if each.casefold() == lower]
+    return name if name in names else next(iter(alike + called), name)
 
 
-def unknown(kind: str, name: str, names: Iterable[str]) -> str:
+def _words(name: str) -> tuple[str, ...]:
+    """The words of a name in small letters, without all that is neither letter nor digit."""
+    return tuple(re.findall(r"[^\W_]+", name.lower()))
+
+
+def unknown(
+    kind: str, name: str, names: Iterable[str], called: Mapping[str, str] | None = None
+) -> str:
     """A sentence on a name that is not among some names: the nearest of them, or all."""
     several = list(names)
-    hint = did_you_mean(name, several)
-    rest = len(several) - _MOST_NAMED
-    more = f" and {rest} other{'s' * (rest > 1)}" if rest > 0 else ""
+    hint = did_you_mean(name, several, called)
+    shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
+    more = f" and {len(several) - shown} others" if len(several) > shown else ""
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}" + (
-        hint or f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
+        hint or f". Known: {', '.join(several[:shown])}{more}."
     )
 
 

@@ -19,8 +19,6 @@ import pandas as pd
 
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
-from coartic.analysis.report import next_goal
-from coartic.analysis.study import load
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
@@ -153,8 +151,7 @@ def filled_pages() -> dict[str, str]:
 def store(results: Path) -> None:
     """Copy tables and figures from the reports below ``results``; lists of run ids stay there.
 
-    The postures of every report's first figure are taken from the runs of suite ``locus``. What is
-    stored of a suite without a report there stays as it is.
+    What is stored of a suite without a report there stays as it is.
     """
     for suite, (tables, figures) in KEPT.items():
         report, kept = results / suite / "report", STORED / suite
@@ -168,8 +165,6 @@ def store(results: Path) -> None:
             frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
-        if suite == "locus":
-            next_goal.store(load(results / suite))
 
 
 def main() -> None:

@@ -95,7 +95,7 @@ SUITES = [
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
     ("raise SystemExit(3)", "cannot be imported: SystemExit: 3"),
-    ("x = 1", "defines no subclass of coartic.method.Method"),
+    ("x = 1", "defines no subclass of coartic.Method"),
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
     (method("title = ", ""), "title must be a text"),

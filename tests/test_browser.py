@@ -208,11 +208,41 @@ def test_printing_shows_every_picture_once(opened):
     figures = page.locator("figure").all()
     assert figures
     for figure in figures:
-        assert [svg.is_visible() for svg in figure.locator("svg").all()] == [True]
+        drawn = figure.locator(".drawn svg")
+        assert [svg.is_visible() for svg in drawn.all()].count(True) == 1
     ids = [figure.get_attribute("id") for figure in figures]
     assert len(ids) == len(set(ids))
     ink = page.evaluate("getComputedStyle(document.body).color")
     assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
+
+
+OVERFLOWS = """[...document.querySelectorAll("main *")].filter(each => each.checkVisibility()
+    && !each.closest("svg") && getComputedStyle(each).display != "inline"
+    && (each.scrollHeight > each.clientHeight + 1 || each.scrollWidth > each.clientWidth + 1))
+    .map(each => each.outerHTML.slice(0, 80))"""
+
+
+def test_in_print_nothing_leaves_its_box_and_no_film_is_there(opened):
+    page = opened(688)  # A4 within its margins
+    page.emulate_media(media="print")
+    assert page.evaluate(OVERFLOWS) == []
+    assert not page.locator(".play").is_visible()
+
+
+def test_panels_stack_on_a_narrow_screen_and_their_curves_go_by_the_key(opened):
+    page = opened(390)
+    figure = page.locator("#figure-learning-curves")
+    panels = [box.bounding_box() for box in figure.locator(".pieces svg").all()]
+    assert len(panels) == 3  # tasks
+    assert len({round(box["x"]) for box in panels}) == 1
+    assert all(box["x"] + box["width"] <= 390 and box["width"] > 250 for box in panels)
+    lines = page.locator("#figure-learning-curves .drawn > svg [data-curve='learner EC1']")
+    shown = "each => each.map(line => getComputedStyle(line).display)"
+    assert set(lines.evaluate_all(shown)) == {"inline"}
+    figure.get_by_role("button", name="learner EC1").click()
+    assert set(lines.evaluate_all(shown)) == {"none"}
+    figure.get_by_role("button", name="learner EC1").press("Enter")
+    assert set(lines.evaluate_all(shown)) == {"inline"}
 
 
 def test_without_scripts_all_is_there(browser, address):

@@ -5,17 +5,30 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from coartic import CoarticError, Task
-from coartic.analysis.figures.style import GREY, INK, PAPER, RC, TIP, styled
+from coartic.analysis.figures.style import (
+    BLUE,
+    CURVE,
+    GREY,
+    INK,
+    PAPER,
+    RC,
+    SKY,
+    TIP,
+    Look,
+    looks,
+    styled,
+)
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED
@@ -24,6 +37,8 @@ from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
 DPI = 300
+MAGNIFIED = 1.3
+"""Of figures on the page: 8 pt in print are as large as its text."""
 _FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
@@ -91,6 +106,11 @@ def missing(study: Study, what: str) -> CoarticError:
     return CoarticError(f"{study.folder}: {what}")
 
 
+def looks_in(study: Study, labels: Collection[str]) -> dict[str, Look]:
+    """The look of each method (:func:`~.style.looks`), the same in all figures of a study."""
+    return looks(labels, dict.fromkeys(label for _, label in study.cells))
+
+
 def spoken(rows: pd.DataFrame, template: str) -> str:
     """Each row in words, for an alternative text: names in ``{}`` are columns."""
     named = rows.assign(method=rows.method.map(name_of))
@@ -123,29 +143,95 @@ def save(plot: Plot, folder: Path) -> list[Path]:
     return paths
 
 
-def svg_for_page(plot: Plot) -> str:
-    """The figure as one ``<svg>`` element for a page of HTML.
+class PagePicture(NamedTuple):
+    """A figure for a page of HTML."""
+
+    svg: str
+    """The whole of it as one ``<svg>`` element."""
+    pieces: tuple[str, ...]
+    """Its panels and what its legend says, an ``<svg>`` each, for screens too narrow for panels
+    side by side: they show parts of the whole. Empty where nothing stands side by side."""
+    curves: tuple[tuple[str, str], ...]
+    """Names of its curves, and how their lines are drawn (CSS)."""
+
+
+def for_page(plot: Plot) -> PagePicture:
+    """A figure for a page of HTML.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    one, and its grey is ``--grey``. Marks with a :func:`~.style.tip` show it. Ids begin with the
-    plot's id, so that several can share a page.
+    one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
+    :func:`~.style.tip` show it, and the marks of a curve have its name as ``data-curve``; the page
+    has a key of the curves in place of a legend. Ids begin with the plot's id, so that several
+    can share a page.
     """
-    stream = io.StringIO()
+    figure, stream = plot.figure, io.StringIO()
+    has_curves = any((part.get_gid() or "").startswith(CURVE) for part in figure.findobj())
+    dpi = figure.dpi
+    figure.set_dpi(72)  # that of SVG, so that boxes are in its points
+    for legend in figure.legends:
+        legend.set(visible=not has_curves, in_layout=not has_curves)
     with rc_context({**RC, "svg.fonttype": "none"}):
-        plot.figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
+        figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
+        boxes = pieces_of(figure)
+    for legend in figure.legends:
+        legend.set(visible=True, in_layout=True)
+    figure.set_dpi(dpi)
     text = stream.getvalue()
-    text = re.sub(rf'<g id="{TIP}([^"]*)">', r"<g><title>\1</title>", text[text.index("<svg") :])
+    text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
+    styles = re.findall(
+        rf'<g id="{CURVE}([^";]*);[^"]*">\n<path [^>]*style="(fill: none[^"]*)"', text
+    )
+    curves: dict[str, str] = {}
+    for name, own in styles:
+        curves.setdefault(html.unescape(name), coloured(own))
+    text = re.sub(rf'<g id="{CURVE}([^";]*);', r'<g data-curve="\1" id="', text)
+    text = re.sub(rf' id="{TIP}([^"]*)">', r"><title>\1</title>", text).replace(' id="">', ">")
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
-    text = re.sub(r"\n\s*", "\n", text)
-    # The backend leaves black fills out: they inherit the root's.
-    text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
-    text = text.replace(GREY, f"var(--grey, {GREY})")
-    head, body = text.split(">", 1)
-    head = re.sub(r' (width|height|version|xmlns:xlink)="[^"]*"', "", head)
+    head, body = coloured(text).split(">", 1)
+    view = re.search(r'viewBox="[^"]*"', head)
+    assert view is not None
     # Styles that the backend gives to all elements would apply to the whole page.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
-    head += ' stroke-linejoin="round" stroke-linecap="butt"'
-    head += f' font-family="{_FONTS}" fill="currentColor"'
-    head += f' role="img" aria-label="{html.escape(one_line(plot.alt))}"'
-    return f"{head}>{body.replace('xlink:href', 'href')}".strip()
+    body = body.replace("xlink:href", "href").strip().removesuffix("</svg>")
+    drawn = 'stroke-linejoin="round" stroke-linecap="butt" fill="currentColor" '
+    drawn += f'font-family="{_FONTS}"'
+    whole = (
+        f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
+        f'aria-label="{html.escape(one_line(plot.alt))}">'
+        f'<g id="{plot.id}-all" {drawn}>{body}</g></svg>'
+    )
+    height = 72 * figure.get_figheight()
+    pieces = tuple(
+        f'<svg viewBox="{box.x0:.0f} {height - box.y1:.0f} {box.width:.0f} {box.height:.0f}" '
+        f'style="width: {MAGNIFIED * box.width / 12:.1f}rem"><use href="#{plot.id}-all"/></svg>'
+        for box in boxes
+    )
+    return PagePicture(whole, pieces, tuple(curves.items()))
+
+
+def coloured(text: str) -> str:
+    """SVG whose colours are the page's, so that they show on dark as well."""
+    # The backend leaves black fills out: they inherit the root's.
+    text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
+    for color, name in ((GREY, "grey"), (BLUE, "blue"), (SKY, "sky")):
+        text = text.replace(color, f"var(--{name}, {color})")
+    return text
+
+
+def pieces_of(figure: Figure) -> list[Bbox]:
+    """Boxes of panels and of what legends say, points, where panels stand side by side and can be
+    read alone."""
+    panels = [axes for axes in figure.axes if axes.axison]
+    alone = all(axes.yaxis.get_tick_params().get("labelleft", True) for axes in panels)
+    if not alone or len({round(axes.get_position().x0, 2) for axes in panels}) < 2:
+        return []
+    entries = [
+        Bbox.union([handle.get_window_extent(), text.get_window_extent()])
+        for legend in figure.legends
+        if legend.get_visible()
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
+        if handle is not None
+    ]
+    boxes = [axes.get_tightbbox() for axes in panels] + entries
+    return [box.padded(3) for box in boxes if box is not None]

@@ -20,17 +20,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
-from coartic import Task
-from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, look_alike
+from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, is_built_in, look_alike
 from coartic.analysis.statistics import estimates
-from coartic.analysis.words import marked
 
 amount = EngFormatter(sep="")
 """A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
 INCH = 25.4  # mm
-ONE = 85 / INCH
+ONE = 89 / INCH
 """Width of one journal column, inches."""
-TWO = 178 / INCH
+TWO = 183 / INCH
 """Width of two."""
 TALLEST = 225 / INCH
 """Height of a page that leaves room for a caption."""
@@ -43,6 +41,8 @@ CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
 PAPER = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""
+CURVE = "curve:"
+"""How the id of what belongs to a :func:`curve` begins."""
 _COLORS: Mapping[Color, str] = {
     "blue": "#0072b2",
     "sky": "#56b4e9",
@@ -73,25 +73,25 @@ Look = dict[str, Any]
 """How the lines of a method are drawn: ``color`` and ``linestyle``."""
 
 
-def looks(labels: Collection[str]) -> dict[str, Look]:
-    """The look of each method of a figure: those with a look of their own have it in all figures,
-    the learner over all tasks that of its two-armed condition."""
+def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]:
+    """The look of each method of a figure, the same in all figures of a report.
+
+    Built-in methods may have one of their own, the learner over all tasks that of its two-armed
+    condition. The others get what is free, methods from files first, in their order ``among`` the
+    labels of the report.
+    """
+    every = dict.fromkeys([*among, *labels])
+    own = [label for label in every if not is_built_in(label)]
     fixed = {}
-    for label in labels:
+    for label in every:
         row = KNOWN_METHODS.get(look_alike(label))
         if row is not None and row.look is not None:
             fixed[label] = {"color": _COLORS[row.look[0]], "linestyle": _DASHES[row.look[1]]}
     dashes, colors = (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
-    every = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
-    free = itertools.cycle(look for look in every if look not in fixed.values())
-    return {label: fixed.get(label) or next(free) for label in dict.fromkeys(labels)}
-
-
-def heading(task: Task) -> str:
-    """A task's name above a panel, with a dagger where it is reconstructed."""
-    # Variants of a task share its title, but not its name.
-    name = task.label if task.label.lower().replace(" ", "-") == task.name else task.name
-    return marked(name, task)
+    pairs = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
+    free = itertools.cycle(look for look in pairs if look not in fixed.values())
+    given = {label: fixed.get(label) or next(free) for label in dict.fromkeys([*own, *every])}
+    return {label: given[label] for label in dict.fromkeys(labels)}
 
 
 def column_width(inches: float) -> float:
@@ -143,12 +143,19 @@ def label_ends(axes: Axes, ends: Mapping[str, float], least: float) -> None:
             "xycoords": ("axes fraction", "data"),
             "textcoords": ("axes fraction", "data"),
         }
-        axes.annotate(name, (1, height), (1.02, place), va="center", annotation_clip=False, **where)
+        where |= {"va": "center", "annotation_clip": False}
+        curve(name, axes.annotate(name, (1, height), (1.02, place), **where))
 
 
 def tip(artist: Artist, text: str) -> None:
     """What a picture in a page of HTML says when the pointer rests on a mark."""
-    artist.set_gid(f"{TIP}{text}")
+    artist.set_gid(f"{artist.get_gid() or ''}{TIP}{text}")
+
+
+def curve(name: str, *artists: Artist) -> None:
+    """Make marks a curve that a page of HTML switches on and off by its name."""
+    for artist in artists:
+        artist.set_gid(f"{CURVE}{name};{artist.get_gid() or ''}")
 
 
 def entry(label: str, **line: Any) -> Line2D:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.published import RUNS
+from coartic.analysis.words import RECONSTRUCTED, listed, marked
 from coartic.learner.learning import TRIALS
 
 
@@ -35,7 +37,7 @@ def limits(study: Study) -> dict[str, Any]:
         "paper_runs": RUNS,
         "seed": study.plan.seed,
         "unproven": [
-            tasks[name].label for name, best in optima.items() if best and not best.proven
+            marked(tasks[name]) for name, best in optima.items() if best and not best.proven
         ],
         "unknown": [tasks[name].label for name, best in optima.items() if best is None],
         "side_by_side": bool(runs.together.fillna(1).max() > 1) if "together" in runs else False,
@@ -43,6 +45,31 @@ def limits(study: Study) -> dict[str, Any]:
         "processor": made_with["processor"],
         "cores": made_with["cores"],
     }
+
+
+def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
+    """What must stand beside numbers of these columns wherever they are copied."""
+    unproven, columns = limits(study)["unproven"], set(columns)
+    if not unproven or not columns & {"gap", "optimum"}:
+        return []
+    return [f"The optimum of {listed(unproven)} is not proven: it is the best known reward."]
+
+
+def notes_on_tables(study: Study) -> str:
+    """What a reader of the CSV files must know, a line each."""
+    tasks = [study.tasks[name] for name in sorted(one_by_one(study), key=list(study.tasks).index)]
+    daggers = (
+        [f"{RECONSTRUCTED} ({listed(map(marked, their))})"]
+        if (their := [task for task in tasks if task.reconstructed])
+        else []
+    )
+    lines = [
+        "Rewards are in ticks. Gaps are shares of the optimum, 0.05 being 5 %.",
+        *daggers,
+        *notes_of(study, ["gap"]),
+        "run_ids: the runs behind a row; the beginning of an id names a run.",
+    ]
+    return "\n".join(lines) + "\n"
 
 
 @cached

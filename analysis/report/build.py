@@ -17,7 +17,7 @@ import pandas as pd
 
 from coartic import CoarticError
 from coartic.analysis.claims.register import CLAIMS, Verdict
-from coartic.analysis.figures.plot import Plot, picture, svg_for_page
+from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.numbers import numbers_tex
@@ -36,8 +36,7 @@ SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
 LONG = 20
 """Rows of a table above which it scrolls in a box of its own."""
-_MAGNIFIED = 1.3  # figures on the page
-_PHONE = 320 / 72  # inches: a phone scrolls what is wider
+_PHONE = 320 / 72  # inches: a phone stacks panels, or scrolls one that is wider
 
 
 def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
@@ -53,7 +52,9 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
             files[f"tables/{name}.csv"] = csv_table(frame).encode()
             if for_paper:
                 caption = captions.get(name) or name.replace("-", " ").capitalize()
-                files[f"tables/{name}.tex"] = latex_table(frame, name, caption).encode()
+                notes = about.notes_of(study, frame.columns)
+                files[f"tables/{name}.tex"] = latex_table(frame, name, caption, notes).encode()
+    files["tables/notes.txt"] = about.notes_on_tables(study).encode()
     files["numbers.tex"] = numbers_tex(study).encode()
     for name in FIGURES if for_paper else plots(study):
         if plot := plots(study).get(name) or draw_figure(study, name):
@@ -138,8 +139,9 @@ def sections(study: Study) -> list[dict[str, Any]]:
         inches = plot.figure.get_figwidth() if plot else 0.0
         figure = plot and {
             **{"id": plot.id, "title": plot.title, "caption": plot.caption},
-            **{"svg": svg_for_page(plot), "wide": inches > _PHONE},
-            "width": f"{_MAGNIFIED * inches * 72 / 12:.0f}",
+            **for_page(plot)._asdict(),
+            "wide": inches > _PHONE,
+            "width": f"{MAGNIFIED * inches * 72 / 12:.0f}",
         }
         words = {"finding": finding(section, study), "rows": table, "figure": figure}
         allowed.append({**vars(section), **words})

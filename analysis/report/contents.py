@@ -12,7 +12,7 @@ from coartic.analysis import topics
 from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.section import Section
 from coartic.analysis.table import TABLES
-from coartic.analysis.topics import horizon, objectives, stops, tasks
+from coartic.analysis.topics import horizon, objectives, settings, stops, tasks
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.families import sentences as families
@@ -25,6 +25,7 @@ for _module in walk_packages(topics.__path__, f"{topics.__name__}."):
 __all__ = ["FIGURES", "SECTIONS", "TABLES"]
 
 SECTIONS: tuple[Section, ...] = (
+    settings.SETTINGS,
     coarticulation.COARTICULATION,
     human.HUMAN,
     paper.PUBLISHED,

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Sequence
+from string import ascii_lowercase
 from typing import Any
 
 import pandas as pd
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.table import COLUMNS, Column
-from coartic.analysis.words import NARROW_SPACE, NONE, in_brackets, number
+from coartic.analysis.words import NARROW_SPACE, NONE, RECONSTRUCTED, in_brackets, number
 from coartic.text import one_line
 
 _COMPANIONS = ("_low", "_high", "_sd")
@@ -29,6 +31,8 @@ TONES = {
 """Class of a verdict on the page, by its words."""
 PACKAGES = "% needs \\usepackage{booktabs} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
+MOST_IN_A_COLUMN = 4
+"""Tasks of a ranking as wide as a journal's column."""
 _LATEX = str.maketrans(
     {
         **{sign: f"\\{sign}" for sign in "&%$#_{}"},
@@ -52,12 +56,25 @@ def column_of(name: str) -> Column:
     return COLUMNS.get(name, Column())
 
 
+def header_of(frame: pd.DataFrame, name: str) -> str:
+    """What stands above a column; a task by its name, with † where it is reconstructed."""
+    if name in (own := frame.attrs.get("headers", {})):
+        return str(own[name])
+    kind, _, task = name.partition(" ")
+    if kind == "on" and (known := frame.attrs.get("tasks", {}).get(task)):
+        return f"{known} (%)"
+    return column_of(name).header or name.replace("_", " ")
+
+
 def columns_of(frame: pd.DataFrame) -> dict[str, str]:
     """Columns of a table that the page and LaTeX show, with their headers."""
     headers = {}
-    for name in frame.columns:
+    names = list(frame.columns)
+    if "verdict" in names:  # it is what one looks for, also where a screen has room for two columns
+        names.insert(1, names.pop(names.index("verdict")))
+    for name in names:
         if not name.endswith(_COMPANIONS) and column_of(name).page:
-            header = column_of(name).header or name.replace("_", " ")
+            header = header_of(frame, name)
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
             interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
             headers[name] = f"{header}{interval}"
@@ -79,7 +96,8 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
     """The values of a column as text, with SDs and intervals that belong to them."""
     column = column_of(name)
     if not is_number(frame[name]):
-        return [word(value, column) for value in frame[name]]
+        known = frame.attrs.get("methods", {}) if column.method else {}
+        return [known.get(value) or word(value, column) for value in frame[name]]
     texts = []
     columns = (figures_of(frame, f"{name}{ending}") for ending in ("", "_low", "_high", "_sd"))
     for values in zip(*columns, strict=True):
@@ -147,21 +165,67 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     return table.replace("<thead>", head, 1).replace("<th>", '<th scope="col">')
 
 
-def latex_table(frame: pd.DataFrame, name: str, caption: str) -> str:
-    """A table for a paper, with booktabs: what the page shows, numbers to the right."""
+def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
+    """A table for a paper, with booktabs: what the page shows, numbers to the right.
+
+    ``notes`` stand below it, with what a dagger means where there is one. A ranking has the width
+    of a column (:func:`ranking_in_a_column`).
+    """
+    groups: list[str] = []
+    if name == "ranking":
+        groups, frame, more = ranking_in_a_column(frame)
+        notes = [*more, *notes]
     columns = columns_of(frame)
     cells = {column: list(map(latex, texts_of(frame, column))) for column in columns}
     shown = pd.DataFrame(cells).set_axis(list(columns.values()), axis="columns")
     styler = shown.style.hide(axis="index").format_index(latex, axis="columns")
+    sides = "".join("r" if is_number(frame[column]) else "l" for column in columns)
     body = styler.to_latex(
         hrules=True,
-        column_format="".join("r" if is_number(frame[column]) else "l" for column in columns),
+        column_format=f"@{{}}{sides}@{{}}",
         caption=latex(caption),
         label=f"tab:coartic-{name}",
         position="tp",
         position_float="centering",
     )
+    if groups:
+        head, middle, rest = body.partition("\\midrule\n")
+        lines = rest.split("\n")
+        for place in reversed(range(len(groups))):
+            if groups[place] not in groups[:place]:
+                words = f"\\emph{{{latex(groups[place])}}}"
+                lines.insert(place, f"\\multicolumn{{{len(sides)}}}{{@{{}}l}}{{{words}}} \\\\")
+        body = head + middle + "\n".join(lines)
+    if "$\\dagger$" in body or any("†" in note for note in notes):
+        notes = [*notes, RECONSTRUCTED]
+    end, below = "\\end{tabular}", " ".join(map(latex, dict.fromkeys(notes)))
+    if below:
+        below = f"\n\n\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {below}}}"
+    small = "\\centering\n\\footnotesize\n\\setlength{\\tabcolsep}{2pt}"
+    body = body.replace("\\centering", small, 1).replace(end, f"{end}{below}", 1)
     return f"{PACKAGES}\n{body}"
+
+
+def ranking_in_a_column(frame: pd.DataFrame) -> tuple[list[str], pd.DataFrame, list[str]]:
+    """A ranking as wide as a journal's column: the group of each row, the rows, and notes.
+
+    Methods with a gap over all tasks by their use of the reward. Tasks go by letters, and the
+    notes have runs.
+    """
+    rows = frame[frame.gap.notna()] if frame.gap.notna().any() else frame
+    groups = list(dict.fromkeys(rows.knows))
+    rows = rows.sort_values("knows", key=lambda uses: uses.map(groups.index), kind="stable")
+    tasks = [name for name in rows.columns if name.startswith("on ")]
+    tasks = tasks if len(tasks) <= MOST_IN_A_COLUMN else []
+    letters = dict(zip(tasks, ascii_lowercase, strict=False))
+    narrow = rows[["method", "gap", "gap_low", "gap_high", *tasks]].copy()
+    narrow.attrs = {**frame.attrs, "headers": {"gap": "gap", **letters}}
+    least, most = rows.runs.min(), rows.runs.max()
+    known = frame.attrs.get("tasks", {})
+    of_tasks = "; ".join(f"{k}: {known.get(name[3:], name[3:])}" for name, k in letters.items())
+    over = f"Mean over tasks; {of_tasks}." if of_tasks else "Mean over tasks."
+    n = number(least) if least == most else f"{number(least)} to {number(most)}"
+    return list(rows.knows), narrow, [over, f"n = {n} runs of each method."]
 
 
 def latex(text: object) -> str:

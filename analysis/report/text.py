@@ -1,4 +1,4 @@
-"""Answers to the four questions of the first screen, and the templates beside this file."""
+"""Answers to the questions of the first screen, and the templates beside this file."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic.analysis import words
 from coartic.analysis.study import Study
+from coartic.analysis.topics import settings
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.paper import sentences as paper
 from coartic.text import one_line
 
 ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
+    ("Which setting is best?", "Best", {"settings": settings.answer}),
     (
         "Does the next goal change the movement?",
         "Coarticulation",
@@ -29,7 +31,7 @@ ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
     ("Who comes nearest to the optimum?", "Nearest", {"nearest": comparison.answer_nearest}),
     ("What does it cost?", "Cost", {"runtimes": comparison.answer_runtimes}),
 )
-"""The four questions with their words on the terminal, and the functions that answer them.
+"""The questions with their words on the terminal, and the functions that answer them.
 
 By the section that says more. The first answer that is not empty counts.
 """
@@ -61,7 +63,7 @@ def shown(text: str) -> str:
 
 
 def answers(study: Study) -> list[dict[str, str]]:
-    """The answers that a folder gives to the four questions, a dozen words each.
+    """The answers that a folder gives to the questions, a dozen words each.
 
     ``id`` of the section that says more, ``question``, ``word``, ``text``.
     """

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from coartic import CoarticError
+from coartic import CoarticError, Task
 from coartic.analysis.methods import name_of
-from coartic.text import did_you_mean, plain
+from coartic.analysis.report.render import columns_of, texts_of
+from coartic.analysis.words import NONE, marked, number
+from coartic.runs.plan import label_of
+from coartic.text import did_you_mean, id_named, plain
+
+SHORT_ID = 12
+"""Characters of a run's id that people see: commands take its beginning."""
 
 
 def tables_of(folder: Path) -> dict[str, Path]:
@@ -28,24 +36,57 @@ def tables_of(folder: Path) -> dict[str, Path]:
     return {path.stem: path for path in sorted(files) if path.parent == reports[0]}
 
 
-def row_and_runs(table: Path, row: str | None) -> tuple[list[str], list[str]]:
-    """The values of a row, a line each, and the ids of its runs; without a row the rows' names.
-
-    Raises CoarticError for a row that the table does not have.
-    """
+def rows_of(table: Path) -> pd.DataFrame:
+    """A table of a report. Raises CoarticError for a file that is none."""
     try:
-        frame = pd.read_csv(table, dtype=str, index_col="row", keep_default_na=False)
+        frame = pd.read_csv(table, index_col="row", keep_default_na=False, na_values=[""])
         if "run_ids" not in frame or not frame.index.is_unique:
             raise ValueError("its rows do not name runs")
     except ValueError as error:
         raise CoarticError(f"{table} is no table of a report: {plain(str(error))}") from None
-    if row is None:
-        return list(frame.index), []
-    named = {name_of(name): name for name in frame.index}
-    row = named.get(row, row)
-    if row not in frame.index:
-        hint = did_you_mean(row, frame.index) or "; without a row, the command lists them"
-        raise CoarticError(f"table {table.stem} has no row {row!r}{hint}")
-    values = frame.loc[row]
-    shown = [f"{name}: {value}" for name, value in values.items() if value and name != "run_ids"]
-    return shown, values.run_ids.split()
+    return frame
+
+
+def row_named(table: str, frame: pd.DataFrame, name: str) -> str:
+    """The row of a table that goes by a name, its own or people's, as the page has it.
+
+    Raises CoarticError where there is none.
+    """
+    called = {row: name_of(row) for row in map(str, frame.index)}
+    if {"task", "method"} <= {*frame}:
+        pairs = zip(frame.index, frame.task, frame.method, strict=True)
+        called = {
+            row: f"{task}, {name_of(method)}".replace(" †", "") for row, task, method in pairs
+        }
+    row = id_named(name, called)
+    if row not in called:
+        hint = did_you_mean(name, called, {k: words for k, words in called.items() if words != k})
+        hint = hint or "; without a row, the command lists them"
+        raise CoarticError(f"table {table} has no row {name!r}{hint}")
+    return row
+
+
+def values_of(frame: pd.DataFrame, row: str, tasks: Mapping[str, Task]) -> list[tuple[str, str]]:
+    """Headers and values of a row as the page shows them, without those that are missing."""
+    one = frame.loc[[row]].drop(columns="run_ids")
+    one.attrs["tasks"] = {name: marked(task) for name, task in tasks.items()}
+    shown = ((header, texts_of(one, name)[0]) for name, header in columns_of(one).items())
+    return [(header, text) for header, text in shown if text not in ("", NONE)]
+
+
+def runs_behind(runs: pd.DataFrame, ids: Sequence[str], tasks: Mapping[str, Task]) -> pd.DataFrame:
+    """The runs with these ids: run, task, seed, hands and reward, worst of a task first, and the
+    method where there are several."""
+    chosen = runs[runs.run_id.isin(ids)].sort_values(["task", "reward"], kind="stable")
+    labels = map(label_of, chosen.method, chosen.variant)
+    rewards = chosen.reward.astype("Float64").to_numpy(float, na_value=math.nan)
+    shown = {
+        "run": chosen.run_id.str[:SHORT_ID],
+        "task": [marked(tasks[task]) for task in chosen.task],
+        "method": list(map(name_of, labels)),
+        "seed": chosen.seed,
+        "hands": chosen.hands.fillna(NONE),
+        "reward (ticks)": [number(reward, 0) for reward in rewards.tolist()],
+    }
+    frame = pd.DataFrame(shown)
+    return frame if len(set(frame.method)) > 1 else frame.drop(columns="method")

@@ -23,14 +23,14 @@ from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
-@table("task, arms, base, initial, condition, learned[], published, optimum, bound")
+@table("task, arms, base, initial, condition, learned[], published±, optimum, bound")
 def tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
         task, label = study.tasks[name], best_condition(study, name)
         best = study.optima.get(name)
         row: Row = {
-            "task": marked(task.label, task),
+            "task": marked(task),
             "arms": len(task.hands),
             "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
             "optimum": best.reward if best else None,
@@ -44,6 +44,7 @@ def tasks(study: Study) -> Rows:
                 "condition": condition,
                 **interval("learned", mean(cell.rewards)),
                 "published": paper.summary.mean if paper and paper.summary else None,
+                "published_sd": paper.summary.sd if paper and paper.summary else None,
                 **runs_of(cell),
             }
         yield name, row
@@ -127,8 +128,9 @@ TASKS = Section(
     figure="tasks",
     table="tasks",
     note=(
-        "Initial: the corrective process alone. Learned: the learner's best condition. Proven "
-        "bound: a reward that no solution can exceed."
+        "Initial: the corrective process alone, with the task's initial hands. Learned: the "
+        "learner's best condition. Best known: the optimum where the proven bound equals it. "
+        "Proven bound: a reward that no solution can exceed."
     ),
     single=True,
 )

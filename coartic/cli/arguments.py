@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_SECONDS
+from coartic.text import id_named, unknown
 from coartic.threads import MOST_JOBS, threads_for
+
+if TYPE_CHECKING:
+    from coartic.benchmarks.registry import Registry
 
 
 def job_count(text: str | int) -> int:
@@ -22,6 +27,23 @@ def job_count(text: str | int) -> int:
             f"--jobs {text}: it must be -1, one process for each core, or from 1 to {MOST_JOBS}."
         ) from None
     return int(text)
+
+
+def whole(option: str, least: int, most: int | None = None) -> Callable[[str | int], int]:
+    """What reads an option as a whole number. It raises CoarticError for what is none, and for
+    one out of its limits."""
+
+    def read(text: str | int) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            raise CoarticError(f"{option} {text}: {text} is no whole number") from None
+        if number < least or (most is not None and number > most):
+            limits = f"at least {least}" if most is None else f"from {least} to {most}"
+            raise CoarticError(f"{option} {text}: it must be {limits}")
+        return number
+
+    return read
 
 
 def output_named(name: str | Path) -> Path:
@@ -63,15 +85,23 @@ Readings = Annotated[
 ]
 RunCount = Annotated[
     int | None,
-    typer.Option(min=1, metavar="N", help="Runs of each cell."),
+    typer.Option(parser=whole("--runs", 1), metavar="N", help="Runs of each cell."),
 ]
-TrialCount = Annotated[int | None, typer.Option(min=1, metavar="N", help="Trials of each run.")]
+TrialCount = Annotated[
+    int | None,
+    typer.Option(parser=whole("--trials", 1), metavar="N", help="Trials of each run."),
+]
 Jobs = Annotated[
     int,
     typer.Option(parser=job_count, metavar="N", help="Processes; -1 is one for each core."),
 ]
-Tasks = Annotated[str | None, typer.Option(metavar="A,B", help="Only these tasks.")]
-Methods = Annotated[str | None, typer.Option(metavar="X,Y", help="Only these methods.")]
+Tasks = Annotated[
+    str | None, typer.Option(metavar="A,B", help="Only these tasks, such as two-armed-1.")
+]
+Methods = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y", help="Only these methods, such as EC4, CMA-ES or 'optimum/*'."),
+]
 Subject = Annotated[
     str,
     typer.Argument(metavar="NAME", help="A method, EC4 or 'optimum/*', or a task file (.toml)."),
@@ -86,14 +116,18 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the suite.")]
+Seed = Annotated[
+    int, typer.Option(parser=whole("--seed", 0), metavar="N", help="Seed of the suite.")
+]
 TimeLimit = Annotated[
     float | None,
     typer.Option(min=1e-3, max=MOST_SECONDS, metavar="SECONDS", help="Most CPU time of a run."),
 ]
 TrialBudget = Annotated[
     int | None,
-    typer.Option(min=1, metavar="N", help="Most trials that a run may make."),
+    typer.Option(
+        parser=whole("--trial-budget", 1), metavar="N", help="Most trials that a run may make."
+    ),
 ]
 Scheduler = Annotated[
     str | None,
@@ -121,3 +155,40 @@ def split_names(text: str | None, option: str) -> list[str]:
     if not all(names):
         raise CoarticError(f"{option} {text!r} has an empty name. Write for example a,b.")
     return names
+
+
+def tasks_meant(names: Sequence[str]) -> list[str]:
+    """Tasks by their ids, where people's names for them may stand; other names as they are."""
+    from coartic import builtin_tasks, load_task
+
+    known = {name: load_task(name).label for name in builtin_tasks()}
+    return [id_named(name, known) for name in names]
+
+
+def method_names(registered: Registry) -> Mapping[str, str]:
+    """People's names of methods by id; the learner's conditions go by their own names as well."""
+    from coartic.analysis.methods import name_of
+    from coartic.learner.conditions import CONDITIONS, VARIANTS
+
+    names = {name: name_of(name) for name in registered}
+    return {name: words if words != name else "" for name, words in names.items()} | dict.fromkeys(
+        [*CONDITIONS, *VARIANTS], ""
+    )
+
+
+def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
+    """Methods by their ids, where people's names for them and wildcards may stand.
+
+    Raises CoarticError with a line for each unknown name.
+    """
+    from coartic.benchmarks.suites import methods_named
+
+    known, ids, wrong = method_names(registered) if names else {}, [], []
+    for name in names:
+        try:
+            ids += methods_named(id_named(name, known), registered)
+        except CoarticError:
+            wrong.append(unknown("method", name, known, known))
+    if wrong:
+        raise CoarticError("\n".join(wrong))
+    return ids

@@ -10,7 +10,7 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.text import counted
+from coartic.text import counted, id_named, unknown
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -36,7 +36,8 @@ def draw(
     from coartic.files import check_output, publish, write_output
     from coartic.tasks.families import named_by, task_text
 
-    names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
+    meant = given.tasks_meant(tasks or builtin_tasks())
+    names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
     from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
     from coartic.analysis.topics.tasks import draw_tasks
@@ -55,22 +56,31 @@ def draw(
 
 
 def animate(
-    run_id: given.RunId,
+    run: Annotated[
+        str, typer.Argument(metavar="RUN", help="Id of a run, or with --task a method.")
+    ],
     out: Annotated[
         Path,
         typer.Option(
             parser=given.output_named, metavar="FILE", help="Film to write: .gif or .mp4."
         ),
-    ],
+    ] = Path("film.gif"),
     other: Annotated[
-        str | None, typer.Argument(metavar="OTHER_RUN", help="A run to show beside it.")
+        str | None, typer.Argument(metavar="OTHER", help="Another one to show beside it.")
+    ] = None,
+    task: Annotated[
+        str | None,
+        typer.Option(metavar="TASK", help="Show methods on this task, by their median runs."),
     ] = None,
     folder: given.In = Path("results"),
     initial: Annotated[
         bool, typer.Option("--initial", help="Show the initial solution beside it.")
     ] = False,
     width: Annotated[
-        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
+        int,
+        typer.Option(
+            parser=given.whole("--width", 200, 3840), metavar="N", help="Width in pixels."
+        ),
     ] = 800,
     replace: given.Replace = False,
 ) -> None:
@@ -84,16 +94,48 @@ def animate(
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     panels = []
-    for name in (run_id,) if other is None else (run_id, other):
-        place, run = find_run(name, folder)
-        movement, number = trajectory_of(place, run), run.key.number
-        title = f"{movement.task.label}: {name_of(run.setting.method)}, run {number}"
+    for name in (run,) if other is None else (run, other):
+        run_id = name if task is None else median_run(folder, name, task)
+        place, found = find_run(run_id, folder)
+        movement, number = trajectory_of(place, found), found.key.number
+        title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
         panels.append((title, movement))
     if initial:
-        task = panels[0][1].task
-        hands = initial_hands(task, model=run.setting.model)
-        movements = corrective_trial(task, hands, model=run.setting.model).movements
-        initial_solution = trajectory(task, movements, model=run.setting.model)
-        panels.insert(0, (f"{task.label}: initial solution", initial_solution))
+        on, model = panels[0][1].task, found.setting.model
+        movements = corrective_trial(on, initial_hands(on, model=model), model=model).movements
+        initial_solution = trajectory(on, movements, model=model)
+        panels.insert(0, (f"{on.label}: initial solution", initial_solution))
     frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
+
+
+def median_run(folder: Path, method: str, task: str) -> str:
+    """Id of the run of a method on a task whose reward is nearest the median, in a results folder
+    or the one below a folder that has such runs.
+
+    Both may go by people's names. Raises CoarticError where there is none, or more than one folder.
+    """
+    from coartic.analysis.methods import name_of
+    from coartic.analysis.study import load, typical_run
+    from coartic.learner.conditions import METHOD_PREFIX
+    from coartic.runs.store import RUNS_FILE
+
+    found, labels, tasks = dict[Path, str](), dict[str, str](), dict[str, str]()
+    for place in sorted(path.parent for path in folder.rglob(RUNS_FILE)):
+        study = load(place)
+        labels |= {label: name_of(label) for _, label in study.cells}
+        tasks |= {name: each.label for name, each in study.tasks.items()}
+        on, label = id_named(task, tasks), id_named(method, labels)
+        keys = (on, label), (on, f"{METHOD_PREFIX}{label}")
+        cell = next((study.cells[key] for key in keys if key in study.cells), None)
+        if cell is not None and len(cell.good):
+            found[place] = str(cell.good.run_id.iloc[typical_run(cell)])
+    if len(found) > 1:
+        places = ", ".join(map(str, found))
+        raise CoarticError(f"several folders have such runs: name one with --in ({places})")
+    if not found:
+        asked = ("task", task, tasks), ("method", method, labels)
+        wrong = [unknown(*each, each[2]) for each in asked if id_named(*each[1:]) not in each[2]]
+        none = f"there is no solution of {method} on {task} in {folder}"
+        raise CoarticError("\n".join(wrong) or none)
+    return next(iter(found.values()))

@@ -112,27 +112,40 @@ def trace(
     ] = Path("results"),
 ) -> None:
     """Name the runs behind a row of a report's table."""
-    from coartic.analysis.report.trace import row_and_runs, tables_of
+    from coartic.analysis.report import trace as traced
     from coartic.benchmarks.registry import registry
+    from coartic.runs.store import RUNS_FILE, open_store
 
-    tables = tables_of(folder)
+    tables = traced.tables_of(folder)
     if table is None:
         say_pairs([("Tables", ", ".join(tables))])
         return
     if table not in tables:
         raise CoarticError(unknown("table", table, tables))
-    values, runs = row_and_runs(tables[table], row)
+    frame = traced.rows_of(tables[table])
     if row is None:
-        say(*values)
+        say(*map(str, frame.index))
         return
-    pairs = [(name, text) for name, _, text in (line.partition(": ") for line in values)]
-    methods = {text.split()[0] for name, text in pairs if name == "method"}
-    file = "" if methods <= {*registry(), "dual-process"} else " --method-file FILE"
-    results = quote(str(tables[table].parents[2]))
-    say_pairs(pairs)
-    say(
-        f"{counted(len(runs), 'run')}:",
-        *(f"coartic reproduce {quote(run)} --in {results}{file}" for run in runs),
+    row = traced.row_named(table, frame, row)
+    ids = str(frame.run_ids.fillna("")[row]).split()
+    results = tables[table].parents[2]
+    if not (results / RUNS_FILE).is_file():  # the report lies elsewhere
+        say_pairs([("Row", row), *traced.values_of(frame, row, {}), ("Runs", " ".join(ids))])
+        return
+    with open_store(results) as store:
+        runs, plan = store.frame("runs"), store.plan()
+    say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])
+    behind = runs[runs.run_id.isin(ids)]
+    known = {*registry(), "dual-process"}
+    file = "" if known >= {*behind.method} else " --method-file FILE"
+    say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
+    show_frame(traced.runs_behind(runs, ids, plan.tasks))
+    where = f"--in {quote(str(results))}"
+    say_pairs(
+        [
+            ("Repeat one", f"coartic reproduce RUN {where}{file}"),
+            ("Film of one", f"coartic animate RUN {where} --out film.gif"),
+        ]
     )
 
 

@@ -54,12 +54,14 @@ def run(
 
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
-    names = split_names(methods, "--methods")
+    registered = registry(method_file or ())
+    names = given.methods_meant(split_names(methods, "--methods"), registered)
     if beside is not None and not names:
-        names = sorted({*registry(method_file or ())} - {*registry()})
+        names = sorted({*registered} - {*registry()})
         if not names:
             raise CoarticError("--beside needs a method to run: add --method-file or --methods")
-    select = Selection(split_names(tasks, "--tasks"), names, task_file or (), method_file or ())
+    wanted = given.tasks_meant(split_names(tasks, "--tasks"))
+    select = Selection(wanted, names, task_file or (), method_file or ())
     plan = plan_suite(
         chosen,
         runs=runs,
@@ -85,13 +87,11 @@ def run(
             plan, out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
         )
     say(str(report))
-    pairs = []
-    if report.progress.done:  # else the answers are as they were, and take a while
-        import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
-        from coartic.analysis.report.text import answers
-        from coartic.analysis.study import load
+    import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
+    from coartic.analysis.report.text import answers
+    from coartic.analysis.study import load
 
-        pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
+    pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
     if report.progress.crashed:
         sys.exit(1)
@@ -110,23 +110,19 @@ def list_(name: given.Something = None, method_file: given.MethodFiles = None) -
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     """One screen: names of tasks and methods, suites with what they are for."""
-    from coartic import builtin_tasks
+    from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
 
-    yield "Tasks", ", ".join(builtin_tasks())
+    yield "Tasks", ", ".join(f"{name} ({load_task(name).label})" for name in builtin_tasks())
     yield "Families", ", ".join(shipped_families())
     yield "Suites", ""
     for name, suite in suites().items():
         yield f"  {name}", suite.title
     yield "Methods", ""
-    groups: dict[str, list[str]] = {}
-    for name in registered:
-        family, _, form = name.partition("/")
-        groups.setdefault(family, []).append(form or name)
-    for family, forms in groups.items():
-        yield f"  {family}/" if forms != [family] else f"  {family}", ", ".join(forms)
-    yield "More", "coartic list NAME, such as two-armed-1, comparison or cma-es/bandit"
+    names = given.method_names(registered)
+    yield from ((f"  {name}", names[name]) for name in registered)
+    yield "More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"
 
 
 def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
@@ -135,10 +131,11 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     Raises CoarticError for another name.
     """
     from coartic import builtin_tasks, load_task
-    from coartic.benchmarks.suites import methods_named, suites
+    from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
+    (name,) = given.tasks_meant([name])
     if name in suites():
         suite = suites()[name]
         yield "Suite", f"{name}: {suite.title}"
@@ -149,7 +146,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Run it", f"coartic run {name}"
     elif name in builtin_tasks() or address_of(name):
         task = load_task(name)
-        yield "Task", f"{name}: {task.description}"
+        yield "Task", f"{name} ({task.label}): {task.description}"
         yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
@@ -162,10 +159,13 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Draw some", f"coartic draw {family.name}/i000..i003 --out FOLDER"
     else:
         try:
-            methods = methods_named(name, registered)
+            methods = given.methods_meant([name], registered)
         except CoarticError as error:
-            names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
-            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
+            names = dict.fromkeys([*suites(), *builtin_tasks(), *shipped_families()], "")
+            names |= given.method_names(registered)
+            raise CoarticError(
+                unknown("task, suite, method or family", name, names, names)
+            ) from error
         for method in methods:
             yield from describe_method(registered[method])
 
@@ -173,12 +173,14 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
 def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
     """What a method is told and takes, and the tasks that it applies to."""
     from coartic import builtin_tasks, load_task
+    from coartic.analysis.methods import name_of
     from coartic.tasks.readings import readings
 
     read = {each.field for each in readings()}
     parameters = [f"{k}={v}" for k, v in card.defaults.items() if k not in read]
     tasks = [name for name in builtin_tasks() if card.why_not(load_task(name)) is None]
     yield "Method", f"{card.name}: {card.title}"
+    yield "Called", name_of(card.name)
     yield "Told", ", ".join(card.told)
     yield "Parameters", ", ".join(parameters) or "none"
     yield "Tasks", ", ".join(tasks) or "none of the four"
@@ -222,7 +224,6 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
     """Check a method or a task file against the rules."""
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.suites import methods_named
 
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
@@ -231,7 +232,7 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
         broken = show_laws(subject, check_task_file(Path(subject), registered))
     else:
         try:
-            names = methods_named(subject, registered)
+            names = given.methods_meant([subject], registered)
         except CoarticError as error:
             raise CoarticError(
                 f"{error} A task is checked by its file, which `coartic draw` writes."
@@ -244,7 +245,11 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
 def show_laws(name: str, laws: Sequence[Law]) -> int:
     """Print what was found; the number of laws that are broken."""
     for law in laws:
-        say(f"{'pass' if law.passed else 'FAIL'}  {law.name}: {law.finding}")
+        first, *more = law.finding.splitlines() or [""]
+        say(
+            f"{'pass' if law.passed else 'FAIL'}  {law.name}: {first}",
+            *(f"      {m}" for m in more),
+        )
     passed = sum(law.passed for law in laws)
     say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
     return len(laws) - passed

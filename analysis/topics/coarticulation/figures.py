@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
@@ -19,7 +18,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.drawing import MARKERS
 
-_LETTERS = 9  # points: the page shows it small
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
 
 
@@ -27,15 +25,15 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
     "postures",
     "One goal, two postures",
     "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
-    "thin: every run. Dashed arrows lead to the next goal.",
+    "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def one_goal_two_postures(study: Study) -> Parts:
     """The postures at one goal before two others, overlaid: all runs faint, their means strong."""
     shared = shared_goal(study)
     if shared is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    drawing = Figure(figsize=(4.3, 2.3), layout="constrained")
-    draw_postures(drawing.subplots(), shared)
+    drawing, (axes,) = style.figure_of((1, 1), (style.ONE, 2.0))
+    draw_postures(axes, shared)
     parts = []
     for task, runs in zip(shared.tasks, shared.postures, strict=True):
         joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
@@ -61,9 +59,9 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
     drawn += [robot.joint_positions(q, shared.hand) for q in means]
     low, high = np.vstack(drawn).min(axis=0), np.vstack(drawn).max(axis=0)
     axes.set_xlim(low[0] - 0.2, high[0] + 1.2)
-    axes.set_ylim(low[1] - 0.35, high[1] + 0.35)
+    axes.set_ylim(low[1] - 0.7, high[1] + 0.35)
     at, radius = shared.tasks[0].goals[shared.goal - 1], shared.tasks[0].radius
-    words: Any = {"textcoords": "offset points", "fontsize": _LETTERS}
+    words: Any = {"textcoords": "offset points"}
     colors = (style.BLUE, style.VERMILLION)
     rows = zip(shared.tasks, colors, shared.postures, means, goals.tolist(), strict=True)
     for task, color, runs, mean, following in rows:
@@ -94,5 +92,8 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
             ha="center", va="bottom" if above else "top", **words,
         )  # fmt: skip
     axes.add_artist(Circle(at, radius, fill=False, edgecolor=style.INK, linewidth=1.1))
+    x, y = low - 0.2
+    axes.plot([x, x + 1], [y, y], color=style.INK, linewidth=1.5)
+    axes.annotate("1 length unit", (x, y), (0, -2), va="top", **words)
     here = f"goal {shared.goal},\nthe same"
     axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)

@@ -8,7 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.methods import in_order, is_search, main_methods
+from coartic.analysis.methods import in_order, is_search
+from coartic.analysis.settings import shown_methods
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.signatures.locus import joined_tasks, moved_goals
 from coartic.analysis.statistics.estimates import Estimate, interval
@@ -116,13 +117,13 @@ def signatures(study: Study) -> Rows:
     frame = frame[frame.value.notna()]
     for task in (name for name in study.tasks if name in one_by_one(study)):
         labels = [label for name, label in study.cells if name == task]
-        for label in in_order(main_methods(labels)):
+        for label in in_order(shown_methods(study, labels)):
             values = frame[(frame.task == task) & (frame.label == label)]
             if len(values) and not is_search(label):
                 means = values.groupby("signature").value.mean()
                 cell = study.cells[task, label]
                 row: Row = {
-                    "task": marked(study.tasks[task].label, study.tasks[task]),
+                    "task": marked(study.tasks[task]),
                     "method": label,
                     "runs": len(cell.good),
                     **{

@@ -4,7 +4,8 @@ how rewards rise with trials."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,12 @@ from matplotlib.axes import Axes
 from coartic import Task
 from coartic.analysis import methods
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.optima import initial_reward
+from coartic.analysis.settings import compares_settings, name_in, shown_methods
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
-from coartic.analysis.words import in_brackets, number
+from coartic.analysis.words import in_brackets, marked, number
 from coartic.robot import Array
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
@@ -49,10 +51,10 @@ def gaps_to_optimum(study: Study) -> Parts:
     groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]
     heights = [len(of_group) + 0.8 for _, of_group in groups]
-    size = 1.25 * style.ONE, 0.5 + 0.145 * (len(rows) + len(groups))
+    size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
     drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
-        draw_group(axes, group, of_group, style.looks(rows.method))
+        draw_group(axes, study, group, of_group, looks_in(study, rows.method))
     farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
@@ -61,7 +63,9 @@ def gaps_to_optimum(study: Study) -> Parts:
     return drawing, rows, alt, study.tasks.values()
 
 
-def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+def draw_group(
+    axes: Axes, study: Study, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]
+) -> None:
     """Methods that know as much of the reward, nearest first."""
     axes.set_title(f"{group[0].upper()}{group[1:]}")
     for place, row in enumerate(rows.to_dict("records")):
@@ -74,10 +78,10 @@ def draw_group(axes: Axes, group: str, rows: pd.DataFrame, looks: Mapping[str, s
         shape = "D" if methods.is_learner(row["method"]) else "o"
         (dot,) = axes.plot(row["gap"], -place, shape, **mark)
         words = f"{number(row['gap'], 1)} % {in_brackets(row['low'], row['high'], 1)}".strip()
-        style.tip(dot, f"{methods.name_of(row['method'])}: {words}, {row['runs']} runs")
+        style.tip(dot, f"{name_in(study, row['method'])}: {words}, {row['runs']} runs")
         beside: Any = {"textcoords": "offset points", "va": "center"}
         axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
-    style.name_rows(axes, [methods.name_of(method) for method in rows.method])
+    style.name_rows(axes, [name_in(study, method) for method in rows.method])
     for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
         if methods.is_learner(method):
             name.set_fontweight("bold")
@@ -100,14 +104,17 @@ def ecdf_of_runtimes(study: Study) -> Parts:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
     for axes, spend in zip(panels, spends, strict=True):
-        draw_shares(axes, data[data.spend == spend], style.looks(data.method))
+        of_spend = data[data.spend == spend]
+        draw_shares(axes, of_spend, looks_in(study, data.method), partial(name_in, study))
+        axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
-    panels[0].set_ylabel("targets reached (%)")
+        axes.set_ylabel("targets reached (%)")
+        axes.tick_params(labelleft=True)
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    names = dict(zip(map(methods.name_of, ends.method), ends.share, strict=True))
-    style.label_ends(panels[-1], names, 5.5)
+    last = zip(map(str, ends.method), ends.share, strict=True)
+    style.label_ends(panels[-1], {name_in(study, label): share for label, share in last}, 6.2)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()
@@ -121,7 +128,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     """
     parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
     times = runtimes.running_times(study)
-    for label in methods.in_order(methods.main_methods(tables.runtimes(study).index)):
+    for label in methods.in_order(shown_methods(study, tables.runtimes(study).index)):
         for spend in PANELS:
             if (label, spend) in times:
                 budget, share = runtimes.ecdf(times[label, spend])
@@ -132,7 +139,12 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look]) -> None:
+def draw_shares(
+    axes: Axes,
+    data: pd.DataFrame,
+    looks: Mapping[str, style.Look],
+    name_of: Callable[[str], str] = methods.name_of,
+) -> None:
     """A step curve for each method."""
     style.log_axis(axes)
     positive = data.budget[data.budget > 0]
@@ -144,7 +156,9 @@ def draw_shares(axes: Axes, data: pd.DataFrame, looks: Mapping[str, style.Look])
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
         line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
-        style.tip(drawn, f"{methods.name_of(str(label))}: {y[-1]:.0f} % of the targets in the end")
+        name = name_of(str(label))
+        style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
+        style.curve(name, drawn)
     axes.set_xlim(edge, most)
     axes.set_ylim(-2, 102)
 
@@ -165,19 +179,19 @@ def reward_by_trial(study: Study) -> Parts:
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
-    size = style.TWO, min(2.15 * rows + 0.45, style.TALLEST)
+    size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
     drawing, panels = style.figure_of((rows, columns), size, len(tasks))
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         draw_curves(axes, study, task, data[data.task == task.name], labels)
-        axes.set_title(style.heading(task))
-        axes.set_ylabel("" if place % columns else "reward (ticks)")
+        axes.set_title(marked(task))
+        axes.set_ylabel("reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.entry(methods.name_of(label), linewidth=1.3, **look)
-        for label, look in style.looks(labels).items()
+        style.entry(name_in(study, label), linewidth=1.3, **look)
+        for label, look in looks_in(study, labels).items()
     ]
-    handles += [style.entry("initial", **style.INITIAL)]
+    handles += [style.entry("initial solution", **style.INITIAL)]
     handles += [style.entry(scores.optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
@@ -217,7 +231,7 @@ def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
         labels = [
             label
             for label in methods.in_order(solved)
-            if label in CURVES or not methods.is_built_in(label)
+            if label in CURVES or not methods.is_built_in(label) or compares_settings(study)
         ]
         two_armed = {*methods.CONDITIONS} & {*labels} - {methods.EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
@@ -244,22 +258,23 @@ def draw_curves(
     axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
 ) -> None:
     """Curves of the methods on a task, between its initial solution and its optimum."""
-    look_of = style.looks(labels)
+    look_of = looks_in(study, labels)
     for label, rows in data.groupby("method", sort=False):
         look = look_of[str(label)]
-        axes.fill_between(
-            rows.trial, rows.best_low, rows.best_high, color=look["color"], alpha=0.22, linewidth=0
-        )
-        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
-        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+        band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
+        middle_half = axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
+        best = axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+        style.curve(name_in(study, str(label)), middle_half, *best, *trials)
     floor, top = data.best.min(), data.best_high.max()
     initial = initial_reward(task, study.model)
     if not math.isnan(initial):
-        axes.axhline(initial, **style.INITIAL)
+        style.curve("initial solution", axes.axhline(initial, **style.INITIAL))
         floor, top = initial, max(top, initial)
     optimum = study.optima.get(task.name)
     if optimum is not None:
-        axes.axhline(optimum.reward, **style.OPTIMUM)
+        name = scores.optimum_in_words(study)
+        style.curve(name, axes.axhline(optimum.reward, **style.OPTIMUM))
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)

@@ -121,7 +121,7 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
     eligible = {
         key: cell
         for key, cell in study.cells.items()
-        if key[0] in tasks and scores.is_compared(cell.label) and not locks_base(cell.runs)
+        if key[0] in tasks and scores.is_compared(study, cell.label) and not locks_base(cell.runs)
     }
     over_all = {
         method: [eligible[key] for key in labels.items()]

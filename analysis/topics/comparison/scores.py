@@ -17,6 +17,7 @@ import pandas as pd
 
 from coartic.analysis import methods
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
+from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics.estimates import Estimate, mean, standard_deviation
 from coartic.analysis.statistics.hypotheses import sign_flip_test
 from coartic.analysis.statistics.instances import task_mean
@@ -229,7 +230,7 @@ def gaps(study: Study) -> pd.DataFrame:
     rows = [
         row | {"knows": group_of(study, row["method"])}
         for row in every
-        if is_compared(row["method"]) and row["solved"] == row["runs"]
+        if is_compared(study, row["method"]) and row["solved"] == row["runs"]
         if not math.isnan(row["gap"])
     ]
     places = [ALL_TASKS, *study.tasks]
@@ -239,16 +240,18 @@ def gaps(study: Study) -> pd.DataFrame:
     return frame.assign(algorithm=list(map(methods.algorithm_of, frame.method)))
 
 
-def is_compared(label: str) -> bool:
-    """Whether a method is compared with others: neither a variant nor a search for the optimum."""
-    return not methods.is_variant(label) and not methods.is_search(label)
+def is_compared(study: Study, label: str) -> bool:
+    """Whether a method is compared with others: no search for the optimum, and a variant only where
+    settings are compared."""
+    shown = compares_settings(study) or not methods.is_variant(label)
+    return shown and not methods.is_search(label)
 
 
 def over_all_tasks(study: Study) -> Iterator[dict[str, Any]]:
     """Rows of :func:`gaps` over all tasks, where there are several."""
     tasks = initial_and_optimum(study)
     for method, labels in labels_by_task(study).items():
-        if 1 < len(tasks) == len(labels) and is_compared(method):
+        if 1 < len(tasks) == len(labels) and is_compared(study, method):
             gap = mean_gap(study, labels)
             runs = sum(len(study.cells[key].runs) for key in labels.items())
             if gap is not None:
@@ -274,7 +277,8 @@ def leaders(study: Study, group: str) -> pd.DataFrame:
     learners = rows.method.map(methods.is_learner).astype(bool)
     most = learners & rows.method.str.contains("EC4")
     best = rows[~learners | (most if most.any() else learners)]
-    best = best.drop_duplicates("algorithm").reset_index(drop=True)
+    one = "method" if compares_settings(study) else "algorithm"
+    best = best.drop_duplicates(one).reset_index(drop=True)
     tests = [paired_difference(study, best.method[0], other) for other in best.method[1:]]
     p, least = [test.p for test in tests], [test.least_p for test in tests]
     first = [math.nan] * min(len(best), 1)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from coartic.analysis import methods, words
 from coartic.analysis.section import Section
+from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import LEVEL, Estimate
 from coartic.analysis.study import CellKey, Study, cached, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
@@ -27,7 +28,8 @@ def leaders_by_group(study: Study) -> dict[str, list[Any]]:
     for group in scores.GROUPS:
         rows = scores.leaders(study, group)
         percent = {column: 100 * rows[column] for column in ("gap", "low", "high")}
-        named = rows.assign(name=list(map(methods.name_of, rows.method)), **percent)
+        names = [name_in(study, method) for method in rows.method]
+        named = rows.assign(name=names, **percent)
         by_group[group] = list(named.itertuples())
     return by_group
 
@@ -48,6 +50,8 @@ def finding_of_ranking(study: Study) -> str:
     by_trial, by_formula, others = leaders_by_group(study).values()
     if not (by_trial or by_formula or others):
         return ""
+    if compares_settings(study):
+        return words.capital(settings_in_words(by_trial or by_formula or others))
     sentences = nearest_by_trial(by_trial) if by_trial else []
     without = "best method that does not use the reward"
     if by_formula:
@@ -70,6 +74,20 @@ def finding_of_ranking(study: Study) -> str:
             f"{plural(settings, 'more setting')} of methods {are} in tables/variants.csv."
         )
     return " ".join(sentences)
+
+
+def settings_in_words(rows: list[Any]) -> str:
+    """A sentence on settings: the nearest to the optimum with its interval, then the others."""
+    best, *others = rows
+    text = f"{best.name} ends nearest to the optimum: {gap_in_words(best, interval=True)} away"
+    if others:
+        rest = ", ".join(f"{row.name} {gap_in_words(row)}" for row in others)
+        text += f"; then {rest}"
+        if others[0].least_p > LEVEL:
+            text += f". Too few runs to tell it from {others[0].name}"
+        elif not others[0].p < LEVEL:
+            text += f". No significant difference from {others[0].name}"
+    return f"{text}."
 
 
 def nearest_by_trial(rows: list[Any]) -> list[str]:
@@ -110,6 +128,8 @@ def answer_nearest(study: Study) -> str:
     by_trial, *others = leaders_by_group(study).values()
     if not any((by_trial, *others)):
         return ""
+    if compares_settings(study):
+        return settings_in_words(next(rows for rows in (by_trial, *others) if rows))
     best = next(row for rows in (by_trial, *others) for row in rows)
     who = (
         f"Among methods that see only rewards: {best.name}"
@@ -160,7 +180,7 @@ def failed_compared(study: Study, consequence: str, *groups: str) -> str:
     cells = [
         (task, label)
         for task, label in study.cells
-        if task in scores.initial_and_optimum(study) and scores.is_compared(label)
+        if task in scores.initial_and_optimum(study) and scores.is_compared(study, label)
         if not groups or scores.group_of(study, label) in groups
     ]
     return failed_runs(study, cells, consequence)

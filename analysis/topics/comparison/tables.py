@@ -53,12 +53,12 @@ def against_learner(study: Study) -> Rows:
         if learner is None or learner is cell or task not in one_by_one(study):
             continue
         both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
-        if not scores.is_compared(label) or not both_solved:
+        if not scores.is_compared(study, label) or not both_solved:
             continue
         drawn = study.plan.methods[cell.method].stochastic
         rewards = cell.rewards if drawn else float(cell.rewards[0])
         row: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "task": marked(study.tasks[task]),
             "method": label,
             "runs": len(cell.runs),
             "reward": cell.rewards.mean(),
@@ -175,7 +175,7 @@ def learning(study: Study) -> Rows:
     """Best reward after so many trials, and when half of a run's gain was there."""
     for (task, label), cell in study.cells.items():
         runs = steps_of(study, cell)
-        if task not in one_by_one(study) or not scores.is_compared(label):
+        if task not in one_by_one(study) or not scores.is_compared(study, label):
             continue
         if not runs or not all(run.learns and run.solved for run in runs):
             continue
@@ -189,7 +189,7 @@ def learning(study: Study) -> Rows:
         halves = [half_gain(initial, run.rewards, run.spent["trials"]) for run in runs]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {
-            "task": marked(study.tasks[task].label, study.tasks[task]),
+            "task": marked(study.tasks[task]),
             "method": label,
             "runs": len(runs),
             "initial": initial,
@@ -215,5 +215,5 @@ def methods(study: Study) -> Rows:
         task, label = row["task"], row["method"]
         if task in one_by_one(study):
             values = {str(name): value for name, value in row.items()}
-            values["task"] = marked(study.tasks[task].label, study.tasks[task])
+            values["task"] = marked(study.tasks[task])
             yield f"{task} {label}", values | runs_of(study.cells[task, label])

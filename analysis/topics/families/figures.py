@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.topics.families.tables import instance_gaps
@@ -33,7 +33,7 @@ def gaps_by_family(study: Study) -> Parts:
     if not len(data):
         raise missing(study, "no solved runs on instances of a family of tasks")
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
-    looks = style.looks(order)
+    looks = looks_in(study, order)
     families = list(dict.fromkeys(data.family))
     size = style.TWO, 0.9 + 0.19 * len(order)
     drawing, panels = style.figure_of((1, len(families)), size, sharey=True)

@@ -57,7 +57,7 @@ def draw_published(study: Study) -> Parts:
             names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
         else:
             pooled = "*" if row["pooled"] else ""
-            name = marked(row["task"], tasks[row["task"]])
+            name = marked(tasks[row["task"]])
             names.append(f"{name}, {name_of(row['method'])}{pooled}")
     axes = drawing.subplots()
     for place, row in enumerate(rows):
@@ -123,7 +123,7 @@ def draw_recruitment(study: Study) -> Parts:
     colors = dict(zip(order[:COLOURED], style.PALETTE, strict=False))
     shape = style.grid(len(tasks), 2)
     bars = data.drop_duplicates(["task", "method", "source"]).task.value_counts().max()
-    size = style.TWO, (0.75 + 0.155 * bars) * shape[0]
+    size = style.TWO, (0.8 + 0.17 * bars) * shape[0]
     drawing, panels = style.figure_of(shape, size, len(tasks))
     for axes, task in zip(panels, tasks, strict=True):
         draw_bars(axes, task, data[data.task == task.name], order, colors)
@@ -154,7 +154,7 @@ def draw_bars(
             axes.barh(-place, share, 0.78, left=left, color=color, hatch=hatch, **_EDGE)
             if share >= 0.08 and ours:
                 middle = left + share / 2, -place, str(row["runs"])
-                axes.text(*middle, ha="center", va="center", fontsize=6, color=style.on(color))
+                axes.text(*middle, ha="center", va="center", fontsize=7, color=style.on(color))
             left += share
     style.name_rows(axes, names)
     axes.set_ylim(-len(names) + 0.5, 0.5)
@@ -162,4 +162,4 @@ def draw_bars(
     axes.set_xticks([0, 0.5, 1], ["0", "50", "100 %"])
     axes.set_xlabel("share of runs")
     axes.spines["left"].set_visible(False)
-    axes.set_title(style.heading(task))
+    axes.set_title(marked(task))

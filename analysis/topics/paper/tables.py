@@ -107,7 +107,7 @@ def hands(study: Study) -> Rows:
 def named(study: Study, cell: CellRuns) -> Row:
     """The task of a cell by its title, and its condition."""
     task = study.tasks[cell.task]
-    return {"task": marked(task.label, task), "condition": cell.label.removeprefix(LEARNER)}
+    return {"task": marked(task), "condition": cell.label.removeprefix(LEARNER)}
 
 
 @table(

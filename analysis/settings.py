@@ -1,0 +1,64 @@
+"""Folders whose question is which setting of a method is best: those of a suite with a grid.
+
+In such a folder every setting is shown beside the others, as methods are in other folders, and the
+default says its value. Elsewhere a setting that is not the default is a variant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from coartic.analysis.methods import INITIAL, PLACEBO, is_search, main_methods, name_of
+from coartic.analysis.study import Study, cached
+
+REFERENCES = (INITIAL, PLACEBO)
+"""Methods that may stand beside the settings of others."""
+
+
+@cached
+def varied(study: Study) -> dict[str, list[str]]:
+    """Parameters of each method that have several values on one task, by method."""
+    values: dict[tuple[str, str], dict[str, set[str]]] = {}
+    for cell in study.plan.cells:
+        of_task = values.setdefault((cell.method.name, cell.task.name), {})
+        for key, value in cell.complete.items():
+            of_task.setdefault(key, set()).add(repr(value))
+    several: dict[str, list[str]] = {}
+    for (method, _), of_task in values.items():
+        names = several.setdefault(method, [])
+        names += [key for key, seen in of_task.items() if len(seen) > 1 and key not in names]
+    return several
+
+
+@cached
+def compares_settings(study: Study) -> bool:
+    """Whether all methods but references have several settings."""
+    methods = {
+        method: names
+        for method, names in varied(study).items()
+        if method not in REFERENCES and not is_search(method)
+    }
+    return bool(methods) and all(methods.values())
+
+
+@cached
+def names_of_settings(study: Study) -> dict[str, str]:
+    """Names of default settings by label, where settings are compared: ``learner EC1 (σ 0.05,
+    default)``."""
+    names = {}
+    for cell in study.plan.cells if compares_settings(study) else ():
+        keys = varied(study)[cell.method.name]
+        if keys and not cell.variant:
+            values = ", ".join(f"{key}={cell.complete[key]}" for key in keys)
+            names[cell.label] = f"{name_of(f'{cell.label} {values}')[:-1]}, default)"
+    return names
+
+
+def name_in(study: Study, label: str) -> str:
+    """The name of a method in a folder; a default that stands beside others has its value."""
+    return names_of_settings(study).get(label) or name_of(label)
+
+
+def shown_methods(study: Study, labels: Iterable[str]) -> list[str]:
+    """Methods that figures and tables of a folder show: all settings where these are compared."""
+    return list(dict.fromkeys(labels)) if compares_settings(study) else main_methods(labels)

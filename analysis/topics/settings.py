@@ -1,0 +1,134 @@
+"""Settings of a method beside each other: which is best on each task."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.ticker import MaxNLocator
+
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing
+from coartic.analysis.section import Section
+from coartic.analysis.settings import compares_settings, name_in, varied
+from coartic.analysis.statistics.estimates import LEVEL, Estimate, interval, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.table import Rows, runs_of, table
+from coartic.analysis.words import estimate, marked, number, plural
+
+MOST_TASKS = 4
+"""Tasks on which a sentence names the best setting."""
+
+
+@table("task, method, runs, solved, reward[], behind, p_holm")
+def settings(study: Study) -> Rows:
+    """Mean reward of each setting, the best of each task first.
+
+    ``behind``: ticks behind the best of its task; ``p_holm``: of the two-tailed bootstrap test of
+    that difference, corrected for the settings of the task. Empty where folders compare methods.
+    """
+    for task in study.tasks if compares_settings(study) else ():
+        cells = [cell for (on, _), cell in study.cells.items() if on == task and len(cell.good)]
+        cells = [cell for cell in cells if varied(study)[cell.method]]
+        cells.sort(key=lambda cell: -cell.rewards.mean())
+        tests = [bootstrap_test(cells[0].rewards, cell.rewards, "two-sided") for cell in cells[1:]]
+        p = [math.nan, *holm([test.p for test in tests])]
+        for cell, corrected in zip(cells, p, strict=True):
+            row = {
+                "task": marked(study.tasks[task]),
+                "method": cell.label,
+                "runs": len(cell.runs),
+                "solved": len(cell.good),
+                **interval("reward", mean(cell.rewards)),
+                "behind": cells[0].rewards.mean() - cell.rewards.mean(),
+                "p_holm": corrected,
+            }
+            yield f"{task} {cell.label}", row | runs_of(cell)
+
+
+@figure(
+    "settings",
+    "Settings",
+    f"Mean reward of each setting with its {style.CONFIDENCE} bootstrap interval over runs; the "
+    "best of each task stands first.",
+)
+def rewards_by_setting(study: Study) -> Parts:
+    """Mean reward of every setting, a panel a task."""
+    data = settings(study)
+    data = data[[name.partition(" ")[0] in one_by_one(study) for name in data.index]]
+    if not len(data):
+        raise missing(study, "no method with several settings")
+    tasks = list(dict.fromkeys(data.task))
+    rows, columns = style.grid(len(tasks))
+    most = data.task.value_counts().max()
+    size = style.TWO if columns > 1 else style.ONE, (0.65 + 0.2 * most) * rows
+    drawing, panels = style.figure_of((rows, columns), size, len(tasks))
+    looks = looks_in(study, data.method)
+    for axes, task in zip(panels, tasks, strict=True):
+        of_task = data[data.task == task]
+        for place, row in enumerate(of_task.to_dict("records")):
+            mark: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
+            axes.plot([row["reward_low"], row["reward_high"]], [-place, -place], **mark)
+            axes.plot(row["reward"], -place, "o", **mark)
+        style.name_rows(axes, [name_in(study, method) for method in of_task.method])
+        axes.set_title(task)
+        axes.set_xlabel("reward (ticks)")
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+    names = data.assign(name=[name_in(study, method) for method in data.method])
+    words = "; ".join(f"{r.task}, {r.name}: {r.reward:.1f}" for r in names.itertuples(index=False))
+    return drawing, data, f"Mean reward by setting. {words}.", study.tasks.values()
+
+
+def answer(study: Study) -> str:
+    """The best setting of each task, and whether it is surely better than the next."""
+    rows = settings(study)
+    tasks = list(dict.fromkeys(rows.task))
+    best = rows[~rows.task.duplicated()]
+    if len(tasks) > MOST_TASKS:
+        counts = best.method.map(partial(setting_in, study)).value_counts()
+        most = "; ".join(f"{name} on {count}" for name, count in counts.items())
+        return f"Best on {plural(len(tasks), 'task')}: {most}."
+    return " ".join(on_task(study, rows[rows.task == task]) for task in tasks)
+
+
+def setting_in(study: Study, label: str) -> str:
+    """A setting in words: the values alone where one method has settings."""
+    name = name_in(study, label)
+    alone = len({label.partition(" ")[0] for label in settings(study).method}) == 1
+    return name.partition(" (")[2].removesuffix(")") if alone else name
+
+
+def on_task(study: Study, rows: pd.DataFrame) -> str:
+    """A sentence on the settings of a task."""
+    first, *others = rows.to_dict("records")
+    reward = Estimate(first["reward"], first["reward_low"], first["reward_high"])
+    text = f"{first['task']}: {setting_in(study, first['method'])}: {estimate(reward, 1)} ticks"
+    if not others:
+        return f"{text}."
+    p = np.array([row["p_holm"] for row in others])
+    after = f"next {setting_in(study, others[0]['method'])}: {number(others[0]['reward'], 1)}"
+    if (p < LEVEL).all():
+        return f"{text}, significantly better than all others; {after}."
+    if np.isnan(p).any():
+        return f"{text}; {after}; too few runs to tell."
+    surely = "significantly worse" if p[0] < LEVEL else "no significant difference"
+    return f"{text}; {after}, {surely}."
+
+
+SETTINGS = Section(
+    "settings",
+    short="Settings",
+    title="Which setting is best?",
+    caption="Mean reward of each setting (ticks), the best of each task first",
+    finding=answer,
+    figure="settings",
+    table="settings",
+    note=(
+        "Behind: ticks behind the best setting of the task. p is corrected for the settings of "
+        "the task (Holm)."
+    ),
+)
