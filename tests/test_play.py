@@ -1,5 +1,6 @@
 """The model in JavaScript: the package's own numbers, in Node."""
 
+import io
 import json
 import shutil
 import statistics
@@ -31,9 +32,9 @@ def node(script, *given):
     program = f"""
       const coartic = require({json.dumps(str(MODEL))});
       const given = JSON.parse(require("fs").readFileSync(0, "utf8"));
-      const answer = ({script})(...given);
       const plain = (key, value) => ArrayBuffer.isView(value) ? Array.from(value) : value;
-      process.stdout.write(JSON.stringify(answer, plain));
+      Promise.resolve(({script})(...given))
+        .then((answer) => process.stdout.write(JSON.stringify(answer, plain)));
     """
     text = json.dumps(given)  # NaN has no place in it: None
     done = subprocess.run(
@@ -242,3 +243,34 @@ def test_search_and_plan_end_where_the_packages_do_and_say_their_true_reward(nam
     optimum = known[name, "task", "free"]
     assert optimum * 1.03 <= plans[-1]["reward"] <= optimum
     assert plans[0]["reward"] < optimum * 1.04
+
+
+FILM = """async (file, width, height, pictures) => {
+  const film = new (require(file).Film)(width, height);
+  pictures.forEach(([pixels, seconds]) => film.add(Uint8ClampedArray.from(pixels), seconds));
+  return new Uint8Array(await film.blob().arrayBuffer());
+}"""
+
+
+def test_a_film_has_the_pictures_that_were_put_in():
+    """Noise, so that codes run out; a part that changes; nothing that changes."""
+    image = pytest.importorskip("PIL.Image")
+    rng = np.random.default_rng(1)
+    colours = 8 * (rng.permutation(32**3)[:200, None] >> (10, 5, 0) & 31)
+    first = colours[rng.integers(200, size=(90, 120))]
+    second = first.copy()
+    second[20:33, 40:87] = colours[rng.integers(200, size=(13, 47))]
+    films = [(first, 0.1), (second, 0.2), (second, 0.3), (first, 0.5)]
+    opaque = [
+        (np.dstack([picture, np.full((90, 120), 255)]).ravel().tolist(), seconds)
+        for picture, seconds in films
+    ]
+    data = node(FILM, str(MODEL.with_name("gif.js")), 120, 90, opaque)
+    with image.open(io.BytesIO(bytes(data))) as film:
+        seen = []
+        for frame in range(film.n_frames):
+            film.seek(frame)
+            seen.append((np.array(film.convert("RGB")), film.info["duration"]))
+    assert [duration for _, duration in seen] == [100, 500, 500]
+    for (shown, _), picture in zip(seen, (first, second, first), strict=True):
+        np.testing.assert_array_equal(shown, picture)

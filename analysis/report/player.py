@@ -9,14 +9,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from coartic import Movement
+import numpy as np
+
+from coartic import MotionModel, Movement, Trajectory, execute
 from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.topics.comparison.scores import labels_by_task
 from coartic.analysis.topics.comparison.sentences import most_improved
 from coartic.play.page import figure, preset_of
-from coartic.robot import HANDS
+from coartic.robot import HANDS, Array
 
 CONTROL = "play-link"
 """Hidden control of the figure that holds its state for the address of the page."""
@@ -90,17 +92,64 @@ def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
     return {
         "run": str(good.run_id.iloc[k]),
         "ticks": runs[k].ticks,
-        "movements": [movement_of(movement) for movement in runs[k].execution.movements],
+        "movements": [plain(movement) for movement in shortened(runs[k], study.model)],
     }
 
 
 def postures(study: Study, cell: CellKey) -> dict[str, Any]:
     """Where the runs of a cell hit goal 1."""
     runs = study.trajectories(*cell).runs
-    return {"reached": [run.execution.configurations[0].round(4).tolist() for run in runs]}
+    return {"reached": [run.execution.configurations[0].round(3).tolist() for run in runs]}
 
 
-def movement_of(movement: Movement) -> dict[str, Any]:
+def shortened(run: Trajectory, model: MotionModel) -> tuple[Movement, ...]:
+    """The movements of a run with fewer digits, and paths with fewer waypoints: as few as give each
+    goal the same ticks."""
+    made = run.execution
+    for digits in range(2, 7):
+        before: Any = run.task.q0
+        shorter = []
+        for movement in made.movements:
+            shorter.append(rounded(movement, before, run.task.q0, digits))
+            before = movement.target
+        again = execute(run.task, shorter, model=model)
+        if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
+            return tuple(shorter)
+    return made.movements
+
+
+def rounded(movement: Movement, before: Array, q0: Array, digits: int) -> Movement:
+    """A movement from ``before`` with so many decimals; what stands as at the start still does."""
+
+    def short(points: Array) -> Array:
+        return np.where(points == q0, points, np.round(points, digits))
+
+    target, waypoints = movement.target, movement.waypoints
+    if waypoints is not None:
+        waypoints = short(bends(np.vstack([before, waypoints]), 10.0**-digits)[1:])
+        target = waypoints[-1]
+    return replace(movement, target=None if target is None else short(target), waypoints=waypoints)
+
+
+def bends(points: Array, tolerance: float) -> Array:
+    """Those of the points ``(k, dof)`` of a polyline from which it keeps within a tolerance, its
+    ends among them. Splits at the worst point (Ramer 1972; Douglas and Peucker 1973)."""
+    kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
+        inner, line = points[first + 1 : last] - points[first], points[last] - points[first]
+        if not len(inner):
+            continue
+        share = np.clip(inner @ line / max(line @ line, 1e-30), 0.0, 1.0)
+        off = np.linalg.norm(inner - share[:, None] * line, axis=1)
+        worst = first + 1 + int(off.argmax())
+        if off.max() > tolerance:
+            kept.add(worst)
+            spans += [(first, worst), (worst, last)]
+    return points[sorted(kept)]
+
+
+def plain(movement: Movement) -> dict[str, Any]:
     """A movement as ``model.js`` executes it."""
     made = {"goal": movement.goal - 1, "hand": HANDS.index(movement.hand), "kind": movement.kind}
     if movement.waypoints is not None:

@@ -35,7 +35,8 @@ def play(
     from coartic.files import write_output
     from coartic.play.page import play_page
 
-    page = play_page(None if task is None else load_task(task)).encode()
+    chosen = [] if task is None else given.tasks_meant([task])
+    page = play_page(*map(load_task, chosen)).encode()
     if out is None:
         with tempfile.NamedTemporaryFile(suffix=".html", prefix="coartic-", delete=False) as file:
             file.write(page)
