@@ -359,7 +359,8 @@ def answer_gain(study: Study) -> str:
     return (
         "Not tested here: it takes two tasks with the same first goals. "
         f"On {marked(study.tasks[task])} the {methods.name_of(label)} gets from "
-        f"{number(initial, 0)} to {number(learned, 0)} ticks{', with a slower first movement' if slower else ''}."
+        f"{number(initial, 0)} to {number(learned, 0)} ticks"
+        f"{', with a slower first movement' if slower else ''}."
         + failed_runs(study, [(task, label)], " and are not counted")
     )
 
