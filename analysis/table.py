@@ -15,6 +15,8 @@ from coartic.analysis.words import marked, read_beside
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
 """Rows of a table with their names."""
+SHORT_ID = 8
+"""Characters of a run's id that people see: commands take its beginning."""
 TABLES: dict[str, Callable[[Study], pd.DataFrame]] = {}
 """Every table of the report by its id: the name of its function, with dashes."""
 

@@ -19,10 +19,12 @@ from coartic.analysis.report import numbers, render
 from coartic.analysis.report.build import SECTIONS, inert, report_files, write_report
 from coartic.analysis.report.contents import FIGURES, TABLES
 from coartic.analysis.report.text import answers
-from coartic.analysis.report.trace import SHORT_ID, rows_of, tables_of
+from coartic.analysis.report.trace import rows_of, tables_of
 from coartic.analysis.study import Study
+from coartic.analysis.table import SHORT_ID
 from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
+from coartic.cli.draw import median_run
 from coartic.runs.store import RUNS_FILE
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
@@ -89,13 +91,26 @@ def test_trace_goes_from_a_row_to_its_runs(
     assert code == 0
     stored = traced.runs.set_index("run_id").loc[runs]
     for run, seed, reward in zip(runs, stored.seed, stored.reward, strict=True):
-        (line,) = (line for line in text.splitlines() if run[:SHORT_ID] in line)
+        line = [line for line in text.splitlines() if run[:SHORT_ID] in line][-1]
         assert {str(seed), f"−{-reward}"} <= set(line.split())
     people = f"{frame.task.iloc[0]}, {name_of(method)}".replace(" †", "")
     assert call(monkeypatch, capsys, "trace", "methods", people, "--in", results)[1] == text
     code, _, error = call(monkeypatch, capsys, "trace", "methods", "nothing", "--in", results)
     assert code == 2
     assert "no row 'nothing'" in error
+
+
+def test_the_median_run_goes_by_the_names_of_people(traced, tables_by_name):
+    chosen = median_run(traced.folder, "learner EC4", "Two-armed 1")
+    runs = traced.cells["two-armed-1", "dual-process/EC4"].good.set_index("run_id").reward
+    off = (runs - runs.median()).abs()
+    assert off[chosen] == off.min()
+    shown = tables_by_name["methods"].median_run["two-armed-1 dual-process/EC4"]
+    assert chosen.startswith(shown)
+    assert median_run(traced.folder, "EC4", "two-armed-1") == chosen
+    with pytest.raises(CoarticError, match=r"did you mean 'two-armed-1' \(Two-armed 1\)") as caught:
+        median_run(traced.folder, "learner EC9", "two-armed1")
+    assert len(str(caught.value).splitlines()) == 2
 
 
 HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'

@@ -169,13 +169,11 @@ def for_page(plot: Plot) -> PagePicture:
     has_curves = any((part.get_gid() or "").startswith(CURVE) for part in figure.findobj())
     dpi = figure.dpi
     figure.set_dpi(72)  # that of SVG, so that boxes are in its points
-    for legend in figure.legends:
-        legend.set(visible=not has_curves, in_layout=not has_curves)
+    legends, figure.legends = figure.legends, [] if has_curves else figure.legends
     with rc_context({**RC, "svg.fonttype": "none"}):
         figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
         boxes = pieces_of(figure)
-    for legend in figure.legends:
-        legend.set(visible=True, in_layout=True)
+    figure.legends = legends
     figure.set_dpi(dpi)
     if not has_curves:
         figure.set_layout_engine("none")  # its file has the layout that it now has
@@ -231,7 +229,6 @@ def pieces_of(figure: Figure) -> list[Bbox]:
     entries = [
         Bbox.union([handle.get_window_extent(), text.get_window_extent()])
         for legend in figure.legends
-        if legend.get_visible()
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
         if handle is not None
     ]

@@ -7,7 +7,6 @@ white. All are legible on white and on #111; dashes tell what colours tell.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase
@@ -129,22 +128,6 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """A legend below all panels."""
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
-
-
-def label_ends(axes: Axes, ends: Mapping[str, float], least: float) -> None:
-    """Names of lines at the right of a panel, each at its end or moved so that none overlap.
-
-    ``ends``: height of each line's end by its name; ``least``: distance between two names.
-    """
-    place = math.inf
-    for name, height in sorted(ends.items(), key=lambda item: -item[1]):
-        place = min(height, place - least)
-        where: Any = {
-            "xycoords": ("axes fraction", "data"),
-            "textcoords": ("axes fraction", "data"),
-        }
-        where |= {"va": "center", "annotation_clip": False}
-        curve(name, axes.annotate(name, (1, height), (1.02, place), **where))
 
 
 def tip(artist: Artist, text: str) -> None:

@@ -179,10 +179,11 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
     cells = {column: list(map(latex, texts_of(frame, column))) for column in columns}
     shown = pd.DataFrame(cells).set_axis(list(columns.values()), axis="columns")
     styler = shown.style.hide(axis="index").format_index(latex, axis="columns")
-    sides = "".join("r" if is_number(frame[column]) else "l" for column in columns)
+    sides = ["r" if is_number(frame[column]) else "l" for column in columns]
+    sides[:1] = ["p{40mm}"] if groups else sides[:1]
     body = styler.to_latex(
         hrules=True,
-        column_format=f"@{{}}{sides}@{{}}",
+        column_format=f"@{{}}{''.join(sides)}@{{}}",
         caption=latex(caption),
         label=f"tab:coartic-{name}",
         position="tp",

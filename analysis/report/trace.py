@@ -11,12 +11,10 @@ import pandas as pd
 from coartic import CoarticError, Task
 from coartic.analysis.methods import name_of
 from coartic.analysis.report.render import columns_of, texts_of
+from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
 from coartic.runs.plan import label_of
 from coartic.text import did_you_mean, id_named, plain
-
-SHORT_ID = 12
-"""Characters of a run's id that people see: commands take its beginning."""
 
 
 def tables_of(folder: Path) -> dict[str, Path]:

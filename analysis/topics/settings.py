@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import MaxNLocator
 
-from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, missing
 from coartic.analysis.section import Section
 from coartic.analysis.settings import compares_settings, name_in, varied
 from coartic.analysis.statistics.estimates import LEVEL, Estimate, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.words import estimate, marked, number, plural
 
@@ -48,39 +44,6 @@ def settings(study: Study) -> Rows:
                 "p_holm": corrected,
             }
             yield f"{task} {cell.label}", row | runs_of(cell)
-
-
-@figure(
-    "settings",
-    "Settings",
-    f"Mean reward of each setting with its {style.CONFIDENCE} bootstrap interval over runs; the "
-    "best of each task stands first.",
-)
-def rewards_by_setting(study: Study) -> Parts:
-    """Mean reward of every setting, a panel a task."""
-    data = settings(study)
-    data = data[[name.partition(" ")[0] in one_by_one(study) for name in data.index]]
-    if not len(data):
-        raise missing(study, "no method with several settings")
-    tasks = list(dict.fromkeys(data.task))
-    rows, columns = style.grid(len(tasks))
-    most = data.task.value_counts().max()
-    size = style.TWO if columns > 1 else style.ONE, (0.65 + 0.2 * most) * rows
-    drawing, panels = style.figure_of((rows, columns), size, len(tasks))
-    looks = looks_in(study, data.method)
-    for axes, task in zip(panels, tasks, strict=True):
-        of_task = data[data.task == task]
-        for place, row in enumerate(of_task.to_dict("records")):
-            mark: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
-            axes.plot([row["reward_low"], row["reward_high"]], [-place, -place], **mark)
-            axes.plot(row["reward"], -place, "o", **mark)
-        style.name_rows(axes, [name_in(study, method) for method in of_task.method])
-        axes.set_title(task)
-        axes.set_xlabel("reward (ticks)")
-        axes.xaxis.set_major_locator(MaxNLocator(4))
-    names = data.assign(name=[name_in(study, method) for method in data.method])
-    words = "; ".join(f"{r.task}, {r.name}: {r.reward:.1f}" for r in names.itertuples(index=False))
-    return drawing, data, f"Mean reward by setting. {words}.", study.tasks.values()
 
 
 def answer(study: Study) -> str:
@@ -125,7 +88,6 @@ SETTINGS = Section(
     title="Which setting is best?",
     caption="Mean reward of each setting (ticks), the best of each task first",
     finding=answer,
-    figure="settings",
     table="settings",
     note=(
         "Behind: ticks behind the best setting of the task. p is corrected for the settings of "

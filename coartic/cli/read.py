@@ -40,7 +40,7 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
     study = load(folder)
     with interruptible(lambda: f"{out} may be incomplete; repeat the command to finish it."):
         files = write_report(study, out, for_paper=for_paper)
-    tables = len({Path(name).stem for name in files if name.startswith("tables/")})
+    tables = sum(name.endswith(".csv") for name in files)
     figures = len({Path(name).stem for name in files if name.startswith("figures/")})
     what = "CSV and LaTeX" if for_paper else "CSV"
     say(

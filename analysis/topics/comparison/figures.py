@@ -20,7 +20,7 @@ from coartic.analysis.optima import initial_reward
 from coartic.analysis.settings import compares_settings, name_in, shown_methods
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
-from coartic.analysis.words import in_brackets, marked, number
+from coartic.analysis.words import capital, in_brackets, marked, number
 from coartic.robot import Array
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
@@ -57,8 +57,10 @@ def gaps_to_optimum(study: Study) -> Parts:
         draw_group(axes, study, group, of_group, looks_in(study, rows.method))
     farthest = float(np.nanmax(percent[["gap", "high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
-    where = "" if rows.task.iloc[0] == scores.ALL_TASKS else f" on {rows.task.iloc[0]}"
-    panels[-1].set_xlabel(f"gap to the {scores.optimum_in_words(study)}{where} (%)")
+    name = rows.task.iloc[0]
+    to = f"to {scores.optimum_in_words(study).removesuffix(' reward')}"
+    where = to if name == scores.ALL_TASKS else f"on {study.tasks[name].label}"
+    panels[-1].set_xlabel(f"gap {where} (%)")
     alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
 
@@ -67,7 +69,7 @@ def draw_group(
     axes: Axes, study: Study, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]
 ) -> None:
     """Methods that know as much of the reward, nearest first."""
-    axes.set_title(f"{group[0].upper()}{group[1:]}")
+    axes.set_title(capital(group.removeprefix("using the ")))
     for place, row in enumerate(rows.to_dict("records")):
         color = looks[row["method"]]["color"]
         mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
@@ -102,19 +104,20 @@ def ecdf_of_runtimes(study: Study) -> Parts:
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
-    drawing, panels = style.figure_of((1, len(spends)), (style.TWO, 2.6), sharey=True)
+    looks = looks_in(study, data.method.unique())
+    size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
+    drawing, panels = style.figure_of((1, len(spends)), size)
     for axes, spend in zip(panels, spends, strict=True):
         of_spend = data[data.spend == spend]
-        draw_shares(axes, of_spend, looks_in(study, data.method), partial(name_in, study))
+        draw_shares(axes, of_spend, looks, partial(name_in, study))
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
         axes.set_ylabel("targets reached (%)")
-        axes.tick_params(labelleft=True)
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    last = zip(map(str, ends.method), ends.share, strict=True)
-    style.label_ends(panels[-1], {name_in(study, label): share for label, share in last}, 6.2)
+    entries = [style.entry(name_in(study, label), **look) for label, look in looks.items()]
+    style.legend(drawing, entries, 3)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
     return drawing, data, alt, study.tasks.values()

@@ -356,11 +356,11 @@ def answer_gain(study: Study) -> str:
     # Ticks by which the first movement is slower than the corrective process's.
     changes = study.trajectories(task, label).against_same_hands
     slower = len(changes) and changes[:, 0].mean() > 1
+    first = ", with a slower first movement" if slower else ""
     return (
         "Not tested here: it takes two tasks with the same first goals. "
         f"On {marked(study.tasks[task])} the {methods.name_of(label)} gets from "
-        f"{number(initial, 0)} to {number(learned, 0)} ticks"
-        f"{', with a slower first movement' if slower else ''}."
+        f"{number(initial, 0)} to {number(learned, 0)} ticks{first}."
         + failed_runs(study, [(task, label)], " and are not counted")
     )
 

@@ -11,8 +11,8 @@ from coartic.analysis.optima import gap_share, initial_reward
 from coartic.analysis.statistics.estimates import LEVEL, interval
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, other_tasks
-from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.study import Study, one_by_one, typical_run
+from coartic.analysis.table import SHORT_ID, Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.comparison import scores
 from coartic.analysis.topics.comparison.runtimes import (
@@ -207,13 +207,18 @@ def half_gain(initial: float, rewards: Array, trials: Array) -> float:
 
 @table(
     "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, told, "
-    "corrections, jacobians, movement_ticks, other_arm",
+    "corrections, jacobians, movement_ticks, other_arm, median_run",
 )
 def methods(study: Study) -> Rows:
-    """Every method on every task: reward, gap, hands and what a run spends."""
+    """Every method on every task: reward, gap, hands and what a run spends.
+
+    ``median_run``: beginning of the id of the run whose reward is nearest the median.
+    """
     for row in scores.scores(study).reset_index().to_dict("records"):
         task, label = row["task"], row["method"]
         if task in one_by_one(study):
             values = {str(name): value for name, value in row.items()}
-            values["task"] = marked(study.tasks[task])
-            yield f"{task} {label}", values | runs_of(study.cells[task, label])
+            values["task"], cell = marked(study.tasks[task]), study.cells[task, label]
+            if len(cell.good):
+                values["median_run"] = str(cell.good.run_id.iloc[typical_run(cell)])[:SHORT_ID]
+            yield f"{task} {label}", values | runs_of(cell)
