@@ -131,7 +131,7 @@ def test_half_of_the_goals_are_too_few():
     assert ensemble.rarely_supported([more, held])
     assert not ensemble.rarely_supported([more])
     assert not ensemble.rarely_supported([])
-    words = "121 of 242 (two-armed-1, refuted in 3); 122 of 242 (two-armed-2)"
+    words = "121 of 242 (Two-armed 1, refuted in 3); 122 of 242 (Two-armed 2)"
     assert ensemble.held_in_words([held, more]) == words
 
 

@@ -376,7 +376,7 @@ def test_a_small_study(small):
         for distance in (1, 2)
     )
     # What is planned for one goal at a time does not follow the next; one ahead, not the third.
-    for model in ("corrective process", "no goal ahead", "null-space control, this goal"):
+    for model in ("corrective process alone", "no goal ahead", "null-space control, current goal"):
         assert list(near[model].values()) == pytest.approx([0, 0], abs=1e-9)
     assert np.mean(list(near["one goal ahead"].values())) > 0.01
     assert list(far["one goal ahead"].values()) == pytest.approx([0, 0], abs=1e-9)

@@ -14,6 +14,8 @@ from typing import Any
 
 import pandas as pd
 
+from coartic import load_task
+
 
 @cache
 def held_by(claim: str) -> tuple[Any, ...]:
@@ -26,7 +28,7 @@ def held_by(claim: str) -> tuple[Any, ...]:
 
 
 def held_in_words(rows: Iterable[Any]) -> str:
-    """``231 of 242 (two-armed-1, refuted in 3)``, or that there is no count.
+    """``231 of 242 (Two-armed 1, refuted in 3)``, or that there is no count.
 
     There is none where all members were admitted by the claim, and where it takes other runs than
     the paper's conditions.
@@ -34,7 +36,7 @@ def held_in_words(rows: Iterable[Any]) -> str:
     parts = []
     for held in rows:
         refuted = f", refuted in {held.refuted}" if held.refuted else ""
-        parts.append(f"{held.supported} of {held.members} ({held.task}{refuted})")
+        parts.append(f"{held.supported} of {held.members} ({load_task(held.task).label}{refuted})")
     return "; ".join(parts) or "not counted"
 
 

@@ -156,7 +156,7 @@ class Display:
         text = f"{there} of {counted(progress.total, 'run')}, {progress.failed} failed"
         if not finished:
             seconds = (now - self._started) / (progress.done - 1) * (progress.total - there)
-            text += f", about {seconds:.0f} s left"
+            text += f", at least {seconds:.0f} s left"
         self.line(text)
 
     def line(self, text: str) -> None:

@@ -82,13 +82,13 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
         arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
         axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
         axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
-        next_goal = f"then goal {shared.goal + 1}\n({task.label.lower()})"
+        next_goal = f"then goal {shared.goal + 1}\n({task.label})"
         axes.annotate(next_goal, following, (5, 0), va="center", ha="left", **words)
         # The base's name stands on the side of the next goal.
         above = following[1] >= at[1]
         place = outline.mean(axis=0)[0], outline[:, 1].max() if above else outline[:, 1].min()
         axes.annotate(
-            f"base,\n{task.label.lower()}", place, (0, 3 if above else -3),
+            f"base,\n{task.label}", place, (0, 3 if above else -3),
             ha="center", va="bottom" if above else "top", **words,
         )  # fmt: skip
     axes.add_artist(Circle(at, radius, fill=False, edgecolor=style.INK, linewidth=1.1))

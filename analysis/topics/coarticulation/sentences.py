@@ -32,10 +32,14 @@ def answer(study: Study) -> str:
             f"({plural(shared.n, 'run')})."
         )
     elif found.seen:
-        of_runs = f"; {number(shared.spreads, 1)} SD of the runs{', ' + p if p else ''}"
         guesses = "" if placebo is None else f"; random guesses {number(placebo.apart, 2)}"
-        of_runs = "" if math.isnan(shared.spreads) else of_runs
-        text = f"Yes: {lie} (length units and rad{of_runs}{guesses})."
+        units = f"{apart} in length units and rad{guesses}"
+        sd = f"by {number(shared.spreads, 1)} standard deviations of the runs, "
+        sd = "" if math.isnan(shared.spreads) else sd
+        text = (
+            f"Yes: at the same goal {goal} the posture differs {sd}depending on the next goal "
+            f"({', '.join(filter(None, (p, units)))})."
+        )
     elif found.differ and placebo is None:
         text = (
             f"Undecided: {lie}, but there is no placebo to compare with. Add the method "
@@ -216,9 +220,9 @@ SIGNATURES = Section(
     table="signatures",
     note=(
         "Ticks are compared with those of the corrective process with the same hands. A first "
-        "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting"
-        " hand nearer: the share of the distance to its next goal that a hand covers while it "
-        "waits. The CSV file has tests against random guesses."
+        "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
+        "hand nearer: share of the way to its next goal that a hand covers while waiting. The CSV "
+        "file has tests against random guesses."
     ),
     single=True,
 )

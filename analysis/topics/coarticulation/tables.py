@@ -45,7 +45,7 @@ def contexts(study: Study) -> Rows:
         shared = TwoContexts(first, second, goal, hand)
         row: Row = {
             "method": label,
-            "place": f"goal {goal} of {task} and {against}",
+            "place": f"goal {goal} of {study.tasks[task].label} and {study.tasks[against].label}",
             "runs": int(group.n.max()),
             "distance": value.get("context distance"),
             "dependence": value.get("context dependence"),
@@ -87,7 +87,7 @@ def slopes(study: Study) -> Rows:
         steepest = by_joint.sort_values("value", key=abs).iloc[-1]
         row: Row = {
             "method": label,
-            "place": f"goal {goal} of {base}, goal {moving} moves",
+            "place": f"goal {goal} of {study.tasks[task].label}, goal {moving} moves",
             "goal": goal,
             "moving": moving,
             "kind": "anticipatory" if goal < moving else "carry-over",

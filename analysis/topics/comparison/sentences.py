@@ -14,7 +14,7 @@ from coartic.analysis.statistics.estimates import LEVEL, Estimate
 from coartic.analysis.study import CellKey, Study, cached, one_by_one
 from coartic.analysis.topics.comparison import runtimes, scores, tables
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import number, plural, two_figures
+from coartic.analysis.words import marked, number, plural, two_figures
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 LEVELS = {"trials_to_quarter": "a quarter", "trials_to_half": "half"}
@@ -139,7 +139,7 @@ def answer_nearest(study: Study) -> str:
     text = f"{who}, {gap_in_words(best)} away{as_declared(best)}."
     rank, learner = learner_among(by_trial)
     if rank > 1:
-        place = f"{ORDINALS[rank - 1]} of {len(by_trial)} algorithms"
+        place = f"{ORDINALS[rank - 1]} of {len(by_trial)} reward-only methods"
         text += f" The paper's learner is {place}, at {gap_in_words(learner)}."
     foreign = from_files(study)
     text += "".join(map(foreign_in_words, foreign[:3]))
@@ -262,7 +262,7 @@ def costs_by_task(study: Study, learner: str, rival: str) -> str:
     ours, theirs = (runtimes.trials_to_half(study, label) for label in (learner, rival))
     by_task = [
         f"{number(trials)} trials ({methods.name_of(rival)} {number(theirs[task])}) on "
-        f"{study.tasks[task].label}"
+        f"{marked(study.tasks[task])}"
         for task, trials in ours.items()
         if task in theirs and task in one_by_one(study)
     ]
@@ -302,11 +302,12 @@ def answer_runtimes(study: Study) -> str:
         return ""
     who = "" if rival is None else methods.name_of(rival.method)
     targets = "of the reward targets between initial solution and optimum"
-    if "trials_to_half" in ratios(study):
+    if at := ratios(study).get("trials_to_half"):
         ours, theirs = number(learner.trials_to_half), number(rival.trials_to_half)
+        more = f", {two_figures(at)} times fewer" if at > 1 else ""
         text = (
-            f"Half {targets} take the learner {ours} trials, {who} {theirs} (all tasks and runs "
-            "pooled)."
+            f"For half {targets} the learner needs {ours} trials, {who} {theirs}{more} (tasks and "
+            "runs pooled)."
         )
     else:
         beside = f", {who} {number(100 * rival.reached, 0)} %" if who else ""
@@ -323,7 +324,7 @@ def finding_of_learning(study: Study) -> str:
         return ""
     two_armed = any(len(task.hands) > 1 for task in tasks.values())
     conditions = " (EC1 with one arm, EC4 with two)" if two_armed else ""
-    after = [f"{two_figures(half[row])} trials on {task.label}" for row, task in tasks.items()]
+    after = [f"{two_figures(half[row])} trials on {marked(task)}" for row, task in tasks.items()]
     return (
         f"The learner{conditions} has made half of its own gain after about {', '.join(after)} "
         "(median run)."
@@ -356,8 +357,9 @@ def answer_gain(study: Study) -> str:
     changes = study.trajectories(task, label).against_same_hands
     slower = len(changes) and changes[:, 0].mean() > 1
     return (
-        f"On {study.tasks[task].label} the {methods.name_of(label)} gets from {number(initial, 0)} "
-        f"to {number(learned, 0)} ticks{', with a slower first movement' if slower else ''}."
+        "Not tested here: it takes two tasks with the same first goals. "
+        f"On {marked(study.tasks[task])} the {methods.name_of(label)} gets from "
+        f"{number(initial, 0)} to {number(learned, 0)} ticks{', with a slower first movement' if slower else ''}."
         + failed_runs(study, [(task, label)], " and are not counted")
     )
 
@@ -373,12 +375,11 @@ NEAREST = Section(
     figure="ranking",
     table="ranking",
     note=(
-        "Methods are grouped by what they are told and use of the reward: that of each trial "
-        "after making it, the formula, or nothing. Intervals are about other runs on these tasks."
-        " Better on, worse on: the number of tasks on which the mean reward differs significantly"
-        " from that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed "
-        "bootstrap tests that are corrected for the tasks of the method (table against-learner). "
-        "Empty: too few runs to tell."
+        "Methods are grouped by what they know about the reward: the value after each trial, its "
+        "formula, or nothing. Intervals describe new runs on the same tasks. Better on, worse on: "
+        "number of tasks on which the mean reward differs significantly from that of the paper's "
+        "learner (EC1 with one arm, EC4 with two), by two-tailed bootstrap tests, corrected for "
+        "the tasks of the method (table against-learner). Empty: too few runs to tell."
     ),
     single=True,
 )
@@ -392,9 +393,8 @@ RUNTIMES = Section(
     figure="runtimes",
     table="runtimes",
     note=(
-        "Kinematics: how often a method computes where the hand is in a posture, a cost of "
-        "computing that does not depend on the machine. ∞: not reached within the budget of "
-        "trials."
+        "Kinematics: number of forward-kinematics evaluations, a cost that is the same on every "
+        "machine. ∞: not reached within the budget of trials."
     ),
     single=True,
 )
@@ -407,7 +407,7 @@ LEARNING = Section(
     finding=finding_of_learning,
     figure="learning-curves",
     table="learning",
-    note="The gain is that on the initial solution. ∞: the run gains nothing.",
+    note="Gain: improvement over the initial solution. ∞: never improved.",
     single=True,
 )
 
@@ -418,8 +418,8 @@ METHODS = Section(
     caption="Reward, gap to the optimum, hands and what a run spends (medians)",
     table="methods",
     note=(
-        "Every method works on the same robot. Its movements are executed and scored by one "
-        "function, which it does not see. Times are seconds of solving."
+        "Every method works on the same robot. Its movements are scored by a function hidden from "
+        "the method. Times are seconds of solving."
     ),
     single=True,
 )

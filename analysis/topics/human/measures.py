@@ -264,7 +264,7 @@ def turn_at_goals(run: Trajectory) -> float:
 
 def turn_saved(study: Study, model: Model) -> ByTask:
     """Turn at goals under the corrective process alone less that of the model, on one arm."""
-    alone = unmoved_tasks(study, MODELS["corrective process"], 1)
+    alone = unmoved_tasks(study, MODELS["corrective process alone"], 1)
     return {
         task: turn_at_goals(alone[task].runs[0]) - np.mean([*map(turn_at_goals, runs.runs)])
         for task, runs in unmoved_tasks(study, model, 1).items()

@@ -256,7 +256,7 @@ def most_alternate(data: Data, label: str) -> Finding:
 
 @judges(
     "ec3-as-exhaustive",
-    test="exact: more than {majority:.0%} of the runs of condition 3 learn hands that are best "
+    test="exact: more than {majority:.0%} of the runs of EC3 learn hands that are best "
     "with the corrective process alone",
 )
 def ec3_as_exhaustive(data: Data) -> Finding:
@@ -337,7 +337,7 @@ def sequences_change(data: Data) -> Finding:
 
 @judges(
     "rail",
-    test="exact binomial tests under condition 3: with the base on its rail more than {most:.0%} "
+    test="exact binomial tests under EC3: with the base on its rail more than {most:.0%} "
     "of the runs have the commonest sequence, and with the base free fewer do",
 )
 def rail(data: Data) -> Finding:

@@ -106,7 +106,7 @@ def contexts_of(data: Data, label: str, *, replayed: bool = False) -> TwoContext
 
 @judges(
     "overall-reward",
-    test="one-tailed bootstrap tests on both tasks, condition 1 against the same learner with a "
+    test="one-tailed bootstrap tests on both tasks, EC1 against the same learner with a "
     "reward for each subtask, both by what they learned (noiseless replay): it earns more, and its "
     "first movement takes more than {ticks:g} tick longer",
 )
@@ -130,7 +130,7 @@ def overall_reward(data: Data) -> Finding:
     test="one-tailed bootstrap tests: from the learned posture of base and chosen arm the "
     "corrective process reaches the next goal more than {ticks:g} tick sooner than from the "
     "posture in which it would itself have hit the goal, and by more than in the placebos (the "
-    "best of random guesses; of condition 4 also the learner rewarded by subtask). The waiting arm "
+    "best of random guesses; of EC4 also the learner rewarded by subtask). The waiting arm "
     "is where it was before the movement. Mean over the goals of a run that others follow",
 )
 def arm_coarticulation(data: Data) -> Finding:

@@ -14,7 +14,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.topics.comparison.scores import best_condition
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.topics.paper.tables import beside_paper
-from coartic.analysis.words import capital, estimate, listed
+from coartic.analysis.words import capital, estimate, listed, marked
 
 MOST_CHANGES = 4
 """Tasks with changed hands that a sentence names."""
@@ -67,8 +67,9 @@ def finding_of_rewards(study: Study) -> str:
             off = Estimate(row["difference"], row["difference_low"], row["difference_high"])
             if off.low > 0 or off.high < 0:
                 condition = row["cell"].label.removeprefix(LEARNER)
+                task = marked(study.tasks[row["cell"].task])
                 words += (
-                    f" {condition} on {study.tasks[row['cell'].task].label} is {estimate(off, 1)} "
+                    f" {condition} on {task} is {estimate(off, 1)} "
                     "ticks from the printed mean: its interval leaves out 0, not corrected for the "
                     "number of rewards."
                 )
@@ -85,8 +86,8 @@ def finding_of_claims(study: Study) -> str:
     if mostly_undecided(entries):
         return (
             f"These runs do not decide {by_verdict['undecided']} of {judged} claims: tasks, "
-            "methods, runs or trials are missing. Only claims with runs are shown here; "
-            "tables/claims.csv lists all."
+            "methods, runs or trials are missing. Claims without runs are only in "
+            "tables/claims.csv."
         )
     if central := central_claims(entries):
         each = [
@@ -112,9 +113,10 @@ def answer(study: Study) -> str:
     by_verdict = counts(entries)
     judged = sum(by_verdict.values())
     if mostly_undecided(entries):
+        decided = judged - by_verdict["undecided"]
         words = (
-            f"These runs do not decide {by_verdict['undecided']} of {judged} claims; "
-            f"{supported(by_verdict)}."
+            f"Too little to judge the paper: {decided} of {judged} claims {is_or_are(decided)} "
+            f"decided, {supported(by_verdict)}."
         )
     elif central := central_claims(entries):
         if list(central) == ["supported"]:
@@ -174,15 +176,14 @@ def finding_of_hands(study: Study) -> str:
             before, most_frequent = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
             if before not in most_frequent:
                 change = f"{before} to {' or '.join(most_frequent)}"
-                changes.setdefault(change, []).append(task.label)
+                changes.setdefault(change, []).append(marked(task))
     changed = sum(map(len, changes.values()))
-    words = "Learning ends with other hands than the initial solution"
     if changed > MOST_CHANGES:
-        return f"{words} on {changed} of {tasks} tasks."
+        return f"On {changed} of {tasks} tasks the learner changes hands."
     if changed:
-        each = (f"{change} on {listed(where)}" for change, where in sorted(changes.items()))
-        return f"{words}: {'; '.join(each)}."
-    return "Learning keeps the hands of the initial solution."
+        each = (f"on {listed(where)} from {change}" for change, where in sorted(changes.items()))
+        return f"The learner changes hands: {'; '.join(each)}."
+    return "The learner keeps the hands of the initial solution."
 
 
 PUBLISHED = Section(

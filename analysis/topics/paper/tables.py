@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pandas as pd
@@ -122,7 +123,7 @@ def claims(study: Study) -> Rows:
             "statement": claim.statement + " †" * claim.fitted,
             "verdict": entry.verdict,
             "uncounted": claim.uncounted,
-            "evidence": entry.finding.evidence,
+            "evidence": with_names(entry.finding.evidence, study),
             "test": words_of_test(claim),
             "p_holm": entry.adjusted_p,
             "opposite_p_holm": entry.adjusted_opposite_p,
@@ -133,6 +134,13 @@ def claims(study: Study) -> Rows:
             "run_ids": " ".join(entry.run_ids),
         }
         yield claim.id, row
+
+
+def with_names(text: str, study: Study) -> str:
+    """A text with people's names of tasks in place of their ids."""
+    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
+    whole = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
+    return re.sub(whole, lambda found: study.tasks[found[1]].label, text)
 
 
 @cached
