@@ -91,10 +91,10 @@ def test_the_figure_plays_by_keyboard(opened):
     assert tick(page) == stopped
     page.keyboard.press("Tab")  # one tick back
     page.keyboard.press("Enter")
-    page.get_by_text(f"{stopped - 1} of").wait_for()
+    part(page, "count").get_by_text(f"{stopped - 1} of").wait_for()
     page.keyboard.press("Tab")  # one tick on
     page.keyboard.press("Enter")
-    page.get_by_text(f"{stopped} of").wait_for()
+    part(page, "count").get_by_text(f"{stopped} of").wait_for()
     page.keyboard.press("Tab")  # the slider
     page.keyboard.press("End")
     assert tick(page) > stopped
@@ -176,7 +176,7 @@ def test_the_address_holds_the_view(opened, address):
     page.evaluate("document.getElementById('runtimes').scrollIntoView()")
     page.wait_for_url("**tick%3D56**#runtimes")
     again = opened(link=page.url, reduced_motion="reduce")
-    again.get_by_text("56 of").wait_for()
+    part(again, "count").get_by_text("56 of").wait_for()
     assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
     again.wait_for_timeout(300)
     assert again.url == page.url

@@ -30,7 +30,11 @@ def opened(visited, address):
     return open_page
 
 
+DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
 def text(page, name):
+    page.evaluate(DRAWN)
     return page.locator(f"[data-is={name}]").inner_text()
 
 
@@ -42,6 +46,7 @@ def ticks(page, who):
 
 def settled(page):
     """Wait until nothing is to come."""
+    page.evaluate(DRAWN)
     page.wait_for_selector(".play[data-settled]")
     return page
 
