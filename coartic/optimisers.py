@@ -23,7 +23,6 @@ from coartic.method import (
     Information,
     Method,
     MethodError,
-    Outline,
     Parameters,
     Result,
     Session,
@@ -62,7 +61,12 @@ def explored_joints(
 
 
 def sequences_of(session: Session) -> list[str]:
-    """All hand sequences, the task's own first: a small budget may not reach the others."""
+    """All hand sequences, the task's own first: a small budget may not reach the others.
+
+    The task's own alone, where there are too many to try one by one.
+    """
+    if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
+        return [session.find_initial_hands()]
     letters = letters_of(sorted(session.hands))
     sequences = map("".join, itertools.product(letters, repeat=session.goals_count))
     return sorted(sequences, key=lambda hands: hands != session.initial_hands)
@@ -235,7 +239,8 @@ class OptimiserParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
-    """Hand sequence; by default the one with which the corrective process alone does best."""
+    """Hand sequence; by default the one with which the corrective process alone does best, or the
+    task's own where there are too many to try."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Of the bounds, length unit (base) and rad (joints)."""
 
@@ -248,12 +253,6 @@ class Optimiser(Method):
 
     told = TOLD
     Parameters = OptimiserParameters
-
-    def why_not(self, task: Outline) -> str | None:
-        """More hand sequences than can be tried one by one."""
-        if self.parameters.hands:
-            return None
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""
