@@ -16,6 +16,8 @@ _SPEC.loader.exec_module(make_findings)
     [
         "findings.md",
         "foreign.md",
+        "families.md",
+        "fourteen.md",
         "horizon.md",
         "human.md",
         "objectives.md",

@@ -15,6 +15,7 @@ from coartic.analysis.table import TABLES
 from coartic.analysis.topics import fourteen, horizon, objectives, stops, tasks
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
+from coartic.analysis.topics.families import hardness
 from coartic.analysis.topics.families import sentences as families
 from coartic.analysis.topics.human import findings as human
 from coartic.analysis.topics.paper import sentences as paper
@@ -36,6 +37,7 @@ SECTIONS: tuple[Section, ...] = (
     coarticulation.SIGNATURES,
     coarticulation.SLOPES,
     families.FAMILIES,
+    hardness.HARDNESS,
     families.EXPLORATION,
     horizon.HORIZON,
     fourteen.FOURTEEN,

@@ -218,7 +218,8 @@ def draw_horizon(study: Study) -> Parts:
             if group == "goals" and BEYOND not in set(rows.h):
                 rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
             rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
-            curve(axes, rows, color, 0.08 * number, str(name))
+            at = rows.h.map(PLACES.index) + 0.08 * number
+            curve(axes, at, rows, "gap", color=color, label=str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])
@@ -234,12 +235,12 @@ def draw_horizon(study: Study) -> Parts:
     return drawing, data, f"Gain of each goal ahead where it exists. {'; '.join(each)}.", ()
 
 
-def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -> None:
-    """Means by horizon with their intervals."""
-    places = rows.h.map(PLACES.index) + shift
-    line: Any = {"color": color, "marker": "o", "markersize": 3, "linewidth": 1.2}
-    axes.vlines(places, 100 * rows.gap_low, 100 * rows.gap_high, color=color, linewidth=0.9)
-    axes.plot(places, 100 * rows.gap, **line, label=name)
+def curve(axes: Axes, at: pd.Series, rows: pd.DataFrame, column: str, **line: Any) -> None:
+    """Means at some places with their intervals."""
+    axes.vlines(
+        at, 100 * rows[f"{column}_low"], 100 * rows[f"{column}_high"], line["color"], lw=0.9
+    )
+    axes.plot(at, 100 * rows[column], marker="o", markersize=3, linewidth=1.2, **line)
 
 
 def finding_of_horizon(study: Study) -> str:
