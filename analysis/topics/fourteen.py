@@ -108,6 +108,7 @@ def draw_fourteen(study: Study) -> Parts:
     labels = "gap (%)", "gain of a goal ahead (%)", "gain together (%)"
     for axes, label in zip(panels, labels, strict=True):
         axes.set_xlabel("goals ahead")
+        axes.set_xticks(range(0, 9, 2))
         axes.set_ylabel(label)
     panels[1].set_yscale("symlog", linthresh=1)
     panels[1].set_yticks([-1, 0, 1, 3, 10, 30], ["−1", "0", "1", "3", "10", "30"])
