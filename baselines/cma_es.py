@@ -31,8 +31,7 @@ from pydantic import Field
 
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.uninformed import Practice, UninformedParameters
-from coartic.method import Method, Outline, Result, Session
-from coartic.motion.initial import too_many_sequences
+from coartic.method import Method, Result, Session
 from coartic.optimisers import TOLD, sequences_of
 from coartic.robot import Array
 
@@ -93,10 +92,6 @@ class CMAES(Method):
     )
     told = TOLD
     Parameters = UninformedParameters
-
-    def why_not(self, task: Outline) -> str | None:
-        """The reason why there are too many sequences to try one by one, if there are."""
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
 
     def solve(self, session: Session) -> Result:
         """Search until the trials are used up; the solution is the best trial's."""

@@ -74,7 +74,12 @@ def explored_joints(
 
 
 def sequences_of(session: Session) -> list[str]:
-    """All hand sequences, the task's own first: a small budget may not reach the others."""
+    """All hand sequences, the task's own first: a small budget may not reach the others.
+
+    The task's own alone, where there are too many to try one by one.
+    """
+    if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
+        return [session.find_initial_hands()]
     letters = letters_of(sorted(session.hands))
     sequences = map("".join, itertools.product(letters, repeat=session.goals_count))
     return sorted(sequences, key=lambda hands: hands != session.initial_hands)
@@ -550,7 +555,7 @@ class OptimiserParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
     """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
-    best."""
+    best, or the task's own where there are too many to try."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Of the bounds, length unit (base) and rad (joints)."""
 
@@ -565,8 +570,8 @@ class Optimiser(Method):
     Parameters = OptimiserParameters
 
     def why_not(self, task: Outline) -> str | None:
-        """More hand sequences than can be tried one by one."""
-        if self.parameters.hands not in (None, ALL):
+        """Reason why the task has too many hand sequences to search all; None if it does not."""
+        if self.parameters.hands != ALL:
             return None
         return too_many_sequences(task.name, task.goals_count, len(task.hands))
 

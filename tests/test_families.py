@@ -38,6 +38,8 @@ PINNED = {
     "aligned/v1/i017": "df3a3cee4eea483f",
     "aligned/v1/d003": "c25cede53a58ee73",
     "aligned/v1/2027-041": "c79ebd38eb04e921",
+    "fourteen-one/v1/i017": "bad507514407bc5c",
+    "fourteen-two/v1/i017": "b39b17fca94fc804",
     "long/v1/i017": "0c274c3863f2febc",
     "long/v1/d003": "1e66e6a44e109d4d",
     "long/v1/2027-041": "66be010eeaecdab3",
@@ -50,16 +52,22 @@ PINNED = {
     "redundancy/v1/i017": "ec87099bc927fc54",
     "redundancy/v1/d003": "4f8a3750862c01aa",
     "redundancy/v1/2027-041": "d8b0ac44d016bd18",
+    "seven-one/v1/i017": "a5e8d899533de3da",
+    "seven-two/v1/i017": "66b839fbe0b33d6d",
     "two-armed/v1/i017": "b76d21c3df982a43",
     "two-armed/v1/d003": "261073742a1b5a7c",
     "two-armed/v1/2027-041": "d3a3670771eef97e",
 }
 RELEASED = {
     "aligned/v1": "1acc695728233543",
+    "fourteen-one/v1": "e6bf481eeacd2909",
+    "fourteen-two/v1": "ec4a64ca1632ce39",
     "long/v1": "bc600910c824b195",
     "neighbours/v1": "d156eebbc328aa7d",
     "one-armed/v1": "b8ab1125c46640e1",
     "redundancy/v1": "29dd33d58da81c12",
+    "seven-one/v1": "b76ebdb26328ea87",
+    "seven-two/v1": "7afcbda71649e45b",
     "two-armed/v1": "421fe30fedfb532a",
 }
 TEXT = """\

@@ -18,6 +18,8 @@ _SPEC.loader.exec_module(make_findings)
         "findings.md",
         "ahead.md",
         "foreign.md",
+        "families.md",
+        "fourteen.md",
         "horizon.md",
         "human.md",
         "objectives.md",

@@ -29,6 +29,7 @@ from typing import get_args
 # These register the claims that they judge.
 import coartic.analysis.topics.dose
 import coartic.analysis.topics.families.claims
+import coartic.analysis.topics.fourteen
 import coartic.analysis.topics.horizon
 import coartic.analysis.topics.objectives
 import coartic.analysis.topics.paper.claims

@@ -12,9 +12,19 @@ from coartic.analysis import topics
 from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.section import Section
 from coartic.analysis.table import TABLES
-from coartic.analysis.topics import dose, horizon, objectives, resist, settings, stops, tasks
+from coartic.analysis.topics import (
+    dose,
+    fourteen,
+    horizon,
+    objectives,
+    resist,
+    settings,
+    stops,
+    tasks,
+)
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
+from coartic.analysis.topics.families import hardness
 from coartic.analysis.topics.families import sentences as families
 from coartic.analysis.topics.human import findings as human
 from coartic.analysis.topics.paper import sentences as paper
@@ -37,8 +47,10 @@ SECTIONS: tuple[Section, ...] = (
     coarticulation.SIGNATURES,
     coarticulation.SLOPES,
     families.FAMILIES,
+    hardness.HARDNESS,
     families.EXPLORATION,
     horizon.HORIZON,
+    fourteen.FOURTEEN,
     stops.STOPS,
     dose.DOSE,
     resist.RESIST,

@@ -55,31 +55,45 @@ ENOUGH = 0.9
 
 
 @cached
+def plans_by_horizon(
+    study: Study,
+) -> dict[tuple[str, str, str], dict[int, tuple[float, CellRuns]]]:
+    """Length of what the planner made of every random task, and its cell, by goals ahead.
+
+    Keys are task, ``hands`` and ``costs``. Lengths are ticks; with costly joints the weighted path
+    length that was executed. All goals in view are as many as follow the first.
+    """
+    seen: dict[tuple[str, str, str], dict[int, tuple[float, CellRuns]]] = {}
+    for cell, parameters in random_tasks.solved_cells(study).get(random_tasks.RECEDING_HORIZON, ()):
+        task, costly = study.tasks[cell.task], parameters["costs"]
+        if task.family is None:
+            continue
+        length = -float(cell.rewards[0])
+        if costly != "none":
+            costs = joint_costs(task.robot, costly, parameters["cost_factor"])
+            (executed,) = study.trajectories(cell.task, cell.label).runs
+            length = float(segment_lengths(executed.configurations, costs).sum())
+        at = min(parameters["horizon"], len(task.goals) - 1)
+        seen.setdefault((cell.task, parameters["hands"], costly), {})[at] = length, cell
+    return seen
+
+
+@cached
 def gaps_by_horizon(study: Study) -> pd.DataFrame:
     """Gaps of the planner on every random task, a row for each: per cent of the shortest.
 
     Indexed by task, ``hands`` and ``costs``; columns :data:`HORIZONS`, missing where nothing was
     run and where the task has not so many goals ahead; ``ahead``: goals ahead at the first
     movement, four of five; ``cells`` behind the gaps by horizon. Of ticks, over the best known of
-    the task; with costly joints of the weighted path length that was executed, over the shortest
-    of all runs with the same costs.
+    the task; with costly joints over the shortest of all runs with the same costs.
     """
     references = instances.references if (instances := sample(study)) else {}
-    seen: dict[tuple[str, str, str], dict[int, tuple[float, CellRuns]]] = {}
-    for cell, parameters in random_tasks.solved_cells(study).get(random_tasks.RECEDING_HORIZON, ()):
-        if cell.task in references:
-            task, costly = study.tasks[cell.task], parameters["costs"]
-            length = -float(cell.rewards[0])
-            if costly != "none":
-                costs = joint_costs(task.robot, costly, parameters["cost_factor"])
-                (executed,) = study.trajectories(cell.task, cell.label).runs
-                length = float(segment_lengths(executed.configurations, costs).sum())
-            at = min(parameters["horizon"], len(task.goals) - 1)
-            seen.setdefault((cell.task, parameters["hands"], costly), {})[at] = length, cell
+    seen = plans_by_horizon(study)
     rows = {}
-    for (name, hands, costly), by_horizon in seen.items():
+    for (name, hands, costly), plans in seen.items():
         last = len(study.tasks[name].goals) - 1
         planned = seen.get((name, "planned", costly), {})
+        by_horizon = dict(plans)
         if hands == "optimal" and last in planned:  # with all goals in view it is the same plan
             by_horizon.setdefault(last, planned[last])
         lengths = {at: length for at, (length, _) in by_horizon.items()}
@@ -204,7 +218,8 @@ def draw_horizon(study: Study) -> Parts:
             if group == "goals" and BEYOND not in set(rows.h):
                 rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
             rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
-            curve(axes, rows, color, 0.08 * number, str(name))
+            at = rows.h.map(PLACES.index) + 0.08 * number
+            curve(axes, at, rows, "gap", color=color, label=str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])
@@ -220,12 +235,12 @@ def draw_horizon(study: Study) -> Parts:
     return drawing, data, f"Gain of each goal ahead where it exists. {'; '.join(each)}.", ()
 
 
-def curve(axes: Axes, rows: pd.DataFrame, color: str, shift: float, name: str) -> None:
-    """Means by horizon with their intervals."""
-    places = rows.h.map(PLACES.index) + shift
-    line: Any = {"color": color, "marker": "o", "markersize": 3, "linewidth": 1.2}
-    axes.vlines(places, 100 * rows.gap_low, 100 * rows.gap_high, color=color, linewidth=0.9)
-    axes.plot(places, 100 * rows.gap, **line, label=name)
+def curve(axes: Axes, at: pd.Series, rows: pd.DataFrame, column: str, **line: Any) -> None:
+    """Means at some places with their intervals."""
+    axes.vlines(
+        at, 100 * rows[f"{column}_low"], 100 * rows[f"{column}_high"], line["color"], lw=0.9
+    )
+    axes.plot(at, 100 * rows[column], marker="o", markersize=3, linewidth=1.2, **line)
 
 
 def finding_of_horizon(study: Study) -> str:

@@ -34,6 +34,7 @@ from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (
     INITIAL_POLICIES,
+    MOST_GOALS,
     Address,
     InitialPolicy,
     Task,
@@ -55,7 +56,7 @@ LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
 _PARTS = 1000  # of a unit of length, of a rad, of 1
 _STRUCTURE, _GEOMETRY = 0, 1  # what a block of the generator is for
 _LEAST_LINKS, _MOST_LINKS = 3, 8
-_LEAST_GOALS, _MOST_GOALS = 2, 8
+_LEAST_GOALS = 2
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
@@ -70,7 +71,7 @@ Thousandths = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
 Span = tuple[Thousandths, Thousandths]
 """From, to; every thousandth between as likely."""
-_Count = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=_MOST_GOALS)]
+_Count = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
 _Bases = tuple[Base, ...]
 

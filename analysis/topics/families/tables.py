@@ -207,4 +207,5 @@ def instance_gaps(study: Study) -> pd.DataFrame:
                  **mean, "instances": len(scores)}
                 for name, (runs,) in zip(names, scores, strict=True)
             ]  # fmt: skip
-    return pd.DataFrame(rows)
+    columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
+    return pd.DataFrame(rows, columns=columns)
