@@ -24,7 +24,7 @@ from coartic.motion.lanes import LANES, board, lanes_for, runs_for
 from coartic.motion.movement import Goal
 from coartic.motion.penalty import penalties_of_movements
 from coartic.motion.problem import arm_of
-from coartic.motion.reach import Batch, Reached, Requests, Setup, reach_goals
+from coartic.motion.reach import Batch, Requests, Setup, blank, reach_goals
 from coartic.motion.trials import Trials, hand_codes
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Hand, Robot
@@ -236,7 +236,6 @@ def step_robots(
     count = arms.bounds[groups]
     for p in range(count):
         aim(room.order[p], p, actions[room.order[p]], how, table, state, arms)
-        reached.ticks[p, 0] = reached.corrections[p, 0] = reached.iterations[p, 0] = 0
     asked = Requests(
         arms.starts, arms.hands, arms.targets, arms.stops, arms.bounds, arms.goals[:groups]
     )
@@ -489,9 +488,7 @@ class Arms:
             bounds=np.zeros(count + 1, np.int64),
             goals=np.zeros((count, 1, 2)),
         )
-        ends, counts = np.zeros((2, count, 1, dof)), np.zeros((4, count, 1), np.int64)
-        hit = np.zeros((count, 1), np.bool_)
-        self._reached = Reached(ends[0], hit, counts[0], ends[1], *counts[1:])
+        self._reached = blank(self._asked)
         lot = min(count, LANES)
         flags, widest = np.zeros((2, lot), np.bool_), Robot((1.0,) * links, (1.0,) * links)
         self._batch = Batch(runs_for(lot, widest), flags[0], flags[1], lanes_for(widest))

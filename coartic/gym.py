@@ -33,6 +33,7 @@ from coartic.motion.solution import execute
 from coartic.robot import BASE_DOF, Array, Hand
 from coartic.tasks.catalogue import load_task
 from coartic.tasks.families import load_family
+from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Address, Split, Task, as_task
 from coartic.text import unknown
 
@@ -551,16 +552,11 @@ def solve_all(tasks: Sequence[Task], method: Method, seed: int, model: MotionMod
 def best_known(tasks: Sequence[Task]) -> Array:
     """The best reward known of each task ``(K,)``; NaN where none is.
 
-    Of the shipped tasks those of ``analysis/optima.json``, of test instances those of the released
+    Of the shipped tasks those of ``tasks/optima.json``, of test instances those of the released
     results.
     """
-    optima = import_module("coartic.analysis.optima")
-    shipped = {
-        entry.essence: entry.reward
-        for entry in optima.entries()
-        if (entry.base, entry.other_arm) == (optima.BASE, "free")
-    }
-    known = {task.name: shipped.get(optima.essence(task)) for task in tasks}
+    shipped = {task.name: best_shipped(task) for task in tasks}
+    known = {name: None if entry is None else entry.reward for name, entry in shipped.items()}
     if any(known[task.name] is None and task.split == "test" for task in tasks):
         released = import_module("coartic.benchmarks.released")
         with released.results_folder(released.RELEASED, "families") as folder:
