@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
-from coartic.analysis.optima import entries
 from coartic.baselines.cma_es import Bandit
 from coartic.motion.initial import hand_sequences, initial_hands
 from coartic.motion.trials import make_trials
 from coartic.play.page import MODEL
+from coartic.tasks.optima import entries
 from tests.support.strategies import PAPER_CELLS, sample, solve, uneven_task
 
 NODE = shutil.which("node")

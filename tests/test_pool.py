@@ -68,7 +68,7 @@ HANDLED = {
     "forks_and_goes_on": ("os.fork(); return Result(corrected(session))", "ok", ""),
     "closes": ("os.closerange(3, 99); return Result(corrected(session))", "crashed", "exit code"),
     "is_a_pickle": ("session._rewards.append(Runs()); return Result(corrected(session))",
-                    "crashed", "Runs is not JSON serializable"),
+                    "crashed", "Runs"),
     "is_a_hand": ("return Result(corrected(session, Hand('right')))", "ok", ""),
     "counts_wrong": ("session._meter.trials = 10**30; return Result(corrected(session))",
                      "crashed", "counts what cannot be"),

@@ -127,7 +127,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
             store.write([run])
             assert store.count() == 1
         unlike = replace(run, scores={"solution": solution, "initial": solution})
-        with pytest.raises(CoarticError, match="EC4 cannot be stored: UNIQUE"):
+        with pytest.raises(CoarticError, match="cannot be stored: UNIQUE"):
             store.write([unlike])  # paths of two parts
     with open_store(tmp_path) as store:
         assert plain(store.run(run.key.id)) == plain(run)
