@@ -56,23 +56,31 @@ def in_this_process(monkeypatch):
 @pytest.fixture(scope="session")
 def traced(tmp_path_factory):
     """A results folder that nobody writes into: the paper's cells beside other methods."""
-    from tests.support.suites import run_and_write, traced_cells
+    from coartic.analysis.study import load
+    from tests.support.suites import made_once, run_and_write, traced_cells
 
-    return run_and_write(tmp_path_factory.mktemp("traced"), traced_cells(), runs=4, trials=150)
+    def make(folder):
+        run_and_write(folder, traced_cells(), runs=4, trials=150)
+
+    return load(made_once(tmp_path_factory, "traced", make))
 
 
 @pytest.fixture(scope="session")
 def report(traced, tmp_path_factory):
     """The folder of a report on those results, as a user gets it."""
     from coartic.analysis.report import build
+    from tests.support.suites import made_once
 
-    folder = tmp_path_factory.mktemp("traced-report") / "report"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "picture", lambda figure, ending: b"")  # drawn for the page already
-        patch.setattr(build, "visible_sections", lambda study: build.SECTIONS)  # all
-        patch.setattr(build, "mostly_undecided", lambda entries: False)
-        build.write_report(traced, folder, for_paper=False)
-    return folder
+    def make(folder):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(
+                build, "picture", lambda figure, ending: b""
+            )  # drawn for the page already
+            patch.setattr(build, "visible_sections", lambda study: build.SECTIONS)  # all
+            patch.setattr(build, "mostly_undecided", lambda entries: False)
+            build.write_report(traced, folder / "report", for_paper=False)
+
+    return made_once(tmp_path_factory, "traced-report", make) / "report"
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from coartic import (
     hand_sequences,
     load_task,
 )
+from coartic.analysis.study import load
 from coartic.analysis.topics.paper.tables import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
@@ -35,6 +36,7 @@ from tests.support.suites import (
     BROKEN,
     KNOWN,
     InProcess,
+    made_once,
     paper_cells,
     planned,
     run_and_write,
@@ -45,7 +47,10 @@ from tests.support.suites import (
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return run_and_write(tmp_path_factory.mktemp("results") / "deep" / "er")
+    def make(folder):
+        run_and_write(folder / "deep" / "er")
+
+    return load(made_once(tmp_path_factory, "results", make) / "deep" / "er")
 
 
 def test_every_method_runs_in_some_suite():

@@ -22,7 +22,7 @@ from coartic.benchmarks.suites import load_suite
 from coartic.tasks.task import Penalty, hands_of
 from tests.support import reference
 from tests.support.made_up import MadeUp, row, study_of
-from tests.support.suites import InProcess
+from tests.support.suites import InProcess, made_once
 
 SMALL = """
 title = "x"
@@ -46,12 +46,14 @@ PENALTIES = "penalties = [{ distinct = 100 }, { distinct = 300 }]"
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("objectives")
-    (folder / "own.toml").write_text(
-        SMALL + CELLS.replace("PENALTIES", "") + CELLS.replace("PENALTIES", PENALTIES)
-    )
-    run_suite(folder / "own.toml", folder / "results", executor=InProcess())
-    return load(folder / "results")
+    def make(folder):
+        folder.mkdir()
+        (folder / "own.toml").write_text(
+            SMALL + CELLS.replace("PENALTIES", "") + CELLS.replace("PENALTIES", PENALTIES)
+        )
+        run_suite(folder / "own.toml", folder / "results", executor=InProcess())
+
+    return load(made_once(tmp_path_factory, "objectives", make) / "results")
 
 
 def test_a_plan_is_scored_under_penalties_that_it_does_not_know(study):

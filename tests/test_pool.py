@@ -18,7 +18,7 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import Job
-from tests.support.suites import KNOWN, planned, run_and_write
+from tests.support.suites import KNOWN, made_once, planned, run_and_write
 
 METHODS = """
 import itertools, os, signal, sys, tempfile, time
@@ -120,21 +120,25 @@ def entries(folder, bodies):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("pool")
+    """Of runs in the same workers, then others, then this project's."""
+    task = load_task("ascending")
+
+    def make(folder):
+        folder.mkdir()
+        does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
+        cells = [Cell(task, does, {"what": name}) for name in HANDLED]
+        cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
+        run_and_write(
+            folder / "out", cells, executor=Local(2, wall_times=10), runs=1, time_limit_s=2.0,
+            trial_budget=3,
+        )  # fmt: skip
+
+    return made_once(tmp_path_factory, "pool", make)
 
 
 @pytest.fixture(scope="module")
 def runs(folder):
-    """In the same workers, then others, then this project's."""
-    task = load_task("ascending")
-    does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-    cells = [Cell(task, does, {"what": name}) for name in HANDLED]
-    cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
-    study = run_and_write(
-        folder / "out", cells, executor=Local(2, wall_times=10), runs=1, time_limit_s=2.0,
-        trial_budget=3,
-    )  # fmt: skip
-    return study.runs.set_index("label")
+    return load(folder / "out").runs.set_index("label")
 
 
 @pytest.mark.parametrize("name", HANDLED)

@@ -1,5 +1,7 @@
 """Suites run into folders, in this process where processes are not what is tested."""
 
+import contextlib
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -71,6 +73,22 @@ def run_and_write(folder, cells=None, *, executor=None, retry_failed=False, redo
     executor = executor or InProcess()
     perform(plan, folder, executor=executor, retry_failed=retry_failed, redo=redo)
     return load(folder)
+
+
+def made_once(tmp_path_factory, name, make):
+    """A folder that ``make`` fills, once for all workers of pytest: the others wait for it."""
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+    folder, made = root / name, root / f"{name}.made"
+    with open(root / f"{name}.lock", "w") as file:
+        with contextlib.suppress(ImportError):  # a system without it has one worker
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX)
+        if not made.exists():
+            make(folder)
+            made.touch()
+    return folder
 
 
 def same_results(a, b):
