@@ -51,8 +51,8 @@ speed: $(READY)
 release-check: $(READY)
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
 
-# The suites behind docs/findings.md, their reports, and the pages made from them: two and a
-# half hours.
+# The suites behind docs/findings.md, their reports, and the pages made from them: over three
+# hours.
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
