@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -175,16 +176,17 @@ def draw_resist(study: Study) -> Parts:
         raise missing(study, "no runs on tasks each of whose goals is moved")
     drawing, panels = style.figure_of((1, 2), (style.TWO, 2.8), sharey=True)
     labels = list(data.method[data.group == "all"])
-    looks = style.looks(labels)
+    colors = dict(zip(labels, itertools.cycle(style.PALETTE), strict=False))
     sizes = [group for group in dict.fromkeys(data.group) if group.endswith("links")]
     for axes, groups in zip(panels, (["all"], sizes), strict=True):
         for number, label in enumerate(labels):
             rows = data[(data.method == label) & data.group.isin(groups)].set_index("group")
             places = [groups.index(g) + 0.11 * (number - len(labels) / 2) for g in rows.index]
-            line: Any = {"color": looks[label]["color"], "label": name_of(label)}
-            axes.vlines(places, rows.beyond_low, rows.beyond_high, looks[label]["color"])
-            axes.plot(places, rows.beyond, "o", markersize=4, **line)
+            color = colors[label]
+            axes.vlines(places, rows.beyond_low, rows.beyond_high, color)
+            axes.plot(places, rows.beyond, "o", color=color, markersize=4, label=name_of(label))
         axes.axhline(0, color=style.GREY, linewidth=0.8)
+        axes.set_xlim(-0.5, len(groups) - 0.5)
         axes.set_xticks(range(len(groups)), [group.replace("all", "all tasks") for group in groups])
     panels[0].set_ylabel("correlation beyond chance")
     style.letters(panels)
