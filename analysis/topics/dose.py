@@ -259,35 +259,24 @@ SAVED = (
 )
 
 
-@judges("dose-saves", test=SAVED + "with γ = 1 more than {gain:g} point more than with γ = 0")
-def dose_saves(data: Data) -> Finding:
-    """The whole against none."""
-    return saves_more(data, (1.0, "all"), (0.0, "all"), MARGINS["gain"])
-
-
-@judges("half-a-dose-saves-less", test=SAVED + "with γ = 1 more than {gain:g} point more than 0.5")
-def half_a_dose_saves_less(data: Data) -> Finding:
-    """The whole against half."""
-    return saves_more(data, (1.0, "all"), (0.5, "all"), MARGINS["gain"])
-
-
-@judges(
-    "three-quarters-suffice",
-    test=SAVED + "with γ = 0.75 less than {gain:g} point less than with γ = 1",
-)
-def three_quarters_suffice(data: Data) -> Finding:
-    """Three quarters against the whole."""
-    return saves_more(data, (0.75, "all"), (1.0, "all"), -MARGINS["gain"])
-
-
-@judges(
-    "earlier-movements-count",
-    test=SAVED + "with γ = 1 more than {gain:g} point more where all movements count than where "
-    "later ones alone do",
-)
-def earlier_movements_count(data: Data) -> Finding:
-    """All movements against later ones."""
-    return saves_more(data, (1.0, "all"), (1.0, "later"), MARGINS["gain"])
+WHOLE, GAIN = (1.0, "all"), MARGINS["gain"]
+judges(
+    "dose-saves", SAVED + "with γ = 1 more than {gain:g} point more than with γ = 0",
+    more=WHOLE, less=(0.0, "all"), by=GAIN,
+)(saves_more)  # fmt: skip
+judges(
+    "half-a-dose-saves-less", SAVED + "with γ = 1 more than {gain:g} point more than 0.5",
+    more=WHOLE, less=(0.5, "all"), by=GAIN,
+)(saves_more)  # fmt: skip
+judges(
+    "three-quarters-suffice", SAVED + "with γ = 0.75 less than {gain:g} point less than with γ = 1",
+    more=(0.75, "all"), less=WHOLE, by=-GAIN,
+)(saves_more)  # fmt: skip
+judges(
+    "earlier-movements-count", SAVED + "with γ = 1 more than {gain:g} point more where all "
+    "movements count than where later ones alone do",
+    more=WHOLE, less=(1.0, "later"), by=GAIN,
+)(saves_more)  # fmt: skip
 
 
 @judges(
