@@ -144,9 +144,9 @@ def load_suite(name: str) -> Suite:
     if name.endswith(".toml"):
         return read_suite(Path(name))
     shipped = suites()
-    if (Path(name) / RUNS_FILE).is_file():
-        raise CoarticError(f"{name} is a results folder: coartic report {quote(name)}")
     if name not in shipped:
+        if (Path(name) / RUNS_FILE).is_file():
+            raise CoarticError(f"{name} is a results folder: coartic report {quote(name)}")
         hint = " A suite of your own is a file that ends in .toml." if os.sep in name else ""
         raise CoarticError(f"{unknown('suite', name, shipped)}{hint}")
     return shipped[name]

@@ -362,3 +362,12 @@ def test_the_example_of_a_command_has_options_that_there_are(command, example):
     known = get_command(app).commands[command.__name__.removesuffix("_")].params
     options = {name for parameter in known for name in parameter.opts}
     assert {word for word in example.split() if word.startswith("--")} <= options
+
+
+def test_a_results_folder_is_no_suite_but_may_have_the_name_of_one(coartic, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert coartic(*SMALL, "--methods", "EC1", "--out", "paper")[0] == 0
+    assert "1 run" in coartic(*SMALL, "--methods", "EC1", "--runs", 1, "--out", "again")[1]
+    code, _, error = coartic("run", "again")
+    assert code == 2
+    assert "again is a results folder: coartic report again" in error
