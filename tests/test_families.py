@@ -38,6 +38,9 @@ PINNED = {
     "aligned/v1/i017": "df3a3cee4eea483f",
     "aligned/v1/d003": "c25cede53a58ee73",
     "aligned/v1/2027-041": "c79ebd38eb04e921",
+    "eight/v1/i017": "7dd1266a67c6c0ae",
+    "eight/v1/d003": "fe32db1ce229687c",
+    "eight/v1/2027-041": "301760ae38388046",
     "long/v1/i017": "0c274c3863f2febc",
     "long/v1/d003": "1e66e6a44e109d4d",
     "long/v1/2027-041": "66be010eeaecdab3",
@@ -53,6 +56,7 @@ PINNED = {
 }
 RELEASED = {
     "aligned/v1": "1acc695728233543",
+    "eight/v1": "a4ae479c84df6039",
     "long/v1": "bc600910c824b195",
     "one-armed/v1": "b8ab1125c46640e1",
     "redundancy/v1": "29dd33d58da81c12",
