@@ -38,6 +38,7 @@ KEPT = {
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),
     "horizon": ("horizon horizon-signs claims", "horizon"),
+    "practice": ("practice claims", "practice"),
     "stops": ("stops claims", "stops"),
     "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),

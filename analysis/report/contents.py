@@ -12,7 +12,7 @@ from coartic.analysis import topics
 from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.section import Section
 from coartic.analysis.table import TABLES
-from coartic.analysis.topics import horizon, objectives, stops, tasks
+from coartic.analysis.topics import horizon, objectives, practice, stops, tasks
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.families import sentences as families
@@ -38,6 +38,7 @@ SECTIONS: tuple[Section, ...] = (
     families.FAMILIES,
     families.EXPLORATION,
     horizon.HORIZON,
+    practice.PRACTICE,
     stops.STOPS,
     objectives.OBJECTIVES,
     families.SIGNS,
