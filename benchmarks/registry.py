@@ -41,6 +41,7 @@ MODULES = (
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
     "coartic.baselines.believed_reward",
+    "coartic.baselines.practice",
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""

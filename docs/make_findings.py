@@ -37,6 +37,7 @@ KEPT = {
     "tuning": ("variants", ""),
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "fourteen": ("fourteen claims", "fourteen"),
+    "practice": ("practice claims", "practice"),
     "stops": ("stops claims", "stops"),
     "dose": ("dose claims", "dose"),
     "resist": ("resist claims", "resist"),

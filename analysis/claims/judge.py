@@ -34,6 +34,7 @@ import coartic.analysis.topics.horizon
 import coartic.analysis.topics.objectives
 import coartic.analysis.topics.paper.claims
 import coartic.analysis.topics.paper.coarticulation
+import coartic.analysis.topics.practice
 import coartic.analysis.topics.resist
 import coartic.analysis.topics.stops  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
