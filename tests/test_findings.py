@@ -24,6 +24,7 @@ _SPEC.loader.exec_module(make_findings)
         "human.md",
         "objectives.md",
         "paper.md",
+        "practice.md",
         "resist.md",
         "stops.md",
     ],
