@@ -177,7 +177,7 @@ def for_page(plot: Plot) -> PagePicture:
     figure.set_dpi(dpi)
     if not has_curves:
         figure.set_layout_engine("none")  # its file has the layout that it now has
-    text = stream.getvalue()
+    text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', in_hundredths, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
     styles = re.findall(
         rf'<g id="{CURVE}([^";]*);[^"]*">\n<path [^>]*style="(fill: none[^"]*)"', text
@@ -208,6 +208,11 @@ def for_page(plot: Plot) -> PagePicture:
         for box in boxes
     )
     return PagePicture(whole, pieces, tuple(curves.items()))
+
+
+def in_hundredths(attribute: re.Match[str]) -> str:
+    """An attribute of SVG whose lengths, in points, are cut to hundredths: a third of a page."""
+    return re.sub(r"(\.\d\d)\d+", r"\1", attribute[0])
 
 
 def coloured(text: str) -> str:
