@@ -23,7 +23,7 @@ from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import Selection, perform, plan_suite
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.suites import Cell, load_suite, select_cells
+from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
 from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.method import Information, Meter, Session
@@ -54,8 +54,8 @@ def results(tmp_path_factory):
 
 
 def test_every_method_runs_in_some_suite():
-    suites = map(load_suite, ("comparison", "ablations", "optimum", "horizon", "objectives"))
-    patterns = {pattern for suite in suites for block in suite.cells for pattern in block.methods}
+    blocks = [block for suite in suites().values() for block in suite.cells]
+    patterns = {pattern for block in blocks for pattern in block.methods}
     run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
     assert run == set(KNOWN)
 
