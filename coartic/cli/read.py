@@ -223,7 +223,9 @@ def cite(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            parser=folder_named, metavar="FOLDER", help="Results folder; without, all methods."
+            parser=folder_named,
+            metavar="FOLDER",
+            help="Results folder; without, all methods and the shipped results.",
         ),
     ] = None,
     analysis: Annotated[
@@ -233,12 +235,13 @@ def cite(
     """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
+    from coartic.benchmarks.released import released_hashes
     from coartic.runs.store import open_store
 
-    made_with = None
-    declared = built_in()
-    if folder is not None:
+    if folder is None:
+        text = bibliography(built_in(), analysis=analysis, released=released_hashes())
+    else:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
-    text = bibliography(declared, analysis=analysis, environment=made_with)
+        text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))
