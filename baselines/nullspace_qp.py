@@ -73,7 +73,7 @@ from coartic.tasks.task import beyond_reach, letters_of
 
 FACES = 16
 """Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
-HORIZON = 2
+GOALS_AHEAD = 2
 """Goals after the current one that have a posture under ``next-goal``."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
@@ -423,7 +423,7 @@ class NextGoal(NullspaceQP):
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """As many goals as the horizon has, with their hands."""
-        return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + HORIZON]
+        return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + GOALS_AHEAD]
 
 
 class Preshaping(NullspaceQP):

@@ -44,7 +44,7 @@ Mask = NDArray[np.bool_]
 Layers = dict[tuple[int, Hand], Array]
 """Postures ``(k, dof)`` with a hand at a goal (0-based)."""
 
-BATCH = 60
+PER_ROUND = 60
 """Postures generated in a round."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
@@ -166,7 +166,7 @@ class Neighbourhood(NamedTuple):
     promising: Array
     """Shape ``(goals, dof)``."""
     noise: Array
-    """Standard noise, shape ``(rounds, BATCH, goals, dof)``."""
+    """Standard noise, shape ``(rounds, PER_ROUND, goals, dof)``."""
 
 
 class PosturePlanner:
@@ -198,7 +198,7 @@ class PosturePlanner:
         noise = session.rng.standard_normal((parameters.stored, session.dof))
         self.store = np.vstack([session.q0, session.q0 + sds * noise * self.movable])
         # Weights of the better postures, best first: logarithmic in the rank.
-        better = math.ceil(BATCH / 4)
+        better = math.ceil(PER_ROUND / 4)
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
     def plans(self, options: list[list[HandSequence]]) -> list[GrowingPlan]:
@@ -255,8 +255,8 @@ class PosturePlanner:
         return range(goal, min(goal + self.horizon, len(self.goals)))
 
     def draw_noise(self, goals: range) -> Array:
-        """Standard noise for ``goals``, ``(rounds, BATCH, goals, dof)``."""
-        shape = self.rounds, BATCH, len(goals), self.session.dof
+        """Standard noise for ``goals``, ``(rounds, PER_ROUND, goals, dof)``."""
+        shape = self.rounds, PER_ROUND, len(goals), self.session.dof
         return self.session.rng.standard_normal(shape)
 
     def retrieve(self, plans: list[GrowingPlan], goals: range) -> list[Layers]:
@@ -346,8 +346,10 @@ class PosturePlanner:
     def correct_generated(
         self, start: Array, postures: Array, seeds: list[Neighbourhood], goals: range
     ) -> Mask:
-        """Correct generated postures ``(seeds, BATCH, goals, dof)`` in place; True, shape
-        ``(seeds, BATCH)``, where all hands are there. ``start`` has shape ``(seeds, 1, dof)``."""
+        """Correct generated postures ``(seeds, PER_ROUND, goals, dof)`` in place.
+
+        True, shape ``(seeds, PER_ROUND)``, where all hands are there. ``start`` has shape
+        ``(seeds, 1, dof)``."""
         accurate = np.ones(postures.shape[:2], bool)
         before = np.broadcast_to(start, (*postures.shape[:2], postures.shape[-1])).copy()
         for k, goal in enumerate(goals):

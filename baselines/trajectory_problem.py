@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 from coartic.method import Information
 from coartic.model import PAPER
 from coartic.motion.costs import joint_costs as costs_of
+from coartic.motion.costs import segment_lengths
 from coartic.motion.penalty import disc_centre
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Penalty, Task
@@ -127,8 +128,7 @@ class PathPlan:
 
     def lengths(self, q0: Array) -> Array:
         """Joint-space distances between successive configurations, shape ``(G,)``."""
-        steps = np.diff(np.vstack([q0, self.configurations]), axis=0)
-        return np.asarray(np.sqrt((steps**2).sum(axis=1)))
+        return segment_lengths(np.vstack([q0, self.configurations]))
 
 
 class TrajectoryProblem:

@@ -147,13 +147,13 @@ class Meter:
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
 """What a counter can hold where runs are stored."""
-_FAILED = -MOST_COUNT
+_NO_REWARD = -MOST_COUNT
 """Reward of a trial that failed, where rewards are kept."""
 
 
 def kept(rewards: Iterable[int | None]) -> array[int]:
     """Rewards of trials as a session keeps them, in 8 bytes each."""
-    return array("q", [_FAILED if reward is None else reward for reward in rewards])
+    return array("q", [_NO_REWARD if reward is None else reward for reward in rewards])
 
 
 @dataclass(frozen=True)
@@ -194,13 +194,38 @@ def outline_of(task: Task) -> Outline:
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
-class TaskView:
-    """What a method sees of its task. What has to be declared is noted as used."""
+class Session:
+    """One task, one seed, one meter: all that a method gets to work with.
 
-    def __init__(self, task: Task, told: Iterable[Information]) -> None:
+    The declaration is enforced and the calls are counted between honest parties: Python
+    has no walls, and who reaches for underscored names finds a way around both.
+    ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state what those spent. Trials that a process makes elsewhere than in
+    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        seed: int,
+        told: Iterable[Information],
+        *,
+        model: MotionModel = PAPER,
+        trial_budget: int | None = None,
+        trusted: bool = False,
+        of_run: bool = False,
+    ) -> None:
         self._task = task
         self._told = frozenset(told)
         self._used: set[Information] = set()
+        self.seed = seed
+        self.rng = np.random.default_rng(seed)
+        self.model = model
+        self._trusted = trusted
+        self._of_run = of_run
+        self._trial_budget = trial_budget
+        self._meter = Meter()
+        self._rewards = array("q")
 
     # Open to every method: what the robot is, not what the task wants of it.
 
@@ -260,7 +285,7 @@ class TaskView:
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Hand position as a CasADi expression. Needs ``kinematic model``.
 
-        What a solver evaluates of it is counted with :meth:`Session.spend`.
+        What a solver evaluates of it is counted with :meth:`spend`.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
@@ -291,38 +316,6 @@ class TaskView:
                     f"the method used {item.value!r}, which it does not declare (told: {told})"
                 )
             self._used.add(item)
-
-
-class Session(TaskView):
-    """One task, one seed, one meter: all that a method gets to work with.
-
-    The declaration is enforced and the calls are counted between honest parties: Python
-    has no walls, and who reaches for underscored names finds a way around both.
-    ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state what those spent. Trials that a process makes elsewhere than in
-    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
-    """
-
-    def __init__(
-        self,
-        task: Task,
-        seed: int,
-        told: Iterable[Information],
-        *,
-        model: MotionModel = PAPER,
-        trial_budget: int | None = None,
-        trusted: bool = False,
-        of_run: bool = False,
-    ) -> None:
-        super().__init__(task, told)
-        self.seed = seed
-        self.rng = np.random.default_rng(seed)
-        self.model = model
-        self._trusted = trusted
-        self._of_run = of_run
-        self._trial_budget = trial_budget
-        self._meter = Meter()
-        self._rewards = array("q")
 
     # Calls that are counted.
 
@@ -455,7 +448,7 @@ class Session(TaskView):
 
     def _count_batch(self, trials: Trials) -> None:
         """Count the trials of a batch and keep their rewards."""
-        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _FAILED)
+        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _NO_REWARD)
         spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
         self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
 
@@ -507,7 +500,7 @@ class Session(TaskView):
         meter.corrective_iterations += iterations
         meter.jacobians += iterations
         meter.forward_kinematics += evaluations
-        meter.failed_trials += rewards.count(_FAILED)
+        meter.failed_trials += rewards.count(_NO_REWARD)
         self._rewards.extend(rewards)
 
     @property
@@ -525,7 +518,7 @@ class Session(TaskView):
     @property
     def rewards(self) -> list[int | None]:
         """Reward of each trial made, in order; None where it failed."""
-        return [None if reward == _FAILED else reward for reward in self._rewards]
+        return [None if reward == _NO_REWARD else reward for reward in self._rewards]
 
     # What the method has to state itself.
 

@@ -30,7 +30,7 @@ from coartic.inputs import (
     FileData,
     brief_value,
     error_saying,
-    problems,
+    explain_file,
     read_toml,
     real_array,
 )
@@ -446,7 +446,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(problems(source, error, all_keys())) from None
+        raise TaskError(explain_file(source, error, all_keys())) from None
 
 
 def all_keys() -> list[str]:
