@@ -66,7 +66,7 @@ from coartic import Movement, Task
 from coartic.baselines.cascade import solve_cascade, state_cascade
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
-from coartic.motion.initial import changes_of_hand, too_many_sequences
+from coartic.motion.initial import changes_of_hand
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
 from coartic.tasks.task import beyond_reach, letters_of
@@ -319,8 +319,7 @@ class NullspaceQP(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to simulate, if there are."""
-        every = self.parameters.hands == "every"
-        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
+        return task.too_many_sequences if self.parameters.hands == "every" else None
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """``goal`` (0-based), and the goals that are prepared for on the way there."""

@@ -37,7 +37,6 @@ from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.compiled import chain_by, entry, joint_lever
-from coartic.motion.initial import too_many_sequences
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]
@@ -102,8 +101,7 @@ class PostureBased(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to plan one by one, if there are."""
-        every = self.parameters.hands == "every"
-        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
+        return task.too_many_sequences if self.parameters.hands == "every" else None
 
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""

@@ -147,7 +147,7 @@ class Subtask(NamedTuple):
     target: Array
     """Where the arms moved to, shape ``(N, dof)``."""
     reached: tuple[Reached, ...]
-    """Of both postures in the head, and of the movement."""
+    """What came of both postures in the head, and of the movement."""
 
 
 def trial(

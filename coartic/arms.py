@@ -144,8 +144,10 @@ def nearer_hand(i: int, robots: Any) -> int:
 
 
 @inlined
-def aim(i: int, p: int, action: Any, options: Any, table: Any, robots: Any, arms: Any) -> None:
-    """Write what an action says into the requests."""
+def write_request(
+    i: int, p: int, action: Any, options: Any, table: Any, robots: Any, arms: Any
+) -> None:
+    """Write what an action says into the request of a robot."""
     row, q, target = robots.rows[i], robots.q[i], arms.targets[p, 0]
     hand, first = table.hands[row.task, row.goal], 1 if options.chooses else 0
     if options.chooses:
@@ -230,7 +232,7 @@ def step_robots(
     groups = sort_rows(kind, which, table, robots, arms)
     count = arms.bounds[groups]
     for p in range(count):
-        aim(robots.order[p], p, actions[robots.order[p]], options, table, robots, arms)
+        write_request(robots.order[p], p, actions[robots.order[p]], options, table, robots, arms)
     asked = Requests(
         arms.starts, arms.hands, arms.targets, arms.stops, arms.bounds, arms.goals[:groups]
     )

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 MOST_CELLS = 10_000
-"""Of a suite: sixty times the largest one shipped."""
+"""Most cells of a suite: sixty times the largest one shipped."""
 MOST_RUNS = 1_000_000
-"""Of a cell."""
+"""Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Of a run: a thousand times the paper's; their rewards are kept."""
+"""Most trials of a run: a thousand times the paper's; their rewards are kept."""
 MOST_SECONDS = 1_000_000
-"""Of a run: eleven days; the system's clocks of waiting end at twice that."""
+"""Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
 MOST_SEED = 2**63 - 1
 MOST_BYTES = 10_000_000
-"""Of a file of tasks, suites or methods: a hundred times the largest one shipped."""
+"""Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
@@ -155,7 +155,7 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """The same as part of a sentence."""
+    """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
     return "; ".join(plain(explain_problem(detail, keys)) for detail in causes(error)[:_SHOWN])
 
 

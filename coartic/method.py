@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
-from coartic.motion.initial import search_initial_hands
+from coartic.motion.initial import search_initial_hands, too_many_sequences
 from coartic.motion.outside import inside, note_trials
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.motion.trials import Bench, HandSequences, Trials, check_targets, hand_codes
@@ -151,8 +151,8 @@ _NO_REWARD = -MOST_COUNT
 """Reward of a trial that failed, where rewards are kept."""
 
 
-def kept(rewards: Iterable[int | None]) -> array[int]:
-    """Rewards of trials as a session keeps them, in 8 bytes each."""
+def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
+    """Pack rewards of trials as a session keeps them, in 8 bytes each."""
     return array("q", [_NO_REWARD if reward is None else reward for reward in rewards])
 
 
@@ -164,9 +164,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method wants kept beside it, as plain data. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Of a learner: its first trial, if that hit every goal. Its movements follow no paths."""
+    """A learner's first trial, if that hit every goal. Its movements follow no paths."""
     replay: tuple[Movement, ...] = ()
-    """Of a learner: one greedy trial, without noise, with what it has learned. No paths either."""
+    """A learner's greedy trial, without noise, with what it has learned. No paths either."""
     bound: int | None = None
     """Reward that no solution exceeds, where proven; for searches of this project."""
 
@@ -175,7 +175,7 @@ class Outline(NamedTuple):
     """What a method is told of a task to say whether it applies."""
 
     name: str
-    """Of the task, for the sentence."""
+    """Name of the task, for the sentence."""
     goals_count: int
     dof: int
     hands: tuple[Hand, ...]
@@ -187,6 +187,11 @@ class Outline(NamedTuple):
     def initial_is_policy(self) -> bool:
         """Whether it is a policy."""
         return self.initial_hands in INITIAL_POLICIES
+
+    @property
+    def too_many_sequences(self) -> str | None:
+        """Why the hand sequences cannot all be tried one by one; None where they can."""
+        return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
 def outline_of(task: Task) -> Outline:
@@ -371,7 +376,7 @@ class Session:
             with inside(self._of_run):
                 execution = execute(self._task, solution, model=self.model)
         spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
-        self._count(kept([execution.reward]), *spent)
+        self._count(pack_rewards([execution.reward]), *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
             return execution
         return replace(
@@ -414,9 +419,9 @@ class Session:
 
     def _affordable(self, count: int) -> int:
         """How many of so many trials the budget has. Raises BudgetError where it has none."""
-        if self._trial_budget is None:
+        left = self.trials_left
+        if left is None:
             return count
-        left = self._trial_budget - self._meter.trials
         if left <= 0 < count:
             raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
         return min(count, left)
@@ -468,7 +473,7 @@ class Session:
         )
         penalty = self._bench.penalty(codes, reached)
         reward = -(ticks + penalty) if completed else None
-        self._count(kept([reward]), ticks, corrections, iterations, evaluations)
+        self._count(pack_rewards([reward]), ticks, corrections, iterations, evaluations)
         return reward
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -573,7 +578,7 @@ class Session:
         """Rewards of the trials of a compiled method of this project, and its time for them: of
         the runs of a batch, each has its share."""
         self._needs_trust("record")
-        self._rewards.extend(kept(rewards))
+        self._rewards.extend(pack_rewards(rewards))
         self._meter.solve_s += solve_s
 
     def _needs_trust(self, name: str) -> None:

@@ -553,7 +553,7 @@ class OptimiserParameters(Parameters):
     """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
     best, or the task's own where there are too many to try."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
-    """Of the bounds, length unit (base) and rad (joints)."""
+    """Half the width of the bounds, length unit (base) and rad (joints)."""
 
 
 class Optimiser(Method):
@@ -567,9 +567,7 @@ class Optimiser(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """Reason why the task has too many hand sequences to search all; None if it does not."""
-        if self.parameters.hands != ALL:
-            return None
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
+        return task.too_many_sequences if self.parameters.hands == ALL else None
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""

@@ -148,7 +148,7 @@ class Family(FileData):
     restrictions: _Bases = ()
     """Bases, beside its own, under which every instance can be done."""
     radius: Thousandths = 100
-    """Of every goal, length unit."""
+    """Radius of every goal, length unit."""
     region: Region
     """Where goals are: table ``[region]``."""
     line: Alignment | None = None
