@@ -155,6 +155,8 @@ def load_suite(name: str) -> Suite:
 def read_suite(path: Path) -> Suite:
     """A suite from its file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
+    if "goals" in content and "cells" not in content:
+        raise CoarticError(f"{path} is a task, not a suite: run a suite with --task-file {path}")
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
@@ -319,10 +321,7 @@ def cells_of_block(
     suite: Suite, block: Block, registered: Registry, user_tasks: Mapping[str, Task]
 ) -> Iterator[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
-    for name in block.methods:
-        if name not in registered and name != WILDCARD:
-            raise CoarticError(unknown(f"method of suite {suite.name!r}", name, registered))
-    methods = registered if WILDCARD in block.methods else block.methods
+    methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
     for name in block.task_names(user_tasks):
         if block.move is not None and WILDCARD in block.tasks and name in user_tasks:
             continue
@@ -336,7 +335,7 @@ def cells_of_block(
             variants = [with_penalty(suite, v, p) for v in variants for p in block.penalties]
         for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
-            if reason is not None and WILDCARD not in (*block.methods, *block.tasks):
+            if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
                 raise CoarticError(f"suite {suite.name!r}: {reason}")
             if reason is not None:
                 continue  # "all that applies"
