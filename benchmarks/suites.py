@@ -24,7 +24,7 @@ from coartic.inputs import (
     FileData,
     brief_value,
     error_saying,
-    problems,
+    explain_file,
     read_toml,
 )
 from coartic.learner.conditions import METHOD_PREFIX
@@ -164,7 +164,7 @@ def read_suite(path: Path) -> Suite:
             *(*Suite.model_fields, *Block.model_fields),
             *(*Move.model_fields, *Penalty.model_fields),
         ]
-        raise CoarticError(problems(str(path), error, keys)) from None
+        raise CoarticError(explain_file(str(path), error, keys)) from None
 
 
 def select_cells(
