@@ -54,13 +54,7 @@ import numba  # noqa: E402
 from numba import njit, types  # noqa: E402
 from numba.core.caching import FunctionCache  # noqa: E402
 from numba.core.codegen import get_host_cpu_features  # noqa: E402
-from numba.core.registry import cpu_target  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
-
-# What Numba knows it lists when it first compiles, or loads machine code. Workers are forked from
-# a process that has done so.
-cpu_target.typing_context.refresh()
-cpu_target.target_context.refresh()
 
 _KEPT_S = 30 * 24 * 3600.0
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
@@ -178,7 +172,8 @@ class MachineCode(FunctionCache):
     def load(self, *wanted: Any) -> Any:
         """The code of a signature, or None."""
         try:
-            return super().load_overload(*wanted)
+            # Not load_overload, which first lists all that Numba could compile.
+            return self._load_overload(*wanted)
         except Exception:  # an unpickler may say anything
             with contextlib.suppress(OSError):
                 self.flush()
