@@ -54,6 +54,7 @@ import numba  # noqa: E402
 from numba import njit, types  # noqa: E402
 from numba.core.caching import FunctionCache  # noqa: E402
 from numba.core.codegen import get_host_cpu_features  # noqa: E402
+from numba.core.registry import cpu_target  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
 
 _KEPT_S = 30 * 24 * 3600.0
