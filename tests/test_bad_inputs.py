@@ -98,7 +98,7 @@ METHODS = [
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
     (method("title = ", ""), "title must be a text"),
-    (method('"a"', '"a b"'), "name 'a b' may have letters"),
+    (method('"a"', '"a b"'), "the name 'a b' must begin"),
     (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
     (method('"a"', '"cma-es/every"'), "'cma-es/every' is already taken"),
     (method("frozenset()", '"goals"'), "told must be a set of Information"),
