@@ -22,7 +22,7 @@ from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.reader import Reader, cards_of_module
 from coartic.errors import CoarticError
 from coartic.inputs import check_file
-from coartic.learner.conditions import METHOD_PREFIX
+from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX, VARIANTS
 from coartic.method import Method
 from coartic.runs.card import BUILT_IN, READERS, MethodCard, card_of, methods_in
 from coartic.runs.plan import SEARCH
@@ -96,6 +96,10 @@ def current_code(where: str, name: str) -> str:
 def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) -> None:
     """Add methods by id. Raises CoarticError for an id that is reserved or taken."""
     for card in cards:
+        if card.name in CONDITIONS | VARIANTS:
+            raise CoarticError(
+                f"{card.origin}: method id {card.name!r} is a condition of the paper's learner"
+            )
         if card.name.startswith(RESERVED):
             raise CoarticError(
                 f"{card.origin}: method id {card.name!r} is reserved: ids that begin with "

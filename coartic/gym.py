@@ -432,6 +432,8 @@ def score(
     _, names = make_arms(1, **given)
     tasks = [load_task(name) for name in names] or [as_task(given["task"])]
 
+    found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
+
     def robots(each: int) -> Arms:
         arms, _ = make_arms(each * len(tasks), **given)
         for row in range(each * len(tasks)):
@@ -440,6 +442,14 @@ def score(
         return arms
 
     first = robots(1)
+    entries = first.observation_space.shape
+    for name, each in found.items():
+        learned_on = getattr(getattr(each, "observation_space", None), "shape", entries)
+        if learned_on != entries:
+            raise ValueError(
+                f"{name} was trained on observations of shape {learned_on}; "
+                f"those of {env if isinstance(env, str) else 'this environment'} have {entries}"
+            )
     model = first.model
     rng = np.random.default_rng(seed)
     best = best_known(tasks) if model == PAPER else np.full(len(tasks), np.nan)
@@ -447,7 +457,6 @@ def score(
     alone = [
         corrective_trial(task, each, model=model) for task, each in zip(tasks, hands, strict=True)
     ]
-    found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
     rewards = {
         name: solve_all(tasks, each, seed, model)
         if isinstance(each, Method)

@@ -41,7 +41,7 @@ def test_others_stand_beside_it(mine):
     alone = corrective_trial(TASK, "RR").reward
     learned = np.mean([run.reward for run in runs])
     assert beside.reward.tolist() == [mine.reward, learned, alone, mine.reward]
-    assert beside.better_by.tolist() == [0, mine.reward - learned, mine.reward - alone, 0]
+    assert beside.this_is_better_by.tolist() == [0, mine.reward - learned, mine.reward - alone, 0]
     assert beside.runs.tolist() == [1, 2, 1, 1]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
-from coartic.analysis.methods import LEARNER
+from coartic.analysis.methods import CONDITIONS
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.published import RUNS
 from coartic.analysis.words import RECONSTRUCTED, listed, marked

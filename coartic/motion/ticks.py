@@ -195,8 +195,8 @@ class Trajectory:
         -------
         DataFrame
             A row for this movement and for each other one: ``reward`` (of the learner the mean
-            learned reward), ``better_by`` (ticks by which this movement is better), ``hands`` (of
-            the learner those of its best run) and ``runs``.
+            learned reward), ``this_is_better_by`` (ticks by which this movement is better),
+            ``hands`` (of the learner those of its best run) and ``runs``.
 
         Raises
         ------
@@ -243,7 +243,7 @@ class Trajectory:
                 names = [*CONDITIONS, "corrective process", "optimum"]
                 raise CoarticError(unknown("movement", str(other), names))
         frame = pd.DataFrame.from_dict(rows, orient="index", columns=["reward", "hands", "runs"])
-        frame.insert(1, "better_by", self.reward - frame.reward)
+        frame.insert(1, "this_is_better_by", self.reward - frame.reward)
         return frame
 
 
