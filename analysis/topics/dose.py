@@ -168,9 +168,8 @@ def draw_dose(study: Study) -> Parts:
                 axes.axhline(rows[name].iloc[0], color=color, linestyle=dash, label=words)
                 continue
             places = rows.dose + 0.01 * (counted == "later")
-            if name in MEASURES:
-                axes.vlines(places, rows[f"{name}_low"], rows[f"{name}_high"], color, linewidth=0.8)
-            axes.plot(places, rows[name], "o", ls=dash, color=color, markersize=3.5, label=words)
+            line: Any = {"color": color, "linestyle": dash, "markersize": 3.5, "label": words}
+            style.means(axes, places, rows, name, **line)
         axes.set_ylabel(MEASURES.get(name, "postures apart"))
         axes.set_xlabel("γ")
     style.letters(panels)
@@ -206,11 +205,7 @@ def learned_at(data: Data, name: str, dose: float = math.nan, counted: str = "al
     frame = dose_values(data.study)
     guesses = math.isnan(dose)
     kept = frame.dose.isna() if guesses else (frame.dose == dose) & (frame.counted == counted)
-    tasks = {task: data.task(task) for task in frame.task}
-    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
-    rows = frame[kept & frame.task.isin(drawn)]
-    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
-    return by_task(rows, name)
+    return by_task(random_tasks.judged(data, frame[kept]), name)
 
 
 @judges(

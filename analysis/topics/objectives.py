@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -236,9 +235,9 @@ def draw_objectives(study: Study) -> Parts:
             axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
         for who, (words, color, dash) in WHO.items():
             rows = data[(data.term == term) & (data.who == who)]
-            line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
-            axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
-            axes.plot(rows.weight, rows.regret, **line, label=words.removeprefix("the "))
+            line: Any = {"color": color, "linestyle": dash}
+            label = words.removeprefix("the ")
+            style.means(axes, rows.weight, rows, "regret", **line, label=label)
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("regret (%)")
     style.letters(panels)
@@ -307,7 +306,11 @@ for _claim, (_first, _second, _weight, _terms) in CLAIMED.items():
         _claim,
         test="one-tailed bootstrap tests over random tasks that the first regrets less than the "
         "second by more than {regret:g} % of the best known reward",
-    )(partial(less_regret, first=_first, second=_second, weight=_weight, terms=_terms))
+        first=_first,
+        second=_second,
+        weight=_weight,
+        terms=_terms,
+    )(less_regret)
 
 
 OBJECTIVES = Section(

@@ -35,13 +35,13 @@ KEYS = ["who", "practice", "ahead"]
 
 
 @cached
-def gaps(study: Study) -> pd.DataFrame:
+def practice_values(study: Study) -> pd.DataFrame:
     """Gaps to the best known of each random task, per cent, a row for each solved cell.
 
     Columns ``who``, ``practice`` (trials, 0 without), ``ahead``, ``agent``, ``task``, ``goals``,
     ``gap``, ``cell``. Empty without agents.
     """
-    references = instances.references if (instances := sample(study)) else {}
+    references = sample(study).references
     cells, rows = random_tasks.solved_cells(study), []
     for method, who in WHOSE.items() if next(iter(WHOSE)) in cells else ():
         for cell, asked in cells.get(method, ()):
@@ -104,7 +104,7 @@ def practice(study: Study) -> Rows:
 
     ``best_agent``, ``worst_agent``: means of single agents. ``gain``: of the last goal in view.
     """
-    frame = gaps(study)
+    frame = practice_values(study)
     groups: Any = frame.groupby(KEYS, sort=False)
     for (who, trials, ahead), rows in groups:
         by_agent = of(frame, who, trials, ahead) / 100
@@ -136,17 +136,18 @@ def draw_practice(study: Study) -> Parts:
         raise missing(study, "no agents that have practised")
     drawing, (left, right) = style.figure_of((1, 2), (style.TWO, 2.8), sharey=True)
     counts, views = [0, *sorted(agents.practice.unique())], [*map(str, AHEAD), "all"]
+    line: Any = {"scale": 100, "bars": 0.9}
     for color, ahead in zip(style.PALETTE, AHEAD, strict=False):
         rows = agents[agents.h == str(ahead)].sort_values("practice")
         rows = pd.concat([data[data.who == UNPRACTISED], rows])
-        curve(
-            left, rows, [counts.index(n) + 0.06 * ahead for n in rows.practice], color, str(ahead)
-        )
-        single = of(gaps(study), AGENTS, counts[-1], ahead).mean()
+        places = [counts.index(n) + 0.06 * ahead for n in rows.practice]
+        style.means(left, places, rows, "gap", color=color, label=str(ahead), **line)
+        single = of(practice_values(study), AGENTS, counts[-1], ahead).mean()
         right.plot([ahead + 0.15] * len(single), single, ".", color=style.BLUE, markersize=3)
     last = agents[agents.practice == counts[-1]]
     for rows, color, name in ((last, style.BLUE, "agents"), (planner, style.VERMILLION, "planner")):
-        curve(right, rows, list(map(views.index, rows.h)), color, name)
+        places = list(map(views.index, rows.h))
+        style.means(right, places, rows, "gap", color=color, label=name, **line)
     left.set_xticks(range(len(counts)), [f"{n:,}".replace(",", " ") for n in counts])
     left.set_xlabel("trials of practice")
     left.set_ylabel("gap (%)")
@@ -160,17 +161,11 @@ def draw_practice(study: Study) -> Parts:
     return drawing, data, f"Gaps by practice and goals ahead. {'; '.join(each)}.", ()
 
 
-def curve(axes: Any, rows: pd.DataFrame, places: list[float], color: str, name: str) -> None:
-    """Means with their intervals."""
-    axes.vlines(places, 100 * rows.gap_low, 100 * rows.gap_high, color=color, linewidth=0.9)
-    axes.plot(places, 100 * rows.gap, color=color, marker="o", markersize=3, label=name)
-
-
 def finding_of_practice(study: Study) -> str:
     """Gaps without and with a goal ahead after all practice, and what further goals gain."""
     data = practice(study)
     try:
-        silent = why_silent(gaps(study))
+        silent = why_silent(practice_values(study))
     except MissingError:
         return ""
     if silent:
@@ -199,21 +194,6 @@ def over_agents(values: pd.Series) -> Estimate:
 Part = tuple[str, pd.DataFrame, float, int]
 """A sentence with a place for a mean, values by task and agent, a bound, and 1 where their mean
 should be above it, -1 below."""
-
-
-def finding(parts: list[Part]) -> Finding:
-    """The finding of a claim: over tasks and over agents means are on the side they should."""
-    tests: dict[int, list[Estimate]] = {1: [], -1: []}
-    seen = []
-    for sentence, values, bound, sign in parts:
-        by_task, by_agent = values.mean(axis=1), values.mean()
-        for side, estimates in tests.items():
-            estimates += [random_tasks.over_tasks(side * sign * by_task, side * sign * bound)]
-            estimates += [over_agents(side * sign * (by_agent - bound))]
-        single = f"agents {number(by_agent.min(), 2)} to {number(by_agent.max(), 2)}"
-        seen.append(f"{sentence.format(estimate(mean(by_task), 2))} ({single})")
-    holds = all(test.value > 0 for test in tests[1])
-    return Finding(holds, f"{capital('; '.join(seen))}.", tuple(tests[1]), tuple(tests[-1]))
 
 
 def of_agents(frame: pd.DataFrame, first: tuple[int, int], second: tuple[int, int]) -> pd.DataFrame:
@@ -264,15 +244,25 @@ def stays_behind(frame: pd.DataFrame) -> list[Part]:
     return [(words[h], behind_planner(frame, h), MARGINS["gain"], 1) for h in words]
 
 
-def judge(data: Data, *, parts: Any) -> Finding:
-    """A claim on tasks that methods were not tuned on. Raises MissingError where the agents have
-    not learned."""
-    frame = gaps(data.study)
-    frame = frame[[data.task(name).split != "development" for name in frame.task]]
-    data.run_ids.extend(run for cell in frame.cell for run in cell.good.run_id)
+def judge_parts(data: Data, *, parts: Any) -> Finding:
+    """Whether over tasks and over agents the means of some parts are on the side they should.
+
+    Raises MissingError where the agents have not learned.
+    """
+    frame = random_tasks.judged(data, practice_values(data.study))
     if silent := why_silent(frame):
         raise MissingError(f"the agents have not learned: {silent}")
-    return finding(parts(frame))
+    tests: dict[int, list[Estimate]] = {1: [], -1: []}
+    seen = []
+    for sentence, values, bound, sign in parts(frame):
+        by_task, by_agent = values.mean(axis=1), values.mean()
+        for side, estimates in tests.items():
+            estimates += [random_tasks.over_tasks(side * sign * by_task, side * sign * bound)]
+            estimates += [over_agents(side * sign * (by_agent - bound))]
+        single = f"agents {number(by_agent.min(), 2)} to {number(by_agent.max(), 2)}"
+        seen.append(f"{sentence.format(estimate(mean(by_task), 2))} ({single})")
+    holds = all(test.value > 0 for test in tests[1])
+    return Finding(holds, f"{capital('; '.join(seen))}.", tuple(tests[1]), tuple(tests[-1]))
 
 
 for claim, parts, words in (
@@ -290,7 +280,7 @@ for claim, parts, words in (
      "than {gain:g} points than that of the planner that sees as much"),
 ):  # fmt: skip
     test = f"one-tailed tests over random tasks (bootstrap) and over agents (Student): {words}"
-    judges(claim, test, parts=parts)(judge)
+    judges(claim, test, parts=parts)(judge_parts)
 
 
 PRACTICE = Section(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.claims.data import MissingError
+from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.statistics.estimates import FEWEST, Estimate, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
@@ -34,6 +34,18 @@ def solved_cells(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, Any]]
             parameters = json.loads(str(cell.good.parameters.iloc[0]))
             cells.setdefault(cell.method, []).append((cell, parameters))
     return cells
+
+
+def judged(data: Data, rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table on random tasks that methods were not tuned on, as a claim reads them.
+
+    Columns ``task`` and ``cell``, whose runs are the claim's.
+    """
+    tasks = {name: data.task(name) for name in rows.task}
+    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
+    rows = rows[rows.task.isin(drawn)]
+    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
+    return rows
 
 
 def over_tasks(values: pd.Series, margin: float = 0.0) -> Estimate:

@@ -145,8 +145,7 @@ def draw_stops(study: Study) -> Parts:
         line: Any = {"color": color, "linestyle": dash, "marker": marker, "markersize": 3.5}
         places = part.stop + 0.008 * number
         for axes, name in zip(panels, ("nearer", "turn"), strict=True):
-            axes.vlines(places, part[f"{name}_low"], part[f"{name}_high"], color, linewidth=0.8)
-            axes.plot(places, part[name], **line, label=f"{group}: {cost}, {words}")
+            style.means(axes, places, part, name, **line, label=f"{group}: {cost}, {words}")
     panels[0].set_ylabel("next goal nearer (ticks)")
     panels[1].set_ylabel("turn at goals (rad)")
     for axes, title in zip(panels, ("posture", "velocity"), strict=True):
@@ -187,11 +186,7 @@ def next_goal_nearer(data: Data, timing: str, stop: int) -> pd.Series:
     rows = stop_values(data.study)
     asked = [STOPPING, timing, stop, 1]
     rows = rows[(rows[KEYS[1:]] == asked).all(axis=1)]
-    tasks = {name: data.task(name) for name in rows.task}
-    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
-    rows = rows[rows.task.isin(drawn)]
-    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
-    return rows.set_index("task").nearer.astype(np.float64)
+    return random_tasks.judged(data, rows).set_index("task").nearer.astype(np.float64)
 
 
 @judges(

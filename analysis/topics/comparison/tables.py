@@ -131,7 +131,7 @@ def variants(study: Study) -> Rows:
             row[f"on {task}"] = scores.run_gaps(study, task, label).mean()
         by_family: dict[str, list[Runs]] = {}
         for task, label in labels.items():
-            of_instance = instances.gap(task, label) if instances else None
+            of_instance = instances.gap(task, label)
             if of_instance is not None:
                 by_family.setdefault(str(study.tasks[task].family), []).append((of_instance,))
         row["instances"] = sum(map(len, by_family.values()))

@@ -19,7 +19,7 @@ MOST_GAPS = 4
 def finding_of_families(study: Study) -> str:
     """How far the nearest methods end from the best known reward, over families with two arms."""
     instances = sample(study)
-    if instances is None:
+    if not instances.references:
         return ""
     families = len(instances.families)
     where = "1 family" if families == 1 else f"{families} families"
