@@ -37,9 +37,9 @@ _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
 SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
-CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
+COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
-PAPER = "#ffffff"
+BACKGROUND = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""
 CURVE = "curve:"

@@ -19,7 +19,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import horizon, random_tasks
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.topics.families.tables import family_runs, instance_gaps
-from coartic.analysis.words import plural
+from coartic.analysis.words import interval_in_words, plural
 
 MANY = "fourteen-one/v1", "fourteen-two/v1"
 """Families with fourteen goals."""
@@ -84,7 +84,7 @@ def fourteen(study: Study) -> Rows:
     "fourteen",
     "Sequences of fourteen goals",
     "Means over random tasks with fourteen goals, for one arm and for two, with their "
-    f"{style.CONFIDENCE} intervals (bootstrap over tasks). (a) Gap to the best known solution by "
+    f"{style.COVERAGE} intervals (bootstrap over tasks). (a) Gap to the best known solution by "
     "goals ahead; dotted: learner, dash-dotted: CMA-ES. (b) What each goal ahead gains at a "
     "movement that has it, in per cent of a mean movement; linear below 1 %. (c) Gains together, "
     "with fourteen goals and with seven (open): on each other if a horizon is a number of goals; "
@@ -101,7 +101,7 @@ def draw_fourteen(study: Study) -> Parts:
         line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
         for axes, column in zip(panels, ("gap", "gain", "together"), strict=True):
             style.means(axes, rows.h, rows, column, **line, label=name)
-        empty = line | {"label": f"{name}, seven", "markerfacecolor": style.PAPER}
+        empty = line | {"label": f"{name}, seven", "markerfacecolor": style.BACKGROUND}
         style.means(panels[2], seven.h, seven, "together", **empty)
         for method, dash in (("dual-process", "dotted"), ("cma-es", "dashdot")):
             for gap in rows.gap[rows.method.str.startswith(method)]:
@@ -126,7 +126,7 @@ def finding_of_fourteen(study: Study) -> str:
     data, seen = fourteen(study), []
     for arms, family in zip(ARMS, MANY, strict=True):
         rows = data[(data.family == family) & data.h.between(1, 4)].to_dict("records")
-        gains = [random_tasks.interval_in_words(row, "gain", scale=100) for row in rows]
+        gains = [interval_in_words(row, "gain", scale=100) for row in rows]
         if gains:
             seen.append(f"{', '.join(gains)} with {arms} ({plural(rows[0]['tasks'], 'task')})")
     start = "Of fourteen goals the first ones ahead gain, in per cent of a mean movement that has "

@@ -20,7 +20,7 @@ from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.words import plural
+from coartic.analysis.words import interval_in_words, plural
 from coartic.motion.costs import joint_costs, segment_lengths
 from coartic.tasks.task import MOST_GOALS
 
@@ -194,7 +194,7 @@ PLACES = [str(h) for h in HORIZONS]
 @figure(
     "horizon",
     "Gap of a planner by how far it looks ahead",
-    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    f"Gap to the best known solution, mean over random tasks with its {style.COVERAGE} interval "
     "(bootstrap over tasks), linear below 1 %, at horizons that all of a line's tasks have. By "
     "goals of the task: a line ends where all goals are in view. Given hands: hands chosen by each "
     "plan, or those of the plan with all goals. Dear joints cost three times as much, by weighted "
@@ -238,10 +238,10 @@ def finding_of_horizon(study: Study) -> str:
     by_h = data[data.group == "all"].set_index("h").to_dict("index")
     if not {"0", "1"} <= by_h.keys():
         return ""
-    gaps = [random_tasks.interval_in_words(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
+    gaps = [interval_in_words(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
     names = {"2": "the second gains", "3": "the third gains", "4": "the fourth gains"}
     further = [
-        f"{words} {random_tasks.interval_in_words(by_h[h], 'gain', ' %', scale=100)} "
+        f"{words} {interval_in_words(by_h[h], 'gain', ' %', scale=100)} "
         f"({plural(by_h[h]['tasks'], 'task')})"
         for h, words in {**names, BEYOND: "the others together gain"}.items()
         if h in by_h and not math.isnan(by_h[h]["gain"])

@@ -17,7 +17,7 @@ from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED, TAILS
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
-from coartic.analysis.words import capital, estimate, number
+from coartic.analysis.words import capital, estimate, interval_in_words, number
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
@@ -210,7 +210,7 @@ def crossings(study: Study) -> Rows:
     "objectives",
     "Regret by how wrong a planner's objective is",
     "Regret under the true reward, which loses a penalty of this weight beside 1 a tick: mean over "
-    f"random tasks with its {style.CONFIDENCE} interval (bootstrap over tasks), in per cent of the "
+    f"random tasks with its {style.COVERAGE} interval (bootstrap over tasks), in per cent of the "
     "best known reward. Bands: the interval of the weight at which the learner (blue) and CMA-ES "
     "(green), which are told nothing, overtake the planner of ticks. Horizontally by the square "
     "root.",
@@ -263,7 +263,7 @@ def finding_of_objectives(study: Study) -> str:
         f"learner {', '.join(f'{number(regret, 1)} %' for regret in regrets.learner)}."
     )
     overtakes = [
-        f"{random_tasks.interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
+        f"{interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
         for row in crossings(study).to_dict("records")
         if row["who"] == "learner"
     ]

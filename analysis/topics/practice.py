@@ -20,7 +20,7 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.words import capital, estimate, number
+from coartic.analysis.words import capital, estimate, interval_in_words, number
 
 AGENTS, PLANNER, UNPRACTISED = "agents", "planner", "corrective process"
 WHOSE = {
@@ -123,7 +123,7 @@ def practice(study: Study) -> Rows:
 @figure(
     "practice",
     "What practice on other tasks gains, by goals ahead",
-    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    f"Gap to the best known solution, mean over random tasks with its {style.COVERAGE} interval "
     "(bootstrap over tasks). a: agents that see 0 to 4 goals ahead, by trials of practice; 0 is "
     "the corrective process. b: by goals ahead, agents after all practice (dots: single ones) "
     "beside the planner.",
@@ -174,7 +174,7 @@ def finding_of_practice(study: Study) -> str:
         data.loc[f"{AGENTS} {ALL_TRIALS} h={h}"].to_dict() for h in (0, 1, 2, 4)
     )
     words = [
-        random_tasks.interval_in_words(row, name, " %", scale=100)
+        interval_in_words(row, name, " %", scale=100)
         for row, name in ((none, "gap"), (one, "gap"), (two, "gain"), (four, "gain"))
     ]
     return (
@@ -191,9 +191,9 @@ def over_agents(values: pd.Series) -> Estimate:
     return Estimate(float(values.mean()), p=p, n=(len(values),))
 
 
-Part = tuple[str, pd.DataFrame, float, int]
-"""A sentence with a place for a mean, values by task and agent, a bound, and 1 where their mean
-should be above it, -1 below."""
+Sides = list[tuple[str, pd.DataFrame, float, int]]
+"""Of each part a sentence with a place for a mean, values by task and agent, a bound, and 1 where
+their mean should be above it, -1 below."""
 
 
 def of_agents(frame: pd.DataFrame, first: tuple[int, int], second: tuple[int, int]) -> pd.DataFrame:
@@ -201,28 +201,28 @@ def of_agents(frame: pd.DataFrame, first: tuple[int, int], second: tuple[int, in
     return (of(frame, AGENTS, *first) - of(frame, AGENTS, *second)).dropna()
 
 
-def gains_more(frame: pd.DataFrame) -> list[Part]:
+def gains_more(frame: pd.DataFrame) -> Sides:
     """Practice with two goals ahead against none."""
     two, none = (of_agents(frame, (EARLY, h), (ALL_TRIALS, h)) for h in (2, 0))
     words = "practice gains {} points more with two goals ahead than with none"
     return [(words, (two - none).dropna(), 0.0, 1)]
 
 
-def gains_longer(frame: pd.DataFrame) -> list[Part]:
+def gains_longer(frame: pd.DataFrame) -> Sides:
     """The last three quarters with four goals ahead against none."""
     four, none = (of_agents(frame, (LATER, h), (ALL_TRIALS, h)) for h in (4, 0))
     words = "the last three quarters gain {} points more with four goals ahead than with none"
     return [(words, (four - none).dropna(), 0.0, 1)]
 
 
-def lengthens(frame: pd.DataFrame) -> list[Part]:
+def lengthens(frame: pd.DataFrame) -> Sides:
     """Goals beyond the first ahead, after practice against early on."""
     after, before = (of_agents(frame, (trials, 1), (trials, 4)) for trials in (ALL_TRIALS, EARLY))
     words = "the second to fourth goals ahead gain {} points more after practice"
     return [(words, (after - before).dropna(), 0.0, 1)]
 
 
-def first_most(frame: pd.DataFrame) -> list[Part]:
+def first_most(frame: pd.DataFrame) -> Sides:
     """Goals beyond the first ahead after practice, and the first against them."""
     first, further = (
         of_agents(frame, (ALL_TRIALS, fewer), (ALL_TRIALS, more))
@@ -234,7 +234,7 @@ def first_most(frame: pd.DataFrame) -> list[Part]:
     ]
 
 
-def stays_behind(frame: pd.DataFrame) -> list[Part]:
+def stays_behind(frame: pd.DataFrame) -> Sides:
     """Agents against the planner that sees as much, with two goals or more."""
     words = {
         2: "with two goals ahead agents are {} points behind",

@@ -16,7 +16,7 @@ from coartic.analysis.statistics.estimates import FEWEST, Estimate, interval, me
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row
-from coartic.analysis.words import capital, estimate, in_brackets, number
+from coartic.analysis.words import capital, estimate
 from coartic.robot import Array
 
 RECEDING_HORIZON = "receding-horizon"
@@ -81,11 +81,3 @@ def mean_or_nan(values: Sequence[float] | Array) -> float:
     there = np.asarray(values, dtype=np.float64)
     there = there[~np.isnan(there)]
     return float(there.mean()) if len(there) else math.nan
-
-
-def interval_in_words(
-    row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
-) -> str:
-    """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
-    value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
-    return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()

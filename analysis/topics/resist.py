@@ -21,6 +21,7 @@ from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
+from coartic.analysis.words import interval_in_words
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
@@ -151,7 +152,7 @@ def resist(study: Study) -> Rows:
     "Do goals whose posture resists also impose theirs?",
     "Rank correlation over the inner goals of a task between resistance (how little the posture "
     "follows a neighbouring goal that moves) and aggression (how much the neighbours' postures "
-    f"follow this goal), beyond chance: mean over random tasks with its {style.CONFIDENCE} "
+    f"follow this goal), beyond chance: mean over random tasks with its {style.COVERAGE} "
     "interval. Of tongues it is highly positive. a: all tasks, b: by the number of links.",
 )
 def draw_resist(study: Study) -> Parts:
@@ -185,8 +186,7 @@ def finding_of_resist(study: Study) -> str:
     data = resist(study)
     rows = data[data.group == "all"].to_dict("records")
     parts = [
-        f"{name_of(row['method'])} {random_tasks.interval_in_words(row, 'beyond', digits=2)}"
-        for row in rows
+        f"{name_of(row['method'])} {interval_in_words(row, 'beyond', digits=2)}" for row in rows
     ]
     if not parts:
         return ""

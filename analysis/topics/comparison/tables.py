@@ -15,7 +15,7 @@ from coartic.analysis.study import Study, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.comparison import scores
-from coartic.analysis.topics.comparison.runtimes import (
+from coartic.analysis.topics.comparison.running_times import (
     budget_for,
     cells_compared,
     running_times,

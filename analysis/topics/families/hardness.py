@@ -17,8 +17,8 @@ from coartic.analysis.statistics.correlations import rank_correlation_estimate
 from coartic.analysis.statistics.estimates import interval
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, table
-from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
+from coartic.analysis.words import interval_in_words
 from coartic.robot import BASE_DOF
 
 FEATURES = "goals", "way between goals", "turns", "spare joints"
@@ -80,7 +80,7 @@ def hardness(study: Study) -> Rows:
     "What makes a task hard, and for whom",
     "(a) Tasks by number of goals and mean way between them, of an arm's reach: which families can "
     "tell what. (b) Rank correlation of features of tasks and the gap of each method, over all "
-    f"tasks, with {style.CONFIDENCE} intervals: to the right, more of it makes a task harder.",
+    f"tasks, with {style.COVERAGE} intervals: to the right, more of it makes a task harder.",
 )
 def draw_hardness(study: Study) -> Parts:
     """Features by family, and their correlations with gaps."""
@@ -118,7 +118,7 @@ def finding_of_hardness(study: Study) -> str:
     most = data.sort_values("correlation").drop_duplicates("feature", keep="last").sort_index()
     seen = [
         f"{row['feature']}, {name_of(row['method'])} "
-        f"{random_tasks.interval_in_words(row, 'correlation', digits=2)}"
+        f"{interval_in_words(row, 'correlation', digits=2)}"
         for row in most.to_dict("records")
     ]
     words = f"Over {data.tasks.max()} random tasks gaps go most with (rank correlations): "

@@ -9,7 +9,7 @@ from functools import cached_property
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.methods import CONDITIONS, PLACEBO, most_exploring
+from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.optima import KnownOptimum, gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
@@ -158,7 +158,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     """
     by_cell = {}
     for name in sample(study).references:
-        for label in (*CONDITIONS, PLACEBO):
+        for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.trajectories(name, label)

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import (
-    CONDITIONS,
     EC1,
     EC2,
     EC3,
     EC4,
     INITIAL,
+    LEARNERS,
     PLACEBO,
     is_variant,
     name_of,
@@ -30,7 +30,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.families.sample import THERE, Sample, sample, scores_of
 from coartic.robot import Array
 
-Part = TypeVar("Part")
+OfFamily = TypeVar("OfFamily")
 CONTRASTS = (
     (EC2, INITIAL),
     (EC1, INITIAL),
@@ -117,7 +117,7 @@ def told_apart(first: Array, second: Array) -> bool:
     return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
-def each_and_all(by_family: dict[str, Part]) -> Iterator[tuple[str, dict[str, Part]]]:
+def each_and_all(by_family: dict[str, OfFamily]) -> Iterator[tuple[str, dict[str, OfFamily]]]:
     """Every family by itself, and ``all`` of them where there are several."""
     for family, part in by_family.items():
         yield family, {family: part}
@@ -169,7 +169,7 @@ def exploration(study: Study) -> Rows:
 def family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
     instances = sample(study)
-    for label, sign in itertools.product((*CONDITIONS, PLACEBO), THERE):
+    for label, sign in itertools.product((*LEARNERS, PLACEBO), THERE):
         for family, scores in each_and_all(scores_of(instances, label, sign)):
             means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]
             row: Row = {
