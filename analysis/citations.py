@@ -60,6 +60,19 @@ def software(made_with: Mapping[str, Any] | None = None) -> str:
     )
 
 
+def results_of_version(released: Mapping[str, str]) -> str:
+    """The results that this version ships in BibTeX, each suite with the SHA-256 of its file."""
+    files = ", ".join(f"{suite}.sqlite.xz {digits}" for suite, digits in released.items())
+    return misc(
+        "coartic-results",
+        author="{The coartic developers}",
+        title=escaped(f"Results of coartic {__version__}: suites {' and '.join(released)}"),
+        year="2026",
+        howpublished="Data shipped with the software",
+        note=escaped(f"SHA-256: {files}"),
+    )
+
+
 def behind_analysis() -> tuple[str, ...]:
     """Keys of the works behind signatures and statistics."""
     from coartic.analysis.signatures.register import REGISTER  # with all that measures them
@@ -73,6 +86,7 @@ def bibliography(
     *,
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
+    released: Mapping[str, str] | None = None,
 ) -> str:
     """BibTeX for the software, the paper and the methods, each work once.
 
@@ -80,10 +94,14 @@ def bibliography(
     built-in ones without a row in ``methods.toml``, there is no more than the citation that they
     declare: it is printed as a comment and as the note of a ``@misc``. With ``analysis`` the
     works behind statistics and signatures follow. ``environment`` is a results folder's, for
-    :func:`software`.
+    :func:`software`; ``released`` are suites and SHA-256 of the results that this version ships.
     """
     works = {**references(), "coartic": software(environment)}
-    reasons: dict[str, list[str]] = {"coartic": ["the software"], THE_PAPER: ["the paper"]}
+    reasons: dict[str, list[str]] = {"coartic": ["the software"]}
+    if released:
+        works["coartic-results"] = results_of_version(released)
+        reasons["coartic-results"] = ["the results that this version ships"]
+    reasons[THE_PAPER] = ["the paper"]
     others = []
     for name, method in methods.items():
         row = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None

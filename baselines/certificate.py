@@ -42,7 +42,7 @@ from coartic.motion.initial import too_many_sequences
 from coartic.robot import HANDS, Array, Hand
 
 _TOLERANCE = 1e-6  # of a bound, length unit: rounding is far below
-_APART = 16  # hand sequences that are bounded one by one: few are proven sooner so
+_FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
 _HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
 
 
@@ -179,7 +179,7 @@ class ProofSearch:
             return
         goals = len(self._task.goals)
         sequences: list[PartialSequence] = [(None,) * goals]
-        if len(self._robot_hands) ** goals <= _APART:
+        if len(self._robot_hands) ** goals <= _FEW_SEQUENCES:
             sequences = list(itertools.product(self._robot_hands, repeat=goals))
         for hands in sequences:
             box = self.relaxation(hands, ()).first_box(self.longest(0))

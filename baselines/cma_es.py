@@ -30,7 +30,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic.baselines.evolution import EvolutionStrategy
-from coartic.baselines.uninformed import Practice, UninformedParameters
+from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
 from coartic.optimisers import TOLD, sequences_of
 from coartic.robot import Array
@@ -46,15 +46,15 @@ class BanditParameters(UninformedParameters):
 class Strategy:
     """CMA-ES over the targets of one hand sequence."""
 
-    def __init__(self, session: Session, practice: Practice, hands: str, sigma: float) -> None:
+    def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
         self.hands = hands
         self.sigma = sigma
         self.generations = 1  # the trial by A counts as the first
         self.trials = 1
         self._rng = session.rng
-        self._practice = practice
-        self._mask = practice.explored(hands)
-        first = practice.by_correction(hands)
+        self._attempts = attempts
+        self._mask = attempts.explored(hands)
+        first = attempts.by_correction(hands)
         self.reward = float(first.rewards[0])
         """Best reward so far; -inf where **A** did not complete the sequence."""
         self._mean: Array = first.reached[0, self._mask]
@@ -64,8 +64,8 @@ class Strategy:
         """Make one generation of trials, or the trials that are left."""
         if self._restarts < 0 or self._evolution.has_ended():
             self._restart()
-        values = self._evolution.ask()[: self._practice.left]
-        rewards = self._practice.around(self.hands, self._mask, values).rewards
+        values = self._evolution.ask()[: self._attempts.left]
+        rewards = self._attempts.around(self.hands, self._mask, values).rewards
         self.generations += 1
         self.trials += len(values)
         self.reward = max(self.reward, float(rewards.max()))
@@ -95,18 +95,18 @@ class CMAES(Method):
 
     def solve(self, session: Session) -> Result:
         """Search until the trials are used up; the solution is the best trial's."""
-        practice = Practice(session, self.parameters)
+        attempts = Attempts(session, self.parameters)
         with session.solving():
             strategies = []
-            for hands in sequences_of(session)[: practice.left]:
-                strategies.append(Strategy(session, practice, hands, self.parameters.sigma))
+            for hands in sequences_of(session)[: attempts.left]:
+                strategies.append(Strategy(session, attempts, hands, self.parameters.sigma))
             promising = [s for s in strategies if s.reward > -math.inf]
             if promising:
-                self._allot(promising, practice)
-        return practice.result(trials={s.hands: s.trials for s in strategies})
+                self._allot(promising, attempts)
+        return attempts.result(trials={s.hands: s.trials for s in strategies})
 
     @abstractmethod
-    def _allot(self, strategies: list[Strategy], practice: Practice) -> None:
+    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
         """Spend the trials that are left."""
 
 
@@ -121,7 +121,7 @@ class Bandit(CMAES):
     )
     Parameters = BanditParameters
 
-    def _allot(self, strategies: list[Strategy], practice: Practice) -> None:
+    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
         first = [strategy.reward for strategy in strategies]
         width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
         generations = len(strategies)
@@ -130,7 +130,7 @@ class Bandit(CMAES):
             doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
             return strategy.reward + width * doubt
 
-        while practice.left > 0:
+        while attempts.left > 0:
             max(strategies, key=bound).generation()
             generations += 1
 
@@ -145,19 +145,19 @@ class Every(CMAES):
         "bandits. International Conference on Machine Learning."
     )
 
-    def _allot(self, strategies: list[Strategy], practice: Practice) -> None:
+    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
         rounds = math.ceil(math.log2(len(strategies))) + 1  # the last is for one alone
-        budget = practice.left / rounds
+        budget = attempts.left / rounds
         # Best first from the start: of very many sequences a round does not reach all.
         strategies = sorted(strategies, key=lambda s: -s.reward)
         for _ in range(rounds):
             for strategy in strategies:
                 enough = strategy.trials + budget / len(strategies)
-                while strategy.trials < enough and practice.left > 0:
+                while strategy.trials < enough and attempts.left > 0:
                     strategy.generation()
             strategies = sorted(strategies, key=lambda s: -s.reward)
             strategies = strategies[: math.ceil(len(strategies) / 2)]
-        while practice.left > 0:
+        while attempts.left > 0:
             strategies[0].generation()
 
 

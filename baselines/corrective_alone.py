@@ -10,7 +10,7 @@ import itertools
 
 from coartic import Execution
 from coartic.method import Information, Method, MethodError, Outline, Result, Session
-from coartic.motion.initial import changes_of_hand, corrective_movements, too_many_sequences
+from coartic.motion.initial import changes_of_hand, corrective_movements
 from coartic.tasks.task import letters_of
 
 
@@ -48,7 +48,7 @@ class EverySequence(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to try one by one, if there are."""
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
+        return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""

@@ -41,17 +41,17 @@ class Constants(NamedTuple):
     """Weights of the evolution path and of all points in the covariance matrix, shape
     ``(λ + 1,)``; those of the worse points are negative."""
     stalled: Array
-    """The same while the path is stalled."""
+    """These weights while the path is stalled."""
     selected: float
     """Variance effective selection mass, μ_eff."""
     c_1: float
     """Learning rate of the evolution path in the covariance matrix."""
     c_path: float
-    """Of the evolution path, c_c."""
+    """Learning rate of the evolution path itself, c_c."""
     c_step: float
-    """Of the path of the step size, c_σ."""
+    """Learning rate of the path of the step size, c_σ."""
     damping: float
-    """Of the step size, d_σ."""
+    """Damping of the step size, d_σ."""
     length: float
     """Expected length of a standard normal vector."""
     gap: float

@@ -66,14 +66,14 @@ from coartic import Movement, Task
 from coartic.baselines.cascade import solve_cascade, state_cascade
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
-from coartic.motion.initial import changes_of_hand, too_many_sequences
+from coartic.motion.initial import changes_of_hand
 from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand, directions
 from coartic.tasks.task import beyond_reach, letters_of
 
 FACES = 16
 """Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
-HORIZON = 2
+GOALS_AHEAD = 2
 """Goals after the current one that have a posture under ``next-goal``."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
@@ -319,8 +319,7 @@ class NullspaceQP(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to simulate, if there are."""
-        every = self.parameters.hands == "every"
-        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
+        return task.too_many_sequences if self.parameters.hands == "every" else None
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """``goal`` (0-based), and the goals that are prepared for on the way there."""
@@ -423,7 +422,7 @@ class NextGoal(NullspaceQP):
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """As many goals as the horizon has, with their hands."""
-        return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + HORIZON]
+        return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + GOALS_AHEAD]
 
 
 class Preshaping(NullspaceQP):

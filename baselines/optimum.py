@@ -24,7 +24,7 @@ from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_t
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.corrective import correct
-from coartic.motion.initial import hand_sequences, too_many_sequences
+from coartic.motion.initial import hand_sequences
 from coartic.robot import Array
 from coartic.tasks.task import hands_of, letters_of
 
@@ -185,7 +185,7 @@ class Multistart(Optimum):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many hand sequences to plan one by one, if there are."""
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
+        return task.too_many_sequences
 
     def starts(self, session: Session, task: Task) -> Iterator[Chain]:
         """The corrective process's configurations, and Gaussian noise of many sizes on them."""

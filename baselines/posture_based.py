@@ -37,14 +37,13 @@ from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.compiled import chain_by, entry, joint_lever
-from coartic.motion.initial import too_many_sequences
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]
 Layers = dict[tuple[int, Hand], Array]
 """Postures ``(k, dof)`` with a hand at a goal (0-based)."""
 
-BATCH = 60
+PER_ROUND = 60
 """Postures generated in a round."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
@@ -102,8 +101,7 @@ class PostureBased(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to plan one by one, if there are."""
-        every = self.parameters.hands == "every"
-        return too_many_sequences(task.name, task.goals_count, len(task.hands)) if every else None
+        return task.too_many_sequences if self.parameters.hands == "every" else None
 
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""
@@ -166,7 +164,7 @@ class Neighbourhood(NamedTuple):
     promising: Array
     """Shape ``(goals, dof)``."""
     noise: Array
-    """Standard noise, shape ``(rounds, BATCH, goals, dof)``."""
+    """Standard noise, shape ``(rounds, PER_ROUND, goals, dof)``."""
 
 
 class PosturePlanner:
@@ -198,7 +196,7 @@ class PosturePlanner:
         noise = session.rng.standard_normal((parameters.stored, session.dof))
         self.store = np.vstack([session.q0, session.q0 + sds * noise * self.movable])
         # Weights of the better postures, best first: logarithmic in the rank.
-        better = math.ceil(BATCH / 4)
+        better = math.ceil(PER_ROUND / 4)
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
     def plans(self, options: list[list[HandSequence]]) -> list[GrowingPlan]:
@@ -255,8 +253,8 @@ class PosturePlanner:
         return range(goal, min(goal + self.horizon, len(self.goals)))
 
     def draw_noise(self, goals: range) -> Array:
-        """Standard noise for ``goals``, ``(rounds, BATCH, goals, dof)``."""
-        shape = self.rounds, BATCH, len(goals), self.session.dof
+        """Standard noise for ``goals``, ``(rounds, PER_ROUND, goals, dof)``."""
+        shape = self.rounds, PER_ROUND, len(goals), self.session.dof
         return self.session.rng.standard_normal(shape)
 
     def retrieve(self, plans: list[GrowingPlan], goals: range) -> list[Layers]:
@@ -346,8 +344,10 @@ class PosturePlanner:
     def correct_generated(
         self, start: Array, postures: Array, seeds: list[Neighbourhood], goals: range
     ) -> Mask:
-        """Correct generated postures ``(seeds, BATCH, goals, dof)`` in place; True, shape
-        ``(seeds, BATCH)``, where all hands are there. ``start`` has shape ``(seeds, 1, dof)``."""
+        """Correct generated postures ``(seeds, PER_ROUND, goals, dof)`` in place.
+
+        True, shape ``(seeds, PER_ROUND)``, where all hands are there. ``start`` has shape
+        ``(seeds, 1, dof)``."""
         accurate = np.ones(postures.shape[:2], bool)
         before = np.broadcast_to(start, (*postures.shape[:2], postures.shape[-1])).copy()
         for k, goal in enumerate(goals):

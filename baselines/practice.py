@@ -50,7 +50,7 @@ from coartic.tasks.families import load_family
 FAMILY = "eight/v1"
 COURSE = 327_680
 """Trials in the course of which noise and step size fall."""
-KEPT = (20_480, 81_920, COURSE)
+KEPT_AFTER = (20_480, 81_920, COURSE)
 """Numbers of trials after which a policy is kept in passing."""
 BATCH, PART, EPOCHS, UNITS = 512, 1024, 4, 64
 NOISE, STEP, STEP_OF_CRITIC, LAST_STEP = (0.6, 0.1), 2e-3, 3e-3, 0.05
@@ -147,7 +147,7 @@ class Subtask(NamedTuple):
     target: Array
     """Where the arms moved to, shape ``(N, dof)``."""
     reached: tuple[Reached, ...]
-    """Of both postures in the head, and of the movement."""
+    """What came of both postures in the head, and of the movement."""
 
 
 def trial(
@@ -335,7 +335,7 @@ def blocks(rows: Single) -> Single:
 def practise(
     ahead: int, agent: int, trials: int, model: MotionModel
 ) -> Iterator[tuple[int, Network]]:
-    """The policy of an agent after each of :data:`KEPT` trials and after all, whole batches.
+    """The policy of an agent after each of :data:`KEPT_AFTER` trials and after all, whole batches.
 
     It is the same object, which goes on learning.
     """
@@ -345,7 +345,7 @@ def practise(
     critic = Network.draw(rng, inputs + goals, 1, 0.1)
     numbers = np.repeat(np.eye(goals, dtype=np.float32), BATCH, axis=0)
     for made in range(0, trials - BATCH + 1, BATCH):
-        if made in KEPT:
+        if made in KEPT_AFTER:
             yield made, policy
         sd = NOISE[0] * (NOISE[1] / NOISE[0]) ** (made / COURSE)
         slower = 1 - (1 - LAST_STEP) * made / COURSE

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic.baselines.uninformed import Practice, UninformedParameters
+from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
 from coartic.optimisers import TOLD, Objective, Optimiser, OptimiserParameters
 from coartic.robot import Array
@@ -124,7 +124,7 @@ class RandomSearch:
     ) -> None:
         self._session, self._rng = session, session.rng
         self._first_hands = session.find_initial_hands()
-        self._practice = Practice(session, parameters)
+        self._attempts = Attempts(session, parameters)
         self._letters = [hand[0].upper() for hand in session.hands]
         self._sigma, self._epsilon, self._climbs = parameters.sigma, epsilon, climbs
         self.centres: dict[str, Centre] = {}
@@ -134,13 +134,13 @@ class RandomSearch:
         """The best of all trials, after making them until none is left or none can succeed."""
         with self._session.solving():
             self._run()
-        return self._practice.result(sequences=len(self.centres))
+        return self._attempts.result(sequences=len(self.centres))
 
     def _run(self) -> None:
         most, ahead = len(self._letters) ** self._session.goals_count, 1
         following: str | None = self._first_hands
-        while self._practice.left > 0 and len(self._hopeless) < most:
-            best = self._practice.hands
+        while self._attempts.left > 0 and len(self._hopeless) < most:
+            best = self._attempts.hands
             hands = self._draw(best) if following is None else following
             following = None
             if hands not in self.centres:
@@ -148,7 +148,7 @@ class RandomSearch:
                 continue
             # The next draws are known until a centre moves, which is rare.
             state = self._rng.bit_generator.state
-            drawn, following = self._ahead(hands, best, min(ahead, self._practice.left))
+            drawn, following = self._ahead(hands, best, min(ahead, self._attempts.left))
             tried, moved = self._around(drawn)
             ahead = min(2 * ahead, _MOST_DRAWN)
             if moved:  # then the draws beyond that one are not valid
@@ -158,8 +158,8 @@ class RandomSearch:
 
     def _begin(self, hands: str) -> None:
         """The first trial of a hand sequence."""
-        mask = self._practice.explored(hands)
-        attempt = self._practice.by_correction(hands)
+        mask = self._attempts.explored(hands)
+        attempt = self._attempts.by_correction(hands)
         if attempt.rewards[0] > -np.inf:
             reward = attempt.rewards[0] if self._climbs else np.inf
             self.centres[hands] = centre_at(attempt.reached[0], mask, reward)
@@ -185,7 +185,7 @@ class RandomSearch:
         targets = np.array([centre.targets for centre in centres])
         explored = np.array([centre.mask for centre in centres])
         targets[explored] += self._sigma * np.concatenate([noise for _, noise in drawn])
-        attempt = self._practice.by_targets([hands for hands, _ in drawn], targets, than)
+        attempt = self._attempts.by_targets([hands for hands, _ in drawn], targets, than)
         last = len(attempt.rewards) - 1
         moves = bool(attempt.rewards[last] > than[last])
         if moves:

@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 from coartic.method import Information
 from coartic.model import PAPER
 from coartic.motion.costs import joint_costs as costs_of
+from coartic.motion.costs import segment_lengths
 from coartic.motion.penalty import disc_centre
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Penalty, Task
@@ -119,7 +120,7 @@ class PathPlan:
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
     durations: Array
-    """Of the segments, shape ``(G,)``; their mean is 1. Of use for smoothness costs only."""
+    """Durations of the segments, shape ``(G,)``, with mean 1; for smoothness costs only."""
     rates: Array
     """Time derivatives at start and goals, shape ``(derivatives, G + 1, dof)``."""
     spent: dict[str, int] = field(default_factory=dict)
@@ -127,8 +128,7 @@ class PathPlan:
 
     def lengths(self, q0: Array) -> Array:
         """Joint-space distances between successive configurations, shape ``(G,)``."""
-        steps = np.diff(np.vstack([q0, self.configurations]), axis=0)
-        return np.asarray(np.sqrt((steps**2).sum(axis=1)))
+        return segment_lengths(np.vstack([q0, self.configurations]))
 
 
 class TrajectoryProblem:
@@ -350,14 +350,14 @@ class PenaltyTerms:
     """
 
     shares: Any
-    """Of each goal u, r and a."""
+    """u, r and a of each goal."""
     weights: Any
-    """Of the three terms, as lengths of path."""
+    """Weights of the three terms, as lengths of path."""
     disc: Any
     """Centre and radius."""
     apart: Any
     costly: Any
-    """Of each joint 1 where it is costly, else 0."""
+    """1 for each joint that is costly, else 0."""
 
     @classmethod
     def symbolic(cls, dof: int, goals: int) -> PenaltyTerms:

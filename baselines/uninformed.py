@@ -32,7 +32,7 @@ class UninformedParameters(Parameters):
     4 and 3 of the learner)."""
 
 
-class Practice:
+class Attempts:
     """The physical trials of one run: makes them and remembers the best."""
 
     def __init__(self, session: Session, parameters: UninformedParameters) -> None:

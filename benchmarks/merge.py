@@ -58,7 +58,7 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> Merged:
     if len({path.resolve() for path in paths}) < max(len(paths), 2):
         raise CoarticError("name two results folders or more, each once")
     if os.path.lexists(out):
-        raise CoarticError(f"{out} is there already: choose another --out")
+        raise CoarticError(f"the folder {out} is there already: choose another --out")
     with ExitStack() as stack:
         stores = [stack.enter_context(open_store(path)) for path in paths]
         plan = join({str(store.folder): store.plan() for store in stores})

@@ -140,7 +140,8 @@ def check_declaration(method: type[Method], origin: str) -> None:
             raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
     if not METHOD_NAME.fullmatch(method.name):
         raise CoarticError(
-            f"{where}: name {method.name!r} may have letters, digits, '.', '_', '+', '/' and '-'"
+            f"{where}: the name {method.name!r} must begin with a letter or digit and have only "
+            "letters, digits, '.', '_', '+', '/' and '-'"
         )
     told = getattr(method, "told", None)
     if not isinstance(told, frozenset | set) or not all(isinstance(i, Information) for i in told):

@@ -24,7 +24,7 @@ from coartic.inputs import (
     FileData,
     brief_value,
     error_saying,
-    problems,
+    explain_file,
     read_toml,
 )
 from coartic.learner.conditions import METHOD_PREFIX
@@ -155,6 +155,8 @@ def load_suite(name: str) -> Suite:
 def read_suite(path: Path) -> Suite:
     """A suite from its file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
+    if "goals" in content and "cells" not in content:
+        raise CoarticError(f"{path} is a task, not a suite: run a suite with --task-file {path}")
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
@@ -162,7 +164,7 @@ def read_suite(path: Path) -> Suite:
             *(*Suite.model_fields, *Block.model_fields),
             *(*Move.model_fields, *Penalty.model_fields),
         ]
-        raise CoarticError(problems(str(path), error, keys)) from None
+        raise CoarticError(explain_file(str(path), error, keys)) from None
 
 
 def select_cells(
@@ -319,10 +321,7 @@ def cells_of_block(
     suite: Suite, block: Block, registered: Registry, user_tasks: Mapping[str, Task]
 ) -> Iterator[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
-    for name in block.methods:
-        if name not in registered and name != WILDCARD:
-            raise CoarticError(unknown(f"method of suite {suite.name!r}", name, registered))
-    methods = registered if WILDCARD in block.methods else block.methods
+    methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
     for name in block.task_names(user_tasks):
         if block.move is not None and WILDCARD in block.tasks and name in user_tasks:
             continue
@@ -336,7 +335,7 @@ def cells_of_block(
             variants = [with_penalty(suite, v, p) for v in variants for p in block.penalties]
         for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
-            if reason is not None and WILDCARD not in (*block.methods, *block.tasks):
+            if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
                 raise CoarticError(f"suite {suite.name!r}: {reason}")
             if reason is not None:
                 continue  # "all that applies"

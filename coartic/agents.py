@@ -23,7 +23,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from coartic.arms import Arms
 from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Outline, Parameters, Result, Session
-from coartic.motion.initial import corrective_trial, initial_hands, too_many_sequences
+from coartic.motion.initial import corrective_trial, initial_hands
 from coartic.motion.solution import Movement
 from coartic.motion.trials import Trials, movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
@@ -72,7 +72,7 @@ class OneObject(VecEnv):
         raise NotImplementedError("the environments have no methods of their own")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """They are not."""
+        """Whether each is wrapped: none is."""
         return [False] * self.num_envs
 
 
@@ -239,7 +239,7 @@ class Agent(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """More hand sequences than can be tried one by one."""
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
+        return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
         """Train until one trial is left, and make it with the policy without noise."""

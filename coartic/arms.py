@@ -17,15 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.inputs import WIDTHS, check_limits, real_array
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.compiled import entry, fill_row, inlined, inner, joint_chain, record_type
-from coartic.motion.corrective import Corrector, correct_lanes
+from coartic.motion.compiled import entry, fill_row, inlined, inner, record_type
+from coartic.motion.corrective import correct_lanes
 from coartic.motion.initial import corrective_trial, initial_hands
-from coartic.motion.lanes import LANES, board, lanes_for, runs_for
+from coartic.motion.lanes import LANES, board
 from coartic.motion.movement import Goal
 from coartic.motion.penalty import penalties_of_movements
 from coartic.motion.problem import arm_of
-from coartic.motion.reach import Batch, Requests, Setup, blank, reach_goals
+from coartic.motion.reach import Requests, Setup, blank, new_batch, reach_goals, setup_for
 from coartic.motion.trials import Trials, hand_codes
+from coartic.motion.trigonometry import joint_chain
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Hand, Robot
 from coartic.tasks.task import MOST_GOALS, Task, hands_of
@@ -60,7 +61,7 @@ class Table(NamedTuple):
     around: Any  # (K, G, D) middle of the box where it is fixed
 
 
-class How(NamedTuple):
+class Options(NamedTuple):
     """How an action says a target, and what is observed."""
 
     scale: float
@@ -70,8 +71,8 @@ class How(NamedTuple):
     sight: int
 
 
-class State(NamedTuple):
-    """What N robots are and have done."""
+class Robots(NamedTuple):
+    """What N robots are and have done, and where those of a kind are put in order."""
 
     rows: Any  # (N,) of ROW
     q: Any  # (N, D)
@@ -81,41 +82,36 @@ class State(NamedTuple):
     postures: Any  # (N, 2, D) where the corrective process would bring each hand from here
     found: Any  # (N, 2) whether it does
     seen: Any  # (N, O)
-
-
-class Room(NamedTuple):
-    """Where the robots of a kind are put in order, those at one goal together."""
-
-    order: Any  # (N,)
+    order: Any  # (N,) those of a kind, those at one goal together
     sizes: Any  # (K * G,) always 0 between calls
     firsts: Any  # (K * G,)
-    chain: Any  # (2, most links + 1)
-    seen: Any  # (2,) whether there is an arm of this side in an observation
+    chain: Any  # (2, most links + 1) of one arm
+    shown: Any  # (2,) whether an observation has the arm of this side
 
 
 @inner
-def sort_rows(kind: int, which: Any, table: Any, state: Any, room: Any, arms: Any) -> int:
+def sort_rows(kind: int, which: Any, table: Any, robots: Any, arms: Any) -> int:
     """Put the robots of a kind in order; returns the number of groups, one for each goal."""
     goals, count, groups = table.goals.shape[1], 0, 0
     for i in range(len(which)):
-        row = state.rows[i]
+        row = robots.rows[i]
         going = which[i] and row.goal < table.counts[row.task]
         row.acting = going and table.kinds[row.task] == kind
         if row.acting:
-            room.sizes[row.task * goals + row.goal] += 1
+            robots.sizes[row.task * goals + row.goal] += 1
     for i in range(len(which)):
-        row = state.rows[i]
+        row = robots.rows[i]
         if row.acting:
             key = row.task * goals + row.goal
-            if room.sizes[key] > 0:
-                arms.bounds[groups], room.firsts[key] = count, count
+            if robots.sizes[key] > 0:
+                arms.bounds[groups], robots.firsts[key] = count, count
                 arms.goals[groups, 0, 0] = table.goals[row.task, row.goal, 0]
                 arms.goals[groups, 0, 1] = table.goals[row.task, row.goal, 1]
-                count += room.sizes[key]
-                room.sizes[key] = 0
+                count += robots.sizes[key]
+                robots.sizes[key] = 0
                 groups += 1
-            room.order[room.firsts[key]] = i
-            room.firsts[key] += 1
+            robots.order[robots.firsts[key]] = i
+            robots.firsts[key] += 1
     arms.bounds[groups] = count
     return groups
 
@@ -141,24 +137,26 @@ def way(q: Any, posture: Any) -> float:
 
 
 @inlined
-def nearer_hand(i: int, state: Any) -> int:
+def nearer_hand(i: int, robots: Any) -> int:
     """The hand that the corrective process brings to the goal by the shorter way."""
-    nearer = way(state.q[i], state.postures[i, 1]) < way(state.q[i], state.postures[i, 0])
-    return 1 if state.found[i, 1] and (nearer or not state.found[i, 0]) else 0
+    nearer = way(robots.q[i], robots.postures[i, 1]) < way(robots.q[i], robots.postures[i, 0])
+    return 1 if robots.found[i, 1] and (nearer or not robots.found[i, 0]) else 0
 
 
 @inlined
-def aim(i: int, p: int, action: Any, how: Any, table: Any, state: Any, arms: Any) -> None:
-    """Write what an action says into the requests."""
-    row, q, target = state.rows[i], state.q[i], arms.targets[p, 0]
-    hand, first = table.hands[row.task, row.goal], 1 if how.chooses else 0
-    if how.chooses:
+def write_request(
+    i: int, p: int, action: Any, options: Any, table: Any, robots: Any, arms: Any
+) -> None:
+    """Write what an action says into the request of a robot."""
+    row, q, target = robots.rows[i], robots.q[i], arms.targets[p, 0]
+    hand, first = table.hands[row.task, row.goal], 1 if options.chooses else 0
+    if options.chooses:
         hand = 1 if action[0] > 0.0 else 0
-        if how.middle == _CORRECTIVE:
-            nearer = nearer_hand(i, state)
+        if options.middle == _CORRECTIVE:
+            nearer = nearer_hand(i, robots)
             hand = 1 - nearer if action[0] > 0.5 else nearer
     arms.hands[p, 0], arms.stops[p, 0] = hand, True
-    state.letters[i, row.goal] = _LETTERS[1] if hand == 1 else _LETTERS[0]
+    robots.letters[i, row.goal] = _LETTERS[1] if hand == 1 else _LETTERS[0]
     fill_row(arms.starts[p], q)
     for j in range(len(target)):
         target[j] = q[j]
@@ -166,50 +164,50 @@ def aim(i: int, p: int, action: Any, how: Any, table: Any, state: Any, arms: Any
             target[j] = np.nan
         elif table.moves[row.task, row.goal, j]:
             away = action[first + table.entries[row.task, j]]
-            if how.clips:
+            if options.clips:
                 away = min(max(away, -1.0), 1.0)
             middle = q[j]
-            if how.middle == _FIXED:
+            if options.middle == _FIXED:
                 middle = table.around[row.task, row.goal, j]
-            elif how.middle == _CORRECTIVE:
-                middle = state.postures[i, hand, j]
-            target[j] = middle + how.scale * away
+            elif options.middle == _CORRECTIVE:
+                middle = robots.postures[i, hand, j]
+            target[j] = middle + options.scale * away
 
 
 @inlined
-def see(i: int, how: Any, table: Any, state: Any) -> None:
+def see(i: int, options: Any, table: Any, robots: Any) -> None:
     """Observe what the learner knows, and the posture."""
-    row, seen, goals = state.rows[i], state.seen[i], table.goals.shape[1]
+    row, seen, goals = robots.rows[i], robots.seen[i], table.goals.shape[1]
     for j in range(goals + 2):
         seen[j] = 0.0
     if row.goal < goals:
         seen[row.goal] = 1.0
     if row.goal > 0:
-        seen[goals + (1 if state.letters[i, row.goal - 1] == _LETTERS[1] else 0)] = 1.0
-    if how.sight == _POSTURE:
-        for j in range(len(state.q[i])):
-            seen[goals + 2 + j] = state.q[i, j]
+        seen[goals + (1 if robots.letters[i, row.goal - 1] == _LETTERS[1] else 0)] = 1.0
+    if options.sight == _POSTURE:
+        for j in range(len(robots.q[i])):
+            seen[goals + 2 + j] = robots.q[i, j]
 
 
 @inlined
-def note(i: int, p: int, how: Any, table: Any, state: Any, arms: Any, reached: Any) -> None:
+def note(i: int, p: int, options: Any, table: Any, robots: Any, arms: Any, reached: Any) -> None:
     """Add what came of a subtask to the trial of a robot."""
-    row, goal = state.rows[i], state.rows[i].goal
-    fill_row(state.q[i], reached.q[p, 0])
-    fill_row(state.targets[i, goal], arms.targets[p, 0])
+    row, goal = robots.rows[i], robots.rows[i].goal
+    fill_row(robots.q[i], reached.q[p, 0])
+    fill_row(robots.targets[i, goal], arms.targets[p, 0])
     row.ticks += reached.ticks[p, 0]
     row.corrections += reached.corrections[p, 0]
     row.iterations += reached.iterations[p, 0]
     row.evaluations += reached.evaluations[p, 0]
     row.reward = -FAILED
     if reached.hit[p, 0]:
-        fill_row(state.reached[i, goal], reached.q[p, 0])
+        fill_row(robots.reached[i, goal], reached.q[p, 0])
         row.goal += 1
         row.reward = -reached.ticks[p, 0]
     row.completed = row.goal == table.counts[row.task]
     row.ended = row.completed or not reached.hit[p, 0]
-    if how.sight != _AHEAD:
-        see(i, how, table, state)
+    if options.sight != _AHEAD:
+        see(i, options, table, robots)
 
 
 @entry
@@ -217,10 +215,9 @@ def step_robots(
     kind: int,
     actions: Any,
     which: Any,
-    how: Any,
+    options: Any,
     table: Any,
-    state: Any,
-    room: Any,
+    robots: Any,
     arms: Any,
     setup: Any,
     reached: Any,
@@ -229,54 +226,54 @@ def step_robots(
     """Make the next subtask of the robots of a kind; the first one whose action is wrong, or -1."""
     for i in range(len(which)):
         if not which[i]:
-            state.rows[i].reward, state.rows[i].ended = 0.0, False
-        elif is_wrong(actions[i], 1 if how.chooses else 0, how.clips):
+            robots.rows[i].reward, robots.rows[i].ended = 0.0, False
+        elif is_wrong(actions[i], 1 if options.chooses else 0, options.clips):
             return i
-    groups = sort_rows(kind, which, table, state, room, arms)
+    groups = sort_rows(kind, which, table, robots, arms)
     count = arms.bounds[groups]
     for p in range(count):
-        aim(room.order[p], p, actions[room.order[p]], how, table, state, arms)
+        write_request(robots.order[p], p, actions[robots.order[p]], options, table, robots, arms)
     asked = Requests(
         arms.starts, arms.hands, arms.targets, arms.stops, arms.bounds, arms.goals[:groups]
     )
     reach_goals(asked, setup, reached, batch)
     for p in range(count):
-        note(room.order[p], p, how, table, state, arms, reached)
+        note(robots.order[p], p, options, table, robots, arms, reached)
     return -1
 
 
 @inlined
-def see_ahead(i: int, ahead: int, table: Any, state: Any, setup: Any, room: Any) -> None:
+def see_ahead(i: int, ahead: int, table: Any, robots: Any, setup: Any) -> None:
     """Observe posture, what the corrective process would do, and the goals in view."""
-    row, q, seen = state.rows[i], state.q[i], state.seen[i]
+    row, q, seen = robots.rows[i], robots.q[i], robots.seen[i]
     for j in range(len(seen)):
         seen[j] = 0.0
     left = table.counts[row.task] - row.goal
     seen[0] = left / MANY_GOALS
     if row.goal > 0:
-        seen[2 if state.letters[i, row.goal - 1] == _LETTERS[1] else 1] = 1.0
+        seen[2 if robots.letters[i, row.goal - 1] == _LETTERS[1] else 1] = 1.0
     seen[3] = 1.0 if setup.corrector.free_x else 0.0
     seen[4] = 1.0 if setup.corrector.free_y else 0.0
-    seen[5] = 1.0 if left > 0 and nearer_hand(i, state) == 1 else 0.0
-    at, most = 6, room.chain.shape[1] - 1
+    seen[5] = 1.0 if left > 0 and nearer_hand(i, robots) == 1 else 0.0
+    at, most = 6, robots.chain.shape[1] - 1
     for hand in range(2):
         if table.has[row.task, hand]:
             arm = arm_of(setup, hand)
             links = len(arm.links)
-            joint_chain(q, arm, room.chain[0], room.chain[1])
+            joint_chain(q, arm, robots.chain[0], robots.chain[1])
             seen[at] = links / 8.0
-            seen[at + 1] = (room.chain[0, links] - q[0]) / UNIT
-            seen[at + 2] = (room.chain[1, links] - q[1]) / UNIT
+            seen[at + 1] = (robots.chain[0, links] - q[0]) / UNIT
+            seen[at + 2] = (robots.chain[1, links] - q[1]) / UNIT
             for k in range(links):
                 seen[at + 6 + k] = q[arm.first + k]
-            if left > 0 and state.found[i, hand]:
-                posture = state.postures[i, hand]
+            if left > 0 and robots.found[i, hand]:
+                posture = robots.postures[i, hand]
                 seen[at + 3] = math.sqrt(way(q, posture)) / UNIT
                 seen[at + 4] = (posture[0] - q[0]) / UNIT
                 seen[at + 5] = (posture[1] - q[1]) / UNIT
                 for k in range(links):
                     seen[at + 6 + most + k] = posture[arm.first + k] - q[arm.first + k]
-        if room.seen[hand]:
+        if robots.shown[hand]:
             at += 6 + 2 * most
     for k in range(min(ahead + 1, left)):
         seen[at] = 1.0
@@ -292,36 +289,35 @@ def look_robots(
     observes: bool,
     which: Any,
     table: Any,
-    state: Any,
-    room: Any,
+    robots: Any,
     arms: Any,
     setup: Any,
     batch: Any,
 ) -> None:
     """Ask the corrective process where it would bring each hand, and observe, for the robots of a
     kind."""
-    groups = sort_rows(kind, which, table, state, room, arms)
+    groups = sort_rows(kind, which, table, robots, arms)
     size = len(batch.runs)
     for group in range(groups):
         goal = Goal(arms.goals[group, 0, 0], arms.goals[group, 0, 1], setup.radius)
         for first in range(arms.bounds[group], arms.bounds[group + 1], size):
             count = min(size, arms.bounds[group + 1] - first)
             for hand in range(2):
-                if not room.seen[hand]:
+                if not robots.shown[hand]:
                     continue
                 for n in range(count):
-                    i, run = room.order[first + n], batch.runs[n]
-                    fill_row(run.target, state.q[i])
+                    i, run = robots.order[first + n], batch.runs[n]
+                    fill_row(run.target, robots.q[i])
                     board(batch.lanes.at, n, n, run.target, arm_of(setup, hand))
                 correct_lanes(batch.lanes, count, goal, setup.corrector, setup.model, batch.runs)
                 for n in range(count):
-                    i, run = room.order[first + n], batch.runs[n]
-                    fill_row(state.postures[i, hand], run.target)
-                    has = table.has[state.rows[i].task, hand]
-                    state.found[i, hand] = run.converged and has
+                    i, run = robots.order[first + n], batch.runs[n]
+                    fill_row(robots.postures[i, hand], run.target)
+                    has = table.has[robots.rows[i].task, hand]
+                    robots.found[i, hand] = run.converged and has
     for i in range(len(which)):
-        if observes and which[i] and table.kinds[state.rows[i].task] == kind:
-            see_ahead(i, ahead, table, state, setup, room)
+        if observes and which[i] and table.kinds[robots.rows[i].task] == kind:
+            see_ahead(i, ahead, table, robots, setup)
 
 
 class Frame(NamedTuple):
@@ -448,7 +444,7 @@ class Arms:
         high[bounded:] = LARGEST_FIGURE
         low = np.where(np.arange(size) < bounded, 0.0, -high).astype(np.float32)
         self.observation_space = Box(low, high, dtype=np.float32)
-        self._how = How(self.scale, True, self.chooses_hands, middle, self._sight)
+        self._options = Options(self.scale, True, self.chooses_hands, middle, self._sight)
         self.rows = np.zeros(count, ROW)
         """Task, next goal and trial of each robot, records of :data:`ROW`."""
         self.q = np.zeros((count, dof))
@@ -459,7 +455,7 @@ class Arms:
         self.goal = self.rows["goal"]
         """Number of the next goal, from 0, shape ``(N,)``."""
         places = np.full((2, count, goals, dof), np.nan)
-        self._state = State(
+        self._robots = Robots(
             self.rows,
             self.q,
             letters,
@@ -468,18 +464,16 @@ class Arms:
             postures=np.zeros((count, 2, dof)),
             found=np.zeros((count, 2), np.bool_),
             seen=np.zeros((count, size), np.float32),
+            order=np.zeros(count, np.int64),
+            sizes=np.zeros(most * goals, np.int64),
+            firsts=np.zeros(most * goals, np.int64),
+            chain=np.zeros((2, links + 1)),
+            shown=np.array([hand in sides for hand in HANDS]),
         )
         named = {name: self.rows[name] for name in ("completed", *_COUNTS)}
         self.trials = Trials(targets=places[0], reached=places[1], **named)
         """The trials as far as they are made."""
         self._actions = np.zeros((count, *self.action_space.shape))
-        self._room = Room(
-            order=np.zeros(count, np.int64),
-            sizes=np.zeros(most * goals, np.int64),
-            firsts=np.zeros(most * goals, np.int64),
-            chain=np.zeros((2, links + 1)),
-            seen=np.array([hand in sides for hand in HANDS]),
-        )
         self._asked = Requests(
             starts=np.zeros((count, dof)),
             hands=np.zeros((count, 1), np.int64),
@@ -489,9 +483,8 @@ class Arms:
             goals=np.zeros((count, 1, 2)),
         )
         self._reached = blank(self._asked)
-        lot = min(count, LANES)
-        flags, widest = np.zeros((2, lot), np.bool_), Robot((1.0,) * links, (1.0,) * links)
-        self._batch = Batch(runs_for(lot, widest), flags[0], flags[1], lanes_for(widest))
+        widest = Robot((1.0,) * links, (1.0,) * links)
+        self._batch = new_batch(widest, min(count, LANES))
         if task is not None:
             self.reset(np.ones(count, np.bool_))
 
@@ -527,9 +520,9 @@ class Arms:
         kind = task.robot, float(task.radius), task.locked_base
         if kind not in self._kinds:
             self._kinds[kind] = len(self._setups)
-            free = Corrector("x" not in task.locked_base, "y" not in task.locked_base)
-            left, right = map(task.robot.arm, HANDS)
-            self._setups.append(Setup(left, right, kind[1], free, self.model, True, True))
+            self._setups.append(
+                setup_for(task.robot, kind[1], locked_base=task.locked_base, model=self.model)
+            )
         table.kinds[place], table.counts[place] = self._kinds[kind], goals
         table.has[place] = [hand in task.hands for hand in HANDS]
         table.starts[place, :dof], table.goals[place, :goals] = task.q0, task.goal_array
@@ -580,19 +573,19 @@ class Arms:
 
     def reset(self, which: NDArray[np.bool_]) -> None:
         """Put these robots, of a mask ``(N,)``, at the start of their tasks."""
-        state, goals = self._state, self._table.goals.shape[1]
+        robots, goals = self._robots, self._table.goals.shape[1]
         tasks = self.rows["task"][which]
         for name in ROW.names or ():
             if name != "task":
                 self.rows[name][which] = 0
         self.q[which] = self._table.starts[tasks]
-        state.letters[which] = 0
-        state.targets[which] = state.reached[which] = np.nan
+        robots.letters[which] = 0
+        robots.targets[which] = robots.reached[which] = np.nan
         if self._sight != _AHEAD:
-            state.seen[which, : goals + 2] = np.arange(goals + 2) == 0
+            robots.seen[which, : goals + 2] = np.arange(goals + 2) == 0
         if self._sight == _POSTURE:
-            state.seen[which, goals + 2 : goals + 2 + self.q.shape[1]] = self.q[which]
-            state.seen[which, -2 * goals :] = self._table.goals[tasks].reshape(-1, 2 * goals)
+            robots.seen[which, goals + 2 : goals + 2 + self.q.shape[1]] = self.q[which]
+            robots.seen[which, -2 * goals :] = self._table.goals[tasks].reshape(-1, 2 * goals)
         self._look(which)
 
     def _kinds_of(self, which: NDArray[np.bool_]) -> Sequence[int]:
@@ -603,21 +596,21 @@ class Arms:
 
     def _look(self, which: NDArray[np.bool_]) -> None:
         """Find where the corrective process would bring these robots, where it is needed."""
-        if self._sight == _AHEAD or self._how.middle == _CORRECTIVE:
+        if self._sight == _AHEAD or self._options.middle == _CORRECTIVE:
             for kind in self._kinds_of(which):
                 look_robots(
-                    kind, self.ahead, self._sight == _AHEAD, which, self._table, self._state,
-                    self._room, self._asked, self._setups[kind], self._batch,
+                    kind, self.ahead, self._sight == _AHEAD, which, self._table, self._robots,
+                    self._asked, self._setups[kind], self._batch,
                 )  # fmt: skip
 
     def centre(self, row: int) -> Array:
         """The middle of the box of targets of a robot, for each hand, shape ``(2, dof)``."""
-        state, record = self._state, self.rows[row]
+        robots, record = self._robots, self.rows[row]
         middle = {
             _PRESENT: self.q[row],
             _FIXED: self._table.around[record["task"], record["goal"]],
-            _CORRECTIVE: state.postures[row],
-        }[self._how.middle]
+            _CORRECTIVE: robots.postures[row],
+        }[self._options.middle]
         dof = self.tasks[record["task"]].robot.dof
         return np.array(np.broadcast_to(middle, (2, self.q.shape[1]))[:, :dof])
 
@@ -628,7 +621,7 @@ class Arms:
         the joints are NaN. Raises ValueError for a target outside of the box, which no action leads
         to, and for a hand that the robot does not have or, where hands are given, not at this goal.
         """
-        record, state = self.rows[row], self._state
+        record, robots = self.rows[row], self._robots
         task = self.tasks[record["task"]]
         if hand not in task.hands:
             raise ValueError(f"hand is {hand!r}; it must be one of {task.hands}")
@@ -636,9 +629,9 @@ class Arms:
         given = self._table.hands[record["task"], record["goal"]]
         if not self.chooses_hands and code != given:
             raise ValueError(f"hand is {hand!r}; the {HANDS[given]} hand is given at this goal")
-        if self._how.middle == _CORRECTIVE and self.chooses_hands:
-            ways = ((state.postures[row] - self.q[row]) ** 2).sum(axis=1)
-            nearer = np.where(state.found[row], ways, np.inf).argmin()
+        if self._options.middle == _CORRECTIVE and self.chooses_hands:
+            ways = ((robots.postures[row] - self.q[row]) ** 2).sum(axis=1)
+            nearer = np.where(robots.found[row], ways, np.inf).argmin()
             side = -1.0 if code == nearer else 1.0
         centre = self.centre(row)[code]
         wanted = np.full_like(centre, np.nan) if target is None else real_array("target", target)
@@ -670,12 +663,12 @@ class Arms:
             shape = self._actions.shape
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
         self._actions[:] = chosen
-        how = self._how if clips else self._how._replace(clips=False)
+        options = self._options if clips else self._options._replace(clips=False)
         penalty = self.tasks[0].penalty is not None
         before, goal = (self.q.copy(), self.goal.copy()) if penalty else (self.q, self.goal)
         for kind in self._kinds_of(which):
             wrong = step_robots(
-                kind, self._actions, which, how, self._table, self._state, self._room,
+                kind, self._actions, which, options, self._table, self._robots,
                 self._asked, self._setups[kind], self._reached, self._batch,
             )  # fmt: skip
             if wrong >= 0:
@@ -691,7 +684,7 @@ class Arms:
     def _lose(self, before: Array, goal: NDArray[np.int64], which: NDArray[np.bool_]) -> None:
         """Subtract the penalties of the last step."""
         rows = np.flatnonzero(which)
-        right = self._state.letters[rows, goal[rows]] == _LETTERS[1]
+        right = self._robots.letters[rows, goal[rows]] == _LETTERS[1]
         lost = penalties_of_movements(
             self.tasks[0], before[rows], self.q[rows], right.astype(np.int64), goal[rows] == 0
         )
@@ -700,7 +693,7 @@ class Arms:
 
     def observations(self) -> NDArray[np.float32]:
         """Observations ``(N, O)``."""
-        return np.array(self._state.seen)
+        return np.array(self._robots.seen)
 
     def infos(self) -> dict[str, Any]:
         """Hands used so far (``"RL"``), corrective movements made, whether all goals are hit; of

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
-BLACK, BASE, WHITE = "#000000", "#7a7a7a", "#ffffff"
+BLACK, BASE_GREY, WHITE = "#000000", "#7a7a7a", "#ffffff"
 HIT = "0.55"  # of a goal; not black, which is the right hand
 MARKERS: dict[Hand, dict[str, Any]] = {
     # Squares are larger than circles, so that hands at one place show both.
@@ -38,7 +38,7 @@ def draw_robot(
     """
     outline = task.robot.base_outline(q)
     base = [
-        Polygon(outline, facecolor=BASE, alpha=0.25 * alpha, edgecolor="none", zorder=1.5),
+        Polygon(outline, facecolor=BASE_GREY, alpha=0.25 * alpha, edgecolor="none", zorder=1.5),
         Polygon(
             outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, alpha=alpha, zorder=1.6
         ),

@@ -32,9 +32,9 @@ from coartic.motion.initial import corrective_trial, initial_hands
 from coartic.motion.solution import execute
 from coartic.robot import BASE_DOF, Array, Hand
 from coartic.tasks.catalogue import load_task
-from coartic.tasks.families import load_family
+from coartic.tasks.families import instance_names, load_family
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import Address, Split, Task, as_task
+from coartic.tasks.task import Task, as_task
 from coartic.text import unknown
 
 if TYPE_CHECKING:
@@ -45,12 +45,8 @@ if TYPE_CHECKING:
 OPTIONS = ("scale", "around", "observe", "ahead", "hands", "model")
 OF_FAMILY = ("family", "split", "count", "year")
 FAMILY_OPTIONS = (*OF_FAMILY, "scale", "ahead", "hands", "model")
-COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Instances of a family, from the first one: of the test split those whose best known solutions are
-shipped."""
 WORKS = {"around": "hands", "hands": "initial", "scale": 0.5}
 """Options of version 1 of the single tasks."""
-FAMILY = "two-armed/v1"
 
 
 def make_arms(
@@ -66,36 +62,13 @@ def make_arms(
         raise TypeError(unknown("option", name, [*known, "render_mode"]))
     if not of_family:
         return Arms(num_envs, as_task(task), **options), []  # type: ignore[arg-type]
-    which = {name: options.pop(name) for name in OF_FAMILY if name in options}
-    names, family = instance_names(**which), load_family(which.get("family", FAMILY))
+    which: dict[str, Any] = {"split": "development"}
+    which |= {name: options.pop(name) for name in OF_FAMILY if name in options}
+    names, family = instance_names(**which), load_family(which["family"])
     goals, links = family.goals[1], family.links[1]
     frame = Frame(len(names), goals, links, BASE_DOF + 2 * links, family.hands)
     options = {"scale": 0.5} | options | {"observe": "ahead", "around": "corrective"}
     return Arms(num_envs, frame=frame, **options), names
-
-
-def instance_names(
-    family: str = FAMILY,
-    split: Split = "development",
-    count: int | None = None,
-    year: int | None = None,
-) -> list[str]:
-    """Names of the first ``count`` instances of a split of a family.
-
-    Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
-    instances have no year or others have one; TaskError where there is no such family.
-    """
-    load_family(str(family))
-    if split not in COUNTS:
-        raise ValueError(f"split is {split!r}; it is one of {', '.join(map(repr, COUNTS))}")
-    if (year is None) == (split == "fresh"):
-        raise ValueError(f"year is {year!r}; fresh instances need one, such as 2027, others none")
-    if year is not None:
-        check_limits("year", year, 1000, 9999)
-    count = COUNTS[split] if count is None else count
-    check_limits("count", count, 1, MOST_CELLS)
-    stream = {"development": "d", "test": "i"}.get(split, f"{year}-")
-    return [str(Address(family, stream, number)) for number in range(count)]
 
 
 def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
@@ -105,7 +78,7 @@ def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
     return mode
 
 
-def picture(arms: Arms, row: int) -> NDArray[np.uint8]:
+def draw_picture(arms: Arms, row: int) -> NDArray[np.uint8]:
     """A robot and its goals, ``(height, width, 3)``."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -186,7 +159,7 @@ class TaskEnv(gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=seed)
         if self.names:
-            draw(self.arms, 0, self.names, self.np_random)
+            give_instance(self.arms, 0, self.names, self.np_random)
         self.arms.reset(self._all)
         self._goes_on = True
         if self.render_mode == "human":
@@ -215,7 +188,7 @@ class TaskEnv(gymnasium.Env):
         if self.render_mode is None:
             return None
         if self.render_mode == "rgb_array":
-            return picture(self.arms, 0)
+            return draw_picture(self.arms, 0)
         from matplotlib import pyplot
 
         self._figure = self._figure or pyplot.figure(figsize=(6, 4))
@@ -309,7 +282,7 @@ class TaskVectorEnv(VectorEnv):
     def _begin(self, which: NDArray[np.bool_]) -> None:
         """Begin these trials."""
         for row in np.flatnonzero(which).tolist() if self.names else ():
-            draw(self.arms, row, self.names, self._rngs[row])
+            give_instance(self.arms, row, self.names, self._rngs[row])
         self._ended[which] = False
         self.arms.reset(which)
 
@@ -347,14 +320,16 @@ class TaskVectorEnv(VectorEnv):
         """A picture of each robot and its goals."""
         if self.render_mode is None:
             return None
-        return tuple(picture(self.arms, row) for row in range(self.num_envs))
+        return tuple(draw_picture(self.arms, row) for row in range(self.num_envs))
 
     def _infos(self, which: NDArray[np.bool_]) -> dict[str, Any]:
         infos = self.arms.infos()
         return infos | {f"_{name}": which.copy() for name in infos}
 
 
-def draw(arms: Arms, row: int, names: Sequence[str], rng: np.random.Generator | None) -> None:
+def give_instance(
+    arms: Arms, row: int, names: Sequence[str], rng: np.random.Generator | None
+) -> None:
     """Give a robot an instance that is drawn among these."""
     assert rng is not None
     name = names[int(rng.integers(len(names)))]
@@ -476,25 +451,25 @@ def score(
     rewards = {
         name: solve_all(tasks, each, seed, model)
         if isinstance(each, Method)
-        else play(robots(1), policy_of(each))[:, None]
+        else run_trials(robots(1), policy_of(each))[:, None]
         for name, each in found.items()
     }
     guesses = robots(episodes)
     size = guesses.action_space.shape
-    rewards["random actions"] = play(
+    rewards["random actions"] = run_trials(
         guesses, lambda seen: rng.uniform(-1, 1, (len(seen), *size))
     ).reshape(len(tasks), episodes)
     rewards["corrective process"] = np.array(
         [[np.nan if trial.reward is None else trial.reward] for trial in alone]
     )
     rewards["best known"] = best[:, None]
-    rows = {name: summary(each, best) for name, each in rewards.items()}
+    rows = {name: summarise(each, best) for name, each in rewards.items()}
     rows["best known"]["completed"] = np.nan
     table = pd.DataFrame.from_dict(rows, orient="index")
     return table.rename_axis("policy")
 
 
-def summary(rewards: Array, best: Array) -> dict[str, float]:
+def summarise(rewards: Array, best: Array) -> dict[str, float]:
     """Means over tasks of rewards ``(K, trials)``, NaN for those that failed."""
     gaps = 100.0 * (best[:, None] - rewards) / np.abs(best[:, None])
     values = gaps[0] if len(gaps) == 1 else mean_over(gaps, axis=1)
@@ -530,7 +505,7 @@ def policy_of(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     return policy  # type: ignore[no-any-return]
 
 
-def play(arms: Arms, policy: Callable[[NDArray[np.float32]], ArrayLike]) -> Array:
+def run_trials(arms: Arms, policy: Callable[[NDArray[np.float32]], ArrayLike]) -> Array:
     """Rewards of a trial of each robot, from its start, ``(N,)``; NaN where one failed."""
     going = np.ones(len(arms.rows), dtype=np.bool_)
     while going.any():
@@ -575,7 +550,7 @@ TASKS = {
 }
 
 
-IDS: dict[str, dict[str, Any]] = {"coartic/Family-v0": {"family": FAMILY}}
+IDS: dict[str, dict[str, Any]] = {"coartic/Family-v0": {"family": "two-armed/v1"}}
 for _name, _task in TASKS.items():
     _given = {} if _task is None else {"task": _task}
     IDS |= {f"coartic/{_name}-v0": _given, f"coartic/{_name}-v1": _given | WORKS}

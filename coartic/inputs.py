@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 MOST_CELLS = 10_000
-"""Of a suite: sixty times the largest one shipped."""
+"""Most cells of a suite: sixty times the largest one shipped."""
 MOST_RUNS = 1_000_000
-"""Of a cell."""
+"""Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Of a run: a thousand times the paper's; their rewards are kept."""
+"""Most trials of a run: a thousand times the paper's; their rewards are kept."""
 MOST_SECONDS = 1_000_000
-"""Of a run: eleven days; the system's clocks of waiting end at twice that."""
+"""Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
 MOST_SEED = 2**63 - 1
 MOST_BYTES = 10_000_000
-"""Of a file of tasks, suites or methods: a hundred times the largest one shipped."""
+"""Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
@@ -141,22 +141,22 @@ def brief_value(value: object) -> str:
     return brief(repr(value))
 
 
-def problems(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
+def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
     """One line for each problem of a file, the first :data:`_SHOWN` of them.
 
     ``keys`` are the keys that it may have, wherever they belong.
     """
     details, shown, keys = causes(error), plain(source), list(keys)
-    sentences = (plain(explain(detail, keys)) for detail in details[:_SHOWN])
+    sentences = (plain(explain_problem(detail, keys)) for detail in details[:_SHOWN])
     lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
     if len(details) > _SHOWN:
         lines.append(f"{shown}: has {len(details) - _SHOWN} more problems")
     return "\n".join(lines)
 
 
-def problems_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """The same as part of a sentence."""
-    return "; ".join(plain(explain(detail, keys)) for detail in causes(error)[:_SHOWN])
+def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
+    """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
+    return "; ".join(plain(explain_problem(detail, keys)) for detail in causes(error)[:_SHOWN])
 
 
 def causes(error: ValidationError) -> list[ErrorDetails]:
@@ -183,7 +183,7 @@ def error_saying(text: str) -> PydanticCustomError:
     return PydanticCustomError("sentence", "{text}", {"text": text})
 
 
-def explain(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
+def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
     key, message = key_path(detail["loc"]), detail["msg"]
     match detail["type"]:

@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict
 from coartic.errors import CoarticError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
-from coartic.motion.initial import search_initial_hands
+from coartic.motion.initial import search_initial_hands, too_many_sequences
 from coartic.motion.outside import inside, note_trials
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.motion.trials import Bench, HandSequences, Trials, check_targets, hand_codes
@@ -147,13 +147,13 @@ class Meter:
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
 """What a counter can hold where runs are stored."""
-_FAILED = -MOST_COUNT
+_NO_REWARD = -MOST_COUNT
 """Reward of a trial that failed, where rewards are kept."""
 
 
-def kept(rewards: Iterable[int | None]) -> array[int]:
-    """Rewards of trials as a session keeps them, in 8 bytes each."""
-    return array("q", [_FAILED if reward is None else reward for reward in rewards])
+def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
+    """Pack rewards of trials as a session keeps them, in 8 bytes each."""
+    return array("q", [_NO_REWARD if reward is None else reward for reward in rewards])
 
 
 @dataclass(frozen=True)
@@ -164,9 +164,9 @@ class Result:
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method wants kept beside it, as plain data. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """Of a learner: its first trial, if that hit every goal. Its movements follow no paths."""
+    """A learner's first trial, if that hit every goal. Its movements follow no paths."""
     replay: tuple[Movement, ...] = ()
-    """Of a learner: one greedy trial, without noise, with what it has learned. No paths either."""
+    """A learner's greedy trial, without noise, with what it has learned. No paths either."""
     bound: int | None = None
     """Reward that no solution exceeds, where proven; for searches of this project."""
 
@@ -175,7 +175,7 @@ class Outline(NamedTuple):
     """What a method is told of a task to say whether it applies."""
 
     name: str
-    """Of the task, for the sentence."""
+    """Name of the task, for the sentence."""
     goals_count: int
     dof: int
     hands: tuple[Hand, ...]
@@ -188,19 +188,49 @@ class Outline(NamedTuple):
         """Whether it is a policy."""
         return self.initial_hands in INITIAL_POLICIES
 
+    @property
+    def too_many_sequences(self) -> str | None:
+        """Why the hand sequences cannot all be tried one by one; None where they can."""
+        return too_many_sequences(self.name, self.goals_count, len(self.hands))
+
 
 def outline_of(task: Task) -> Outline:
     """The outline of a task."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
-class TaskView:
-    """What a method sees of its task. What has to be declared is noted as used."""
+class Session:
+    """One task, one seed, one meter: all that a method gets to work with.
 
-    def __init__(self, task: Task, told: Iterable[Information]) -> None:
+    The declaration is enforced and the calls are counted between honest parties: Python
+    has no walls, and who reaches for underscored names finds a way around both.
+    ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state what those spent. Trials that a process makes elsewhere than in
+    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        seed: int,
+        told: Iterable[Information],
+        *,
+        model: MotionModel = PAPER,
+        trial_budget: int | None = None,
+        trusted: bool = False,
+        of_run: bool = False,
+    ) -> None:
         self._task = task
         self._told = frozenset(told)
         self._used: set[Information] = set()
+        self.seed = seed
+        self.rng = np.random.default_rng(seed)
+        self.model = model
+        self._trusted = trusted
+        self._of_run = of_run
+        self._trial_budget = trial_budget
+        self._meter = Meter()
+        self._rewards = array("q")
 
     # Open to every method: what the robot is, not what the task wants of it.
 
@@ -260,7 +290,7 @@ class TaskView:
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Hand position as a CasADi expression. Needs ``kinematic model``.
 
-        What a solver evaluates of it is counted with :meth:`Session.spend`.
+        What a solver evaluates of it is counted with :meth:`spend`.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
@@ -291,38 +321,6 @@ class TaskView:
                     f"the method used {item.value!r}, which it does not declare (told: {told})"
                 )
             self._used.add(item)
-
-
-class Session(TaskView):
-    """One task, one seed, one meter: all that a method gets to work with.
-
-    The declaration is enforced and the calls are counted between honest parties: Python
-    has no walls, and who reaches for underscored names finds a way around both.
-    ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state what those spent. Trials that a process makes elsewhere than in
-    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
-    """
-
-    def __init__(
-        self,
-        task: Task,
-        seed: int,
-        told: Iterable[Information],
-        *,
-        model: MotionModel = PAPER,
-        trial_budget: int | None = None,
-        trusted: bool = False,
-        of_run: bool = False,
-    ) -> None:
-        super().__init__(task, told)
-        self.seed = seed
-        self.rng = np.random.default_rng(seed)
-        self.model = model
-        self._trusted = trusted
-        self._of_run = of_run
-        self._trial_budget = trial_budget
-        self._meter = Meter()
-        self._rewards = array("q")
 
     # Calls that are counted.
 
@@ -378,7 +376,7 @@ class Session(TaskView):
             with inside(self._of_run):
                 execution = execute(self._task, solution, model=self.model)
         spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
-        self._count(kept([execution.reward]), *spent)
+        self._count(pack_rewards([execution.reward]), *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
             return execution
         return replace(
@@ -421,9 +419,9 @@ class Session(TaskView):
 
     def _affordable(self, count: int) -> int:
         """How many of so many trials the budget has. Raises BudgetError where it has none."""
-        if self._trial_budget is None:
+        left = self.trials_left
+        if left is None:
             return count
-        left = self._trial_budget - self._meter.trials
         if left <= 0 < count:
             raise BudgetError(f"all {self._trial_budget} trials of the budget are made")
         return min(count, left)
@@ -455,7 +453,7 @@ class Session(TaskView):
 
     def _count_batch(self, trials: Trials) -> None:
         """Count the trials of a batch and keep their rewards."""
-        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _FAILED)
+        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _NO_REWARD)
         spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
         self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
 
@@ -475,7 +473,7 @@ class Session(TaskView):
         )
         penalty = self._bench.penalty(codes, reached)
         reward = -(ticks + penalty) if completed else None
-        self._count(kept([reward]), ticks, corrections, iterations, evaluations)
+        self._count(pack_rewards([reward]), ticks, corrections, iterations, evaluations)
         return reward
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -507,7 +505,7 @@ class Session(TaskView):
         meter.corrective_iterations += iterations
         meter.jacobians += iterations
         meter.forward_kinematics += evaluations
-        meter.failed_trials += rewards.count(_FAILED)
+        meter.failed_trials += rewards.count(_NO_REWARD)
         self._rewards.extend(rewards)
 
     @property
@@ -525,7 +523,7 @@ class Session(TaskView):
     @property
     def rewards(self) -> list[int | None]:
         """Reward of each trial made, in order; None where it failed."""
-        return [None if reward == _FAILED else reward for reward in self._rewards]
+        return [None if reward == _NO_REWARD else reward for reward in self._rewards]
 
     # What the method has to state itself.
 
@@ -580,7 +578,7 @@ class Session(TaskView):
         """Rewards of the trials of a compiled method of this project, and its time for them: of
         the runs of a batch, each has its share."""
         self._needs_trust("record")
-        self._rewards.extend(kept(rewards))
+        self._rewards.extend(pack_rewards(rewards))
         self._meter.solve_s += solve_s
 
     def _needs_trust(self, name: str) -> None:

@@ -36,9 +36,9 @@ from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.solution import Movement
 from coartic.motion.trials import HandSequences, movements_of
 from coartic.robot import HANDS, Array
-from coartic.tasks.families import load_family
+from coartic.tasks.families import instance_names
 from coartic.tasks.optima import ShippedOptimum, best_shipped
-from coartic.tasks.task import SPLITS, Address, Task, TaskLike, as_task, hands_of, letters_of
+from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
 from coartic.text import counted
 
 if TYPE_CHECKING:  # workers do without pandas
@@ -517,7 +517,7 @@ def problems(
     split : {"test", "development"}
         Instances to report on, or those to tune on.
     count : int
-        How many, from 1 to 1,000.
+        How many, from 1 to 10,000.
     hands : str, optional
         ``"all"``, or None for those with which the corrective process alone does best.
     half_width : float
@@ -539,14 +539,10 @@ def problems(
     ValueError
         The split or the count is another one.
     """
-    streams = {name: stream for stream, name in SPLITS.items()}
-    if split not in streams:
+    if split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
-    check_limits("count", count, 1, 1000)
-    load_family(family)
-    names = (str(Address(family, streams[split], number)) for number in range(count))
     options: dict[str, Any] = {"half_width": half_width, "model": model, "budget": budget}
-    return [objective(name, hands, **options) for name in names]
+    return [objective(name, hands, **options) for name in instance_names(family, split, count)]
 
 
 class OptimiserParameters(Parameters):
@@ -557,7 +553,7 @@ class OptimiserParameters(Parameters):
     """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
     best, or the task's own where there are too many to try."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
-    """Of the bounds, length unit (base) and rad (joints)."""
+    """Half the width of the bounds, length unit (base) and rad (joints)."""
 
 
 class Optimiser(Method):
@@ -571,9 +567,7 @@ class Optimiser(Method):
 
     def why_not(self, task: Outline) -> str | None:
         """Reason why the task has too many hand sequences to search all; None if it does not."""
-        if self.parameters.hands != ALL:
-            return None
-        return too_many_sequences(task.name, task.goals_count, len(task.hands))
+        return task.too_many_sequences if self.parameters.hands == ALL else None
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""

@@ -47,9 +47,9 @@ class Arm(NamedTuple):
     links: Any
     """Lengths of its links from shoulder to hand, shape ``(n,)``, length unit."""
     shoulder_x: float
-    """Where its shoulder is, from the centre of the base, length unit."""
+    """Where its shoulder is in x from the centre of the base, length unit."""
     shoulder_y: float
-    """The same in y."""
+    """Where its shoulder is in y, length unit."""
 
     def __repr__(self) -> str:
         return short_repr(self, **self._asdict())

@@ -36,7 +36,7 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
 
 def error_line(error: BaseException) -> str:
     """An exception in one line."""
-    return plain(f"{type(error).__name__}: {error}")
+    return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:
@@ -117,7 +117,7 @@ def id_named(name: str, names: Mapping[str, str]) -> str:
     ``names`` by id; an id goes before a name.
     """
     lower = name.casefold()
-    called = [each for each, words in names.items() if words.casefold() == lower]
+    called = [each for each, words in names.items() if words and words.casefold() == lower]
     alike = [each for each in names if each.casefold() == lower]
     return name if name in names else next(iter(alike + called), name)
 

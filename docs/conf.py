@@ -35,7 +35,7 @@ nb_execution_in_temp = True
 nb_merge_streams = True
 
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True}
+autodoc_default_options = {"members": True, "exclude-members": "model_config, model_post_init"}
 autodoc_preserve_defaults = True
 napoleon_google_docstring = False  # docstrings have NumPy's blocks
 autodoc_mock_imports = ["stable_baselines3", "torch"]  # of the extra coartic[rl]

@@ -177,8 +177,9 @@ main()
 @pytest.mark.parametrize(
     ("moment", "name", "times"),
     [
-        *((str(ms), "SIGINT", times) for ms in (1, 300, 1500) for times in (1, 2, 3)),
-        ("800", "SIGTERM", 1),
+        ("1", "SIGINT", 1),
+        ("300", "SIGINT", 2),
+        ("1500", "SIGINT", 3),
         ("2500", "SIGTERM", 2),
         ("1800", "SIGHUP", 1),
         ("callback", "SIGINT", 1),
@@ -339,10 +340,9 @@ def test_a_mistake_gets_a_sentence(coartic, arguments, words, tmp_path, monkeypa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("settings", [b"text.usetex: True", b"\xff"])
-def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path, settings):
+def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path):
     """They may name programs, and the folder may be a stranger's."""
-    (tmp_path / "matplotlibrc").write_bytes(settings)
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True")
     code = """if True:
         from coartic.cli import main
         try:

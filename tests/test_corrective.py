@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from coartic import PAPER, MotionModel, Robot, correct, execute, load_task
 from coartic.baselines.corrective_alone import EverySequence
 from coartic.method import Session
-from coartic.motion.compiled import entry, joint_chain, joint_lever
+from coartic.motion.compiled import entry, joint_lever
 from coartic.motion.movement import Goal, largest_square
+from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import TIED, UNEVEN, configurations

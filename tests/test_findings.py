@@ -11,26 +11,11 @@ make_findings = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(make_findings)
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        "dose.md",
-        "findings.md",
-        "ahead.md",
-        "foreign.md",
-        "families.md",
-        "fourteen.md",
-        "horizon.md",
-        "human.md",
-        "objectives.md",
-        "paper.md",
-        "practice.md",
-        "resist.md",
-        "stops.md",
-    ],
-)
-def test_a_page_is_its_template_filled_from_the_stored_tables(page):
-    assert make_findings.filled_pages()[page] == (DOCS / page).read_text(encoding="utf-8")
+def test_pages_are_their_templates_filled_from_the_stored_tables():
+    pages = make_findings.filled_pages()
+    assert len(pages) >= 13
+    for page, text in pages.items():
+        assert text == (DOCS / page).read_text(encoding="utf-8"), page
 
 
 def test_a_sentence_that_no_longer_holds_is_refused():

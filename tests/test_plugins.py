@@ -115,13 +115,14 @@ def test_what_counts_as_the_code_of_a_method(tmp_path, monkeypatch):
     assert code_of(tmp_path) == first
 
 
+HARMLESS = """os.chdir('/'); print('x' * 10**6)
+import coartic.benchmarks.scoring as s; s.score = s.execute_many = None
+import numpy; numpy.sqrt = None
+import signal; signal.signal(signal.SIGINT, signal.SIG_DFL)
+"""
 AT_IMPORT = {
-    "os.chdir('/')": "",
-    "import coartic.benchmarks.scoring as s; s.score = s.execute_many = None": "",
-    "import numpy; numpy.sqrt = None": "",
+    HARMLESS: "",
     "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))": "",
-    "import signal; signal.signal(signal.SIGINT, signal.SIG_DFL)": "",
-    "print('x' * 10**6)": "",
     "class Odd(BaseException): pass\nraise Odd('odd')": "cannot be imported: Odd: odd",
     "raise KeyboardInterrupt": "cannot be imported: KeyboardInterrupt",
     "sys.exit(0)": "cannot be imported: SystemExit: 0",

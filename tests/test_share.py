@@ -106,7 +106,7 @@ def test_a_method_beside_the_released_ones(coartic, shipped, tmp_path):
         (("run", "quick", *command[2:]), "no results of suite 'quick' are released"),
         ((*command, *small, "--seed", 3), "the seed is 0 in the results that it is put beside"),
         (("new", "method", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
-        (("new", "method", "my search"), "may have letters, digits"),
+        (("new", "method", "my search"), "letters, digits"),
         (("new", "method", "other", "--out", mine), "is there already"),
         (("new", "method", "other", "--out", tmp_path / "x.txt"), "must end in .py"),
     ):

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines import cma_es, random_search
-from coartic.baselines.uninformed import Practice, UninformedParameters
+from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import BudgetError, Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
@@ -72,8 +72,8 @@ def test_one_goal_is_reached_on_the_shortest_line():
 )
 def test_joints_explored_for_a_hand_sequence(other_arm, left, right):
     session = Session(load_task("two-armed-1"), 0, TOLD)
-    practice = Practice(session, UninformedParameters(other_arm=other_arm))
-    mask = practice.explored("LRLR")
+    attempts = Attempts(session, UninformedParameters(other_arm=other_arm))
+    mask = attempts.explored("LRLR")
     assert mask[:, 0].all()
     assert not mask[:, 1].any()  # the base is locked in y
     np.testing.assert_array_equal(mask[:, 2:6].T, [left] * 4)
@@ -162,7 +162,7 @@ SECOND_FOR_THE_RIGHT = tiny_task(
 def one_by_one(method, task, seed, parameters):
     """Random search as it is defined: draw, make one trial, draw again."""
     session = Session(task, seed, TOLD)
-    practice, rng = Practice(session, parameters), session.rng
+    attempts, rng = Attempts(session, parameters), session.rng
     climbs = method is random_search.Climbing
     epsilon = parameters.epsilon if climbs else 1.0
     letters = [hand[0].upper() for hand in session.hands]
@@ -170,19 +170,19 @@ def one_by_one(method, task, seed, parameters):
 
     def drawn():
         chosen = ""
-        for letter in practice.hands or " " * session.goals_count:
+        for letter in attempts.hands or " " * session.goals_count:
             random = letter == " " or rng.random() < epsilon
             chosen += letters[rng.integers(len(letters))] if random else letter
         return drawn() if chosen in failed else chosen
 
-    while practice.left > 0:
-        mask = practice.explored(hands)
+    while attempts.left > 0:
+        mask = attempts.explored(hands)
         if hands in centres:
             centre, reward = centres[hands]
             values = centre + parameters.sigma * rng.standard_normal(len(centre))
-            attempt = practice.around(hands, mask, values[None])
+            attempt = attempts.around(hands, mask, values[None])
         else:
-            attempt, reward = practice.by_correction(hands), -np.inf
+            attempt, reward = attempts.by_correction(hands), -np.inf
         if attempt.rewards[0] == reward == -np.inf:
             failed.add(hands)
         elif hands not in centres or (climbs and attempt.rewards[0] > reward):
@@ -241,18 +241,18 @@ class HalfOfAPlain:
 
 def test_failed_trials_rank_last():
     """The best that does not fail is (0.5, 1, 1), with -25."""
-    practice = HalfOfAPlain()
+    attempts = HalfOfAPlain()
     session = Session(ONE_GOAL, 0, TOLD)
-    strategy = cma_es.Strategy(session, practice, "R", 0.05)
+    strategy = cma_es.Strategy(session, attempts, "R", 0.05)
     failed = []
     for _ in range(80):
         strategy.generation()
-        failed.append(practice.failed.mean())
+        failed.append(attempts.failed.mean())
     assert -26.0 < strategy.reward <= -25.0
     assert 0.0 < np.mean(failed) < 0.7
     for _ in range(400):
         strategy.generation()
-    assert [*dict.fromkeys(practice.sizes)][:3] == [7, 14, 28]  # it begins anew with twice as many
+    assert [*dict.fromkeys(attempts.sizes)][:3] == [7, 14, 28]  # it begins anew with twice as many
 
 
 def test_guesses_fill_the_box():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +17,9 @@ from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.text import counted, unknown
+
+if TYPE_CHECKING:
+    from coartic.analysis.study import Study
 
 _ReportFolder = Annotated[
     Path | None,
@@ -33,7 +37,6 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
     """Write the report of a results folder."""
     out = folder / "report" if out is None else out
     from coartic.analysis.report.build import write_report
-    from coartic.analysis.report.text import answers
     from coartic.analysis.study import load
 
     started = time.monotonic()
@@ -47,9 +50,20 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{counted(tables, 'table')} ({what}) and {counted(figures, 'figure')}."
     )
-    say_pairs([(answer["word"], answer["text"]) for answer in answers(study)])
+    say_pairs([*answers_in_words(study)])
     if not for_paper:
         say_pairs([("More", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
+
+
+def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
+    """What a folder answers, and why runs failed if some did: word and text."""
+    from coartic.analysis.report.about import limits
+    from coartic.analysis.report.text import answers
+
+    yield from ((answer["word"], answer["text"]) for answer in answers(study))
+    what = limits(study)
+    if what["failed"]:
+        yield "Failed", f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
 
 
 def runtimes(
@@ -72,7 +86,7 @@ def runtimes(
     ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Show what methods spend to reach targets, as ECDFs of running times."""
+    """Show what methods spend to reach targets (an ECDF)."""
     from coartic.analysis.figures.plot import FORMATS, picture
     from coartic.analysis.runtimes import draw, summary
     from coartic.analysis.runtimes import runtimes as curves_of
@@ -201,20 +215,21 @@ def verify(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",
         *(report.wrong or ["Nothing differs."]),
         "Not checked:",
-        *(f"- {words}" for words in report.unchecked),
+        *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
     )
     different = bool(report.wrong)
     if again:
         from coartic.benchmarks.registry import registry
         from coartic.benchmarks.reproduce import perform_some_again
 
-        registered, count = registry(method_file or []), 0
+        registered, count, unlike = registry(method_file or []), 0, 0
         for run_id, changes in perform_some_again(folder, again, registered):
             count += 1
+            unlike += bool(changes)
             for difference in changes:
                 say(f"Run {run_id}, performed again: {difference}")
-                different = True
-        say(f"{counted(count, 'run')} performed again.")
+        say(f"{counted(count, 'run')} performed again: {unlike or 'none'} with another result.")
+        different |= bool(unlike)
     if different:
         sys.exit(1)
 
@@ -223,7 +238,9 @@ def cite(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            parser=folder_named, metavar="FOLDER", help="Results folder; without, all methods."
+            parser=folder_named,
+            metavar="FOLDER",
+            help="Results folder; without, all methods and the shipped results.",
         ),
     ] = None,
     analysis: Annotated[
@@ -233,12 +250,13 @@ def cite(
     """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
+    from coartic.benchmarks.released import released_hashes
     from coartic.runs.store import open_store
 
-    made_with = None
-    declared = built_in()
-    if folder is not None:
+    if folder is None:
+        text = bibliography(built_in(), analysis=analysis, released=released_hashes())
+    else:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()
-    text = bibliography(declared, analysis=analysis, environment=made_with)
+        text = bibliography(declared, analysis=analysis, environment=made_with)
     say(*text.rstrip("\n").split("\n"))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from coartic.cli import arguments as given
 from coartic.cli.arguments import split_names
+from coartic.cli.read import answers_in_words
 from coartic.cli.terminal import Display, interruptible, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -88,10 +89,9 @@ def run(
         )
     say(str(report))
     import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
-    from coartic.analysis.report.text import answers
     from coartic.analysis.study import load
 
-    pairs = [(answer["word"], answer["text"]) for answer in answers(load(report.folder))]
+    pairs = answers_in_words(load(report.folder))
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
     if report.progress.crashed:
         sys.exit(1)
@@ -143,6 +143,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         runs = sorted({block.runs or suite.runs for block in suite.cells})
         counts = " or ".join(map(str, runs))
         yield "Runs", f"{counts} of each cell, {suite.trials or 'no'} trials a run"
+        yield "Tasks", ", ".join(dict.fromkeys(t for block in suite.cells for t in block.tasks))
+        yield "Methods", ", ".join(dict.fromkeys(m for block in suite.cells for m in block.methods))
         yield "Run it", f"coartic run {name}"
     elif name in builtin_tasks() or address_of(name):
         task = load_task(name)

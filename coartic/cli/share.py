@@ -50,7 +50,7 @@ def export(
     ] = None,
     ioh: Annotated[bool, typer.Option("--ioh", help="For IOHinspector and IOHanalyzer.")] = False,
 ) -> None:
-    """Write the runs that made trials in the format of another program."""
+    """Write runs in the format of another program."""
     from coartic.analysis.ioh import ioh_files
     from coartic.analysis.study import load
     from coartic.files import publish
@@ -74,7 +74,7 @@ def standings(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Table to write (.csv).")] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Check submitted results folders and rank their methods among the released ones."""
+    """Check submitted results and rank their methods."""
     import pandas as pd
 
     from coartic.files import check_output, write_output

@@ -30,7 +30,6 @@ from coartic.motion.compiled import (
     generator_at,
     inlined,
     inner,
-    joint_chain,
     record_type,
 )
 from coartic.motion.corrective import correct_lanes
@@ -38,6 +37,7 @@ from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_fo
 from coartic.motion.movement import move_lanes
 from coartic.motion.penalty import penalty_at
 from coartic.motion.problem import arm_of, goal_of
+from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
 

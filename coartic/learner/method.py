@@ -72,7 +72,7 @@ class DualProcessParameters(Parameters):
 
 
 class SubtaskParameters(DualProcessParameters):
-    """Of the variants that learn from the reward of each subtask."""
+    """Parameters of the variants that learn from the reward of each subtask."""
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
     """γ of a goal's return; 0 is the reward of its own subtask alone."""

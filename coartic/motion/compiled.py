@@ -1,21 +1,79 @@
-"""What kernels share: types, and small kernels."""
+"""Kernels: functions that are compiled when the first of them is called.
+
+Until then they cost nothing: a command that lists names needs no compiler. Here are the decorators
+that make kernels, and what kernels share.
+"""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property, update_wrapper
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.kernels import entry as entry
-from coartic.motion.kernels import from_compiler
-from coartic.motion.kernels import inlined as inlined
-from coartic.motion.kernels import inner as inner
-from coartic.motion.kernels import lanewise as lanewise
-from coartic.motion.trigonometry import cosine, sine
+from coartic.motion import sources  # noqa: F401 (notes the version of what is imported now)
 from coartic.robot import chain, lever
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Kernel:
+    """A function that is compiled as its kind says, see :mod:`coartic.motion.compiler`."""
+
+    def __init__(self, function: Callable[..., Any], kind: str) -> None:
+        self.function, self.kind = function, kind
+        update_wrapper(self, function)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What Numba makes of the function."""
+        from coartic.motion.compiler import compile_kernel
+
+        return compile_kernel(self.function, self.kind)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the compiled function returns."""
+        return self.dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        """For Numba, which takes a kernel that another one calls for its dispatcher."""
+        if name in ("_numba_type_", "py_func", "targetoptions"):
+            return getattr(self.dispatcher, name)
+        raise AttributeError(f"a kernel has no attribute {name!r}")
+
+
+def entry(function: F) -> F:
+    """A kernel that Python calls; its machine code is kept on disk."""
+    return cast(F, Kernel(function, "entry"))
+
+
+def inner(function: F) -> F:
+    """A kernel that only other kernels call."""
+    return cast(F, Kernel(function, "inner"))
+
+
+def inlined(function: F) -> F:
+    """As :func:`inner`, but a part of its callers, whose error model it has: passing whole tables
+    would cost, and loops over a shape are unrolled where it is known."""
+    return cast(F, Kernel(function, "inlined"))
+
+
+def lanewise(function: F) -> F:
+    """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
+    return cast(F, Kernel(function, "lanewise"))
+
+
+def scalar(function: F) -> F:
+    """A kernel of numbers, which compiled functions of others may call, too."""
+    return cast(F, Kernel(function, "scalar"))
+
+
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """A function that gives the type of a call in a kernel and builds its machine code."""
+    return Kernel(function, "intrinsic")
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
@@ -36,9 +94,28 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     return np.array([draws_of(generator) for generator in generators], dtype=np.uintp)
 
 
-@from_compiler
+@intrinsic
+def generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
+    """The generator whose draws are made by what is at these addresses."""
+    from numba.core import cgutils, types
+
+    kind = types.NumPyRandomGeneratorType("generator")
+    kind_of_bits = types.NumPyRandomBitGeneratorType("bit_generator")
+
+    def build(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        bits = cgutils.create_struct_proxy(kind_of_bits)(context, builder)
+        bits.state, bits.fnptr_next_uint64, bits.fnptr_next_double = arguments
+        generator = cgutils.create_struct_proxy(kind)(context, builder)
+        generator.bit_generator = bits._getvalue()
+        return generator._getvalue()
+
+    return kind(state, next_uint64, next_double), build
+
+
+@inner
 def generator_at(addresses: Any, run: int) -> Any:
     """The generator in a row of :func:`addresses`."""
+    return generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
 @inlined
@@ -51,9 +128,3 @@ def fill_row(row: Any, values: Any) -> None:
 
 chain_by = inner(chain)
 joint_lever = inner(lever)
-
-
-@inner
-def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
-    """:func:`coartic.robot.chain` with the kernels' cosine and sine."""
-    chain_by(q, arm, xs, ys, cosine, sine)

@@ -1,6 +1,6 @@
 """Numba: how kernels are built, and where their machine code is kept.
 
-Nothing imports it but :mod:`coartic.motion.kernels`, when the first kernel is called: it takes a
+Nothing imports it but :mod:`coartic.motion.compiled`, when the first kernel is called: it takes a
 while.
 
 Numba keys its on-disk cache by the file of the cached function alone, so a change
@@ -52,16 +52,10 @@ def import_numba() -> Any:
 _config = import_numba()
 import numba  # noqa: E402
 from numba import njit, types  # noqa: E402
-from numba.core import cgutils  # noqa: E402
 from numba.core.caching import FunctionCache  # noqa: E402
 from numba.core.codegen import get_host_cpu_features  # noqa: E402
 from numba.core.registry import cpu_target  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
-
-# What Numba knows it lists when it first compiles, or loads machine code. Workers are forked from
-# a process that has done so.
-cpu_target.typing_context.refresh()
-cpu_target.target_context.refresh()
 
 _KEPT_S = 30 * 24 * 3600.0
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
@@ -77,8 +71,6 @@ binding.set_option("coartic", "-unroll-peel-max-count=0")
 _features = get_host_cpu_features()
 if _config.CPU_FEATURES is None and "+avx512f" in _features.split(","):
     _config.CPU_FEATURES = f"{_features},-prefer-256-bit"
-
-Function = Callable[..., Any]
 
 
 def cache_folder() -> Path | None:
@@ -121,20 +113,23 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "no_cfunc_wrapper": Tr
 _INNER = _OPTIONS | {"no_cpython_wrapper": True}
 
 
-def inner(function: Function) -> Any:
-    """Compile a function that only other compiled functions call."""
-    return for_any_number(njit(**_INNER)(function))
-
-
-def inlined(function: Function) -> Any:
-    """As :func:`inner`, but a part of its callers, whose error model it has: passing whole tables
-    would cost, and loops over a shape are unrolled where it is known."""
-    return njit(**_INNER, inline="always")(function)
-
-
-def lanewise(function: Function) -> Any:
-    """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
-    return for_any_number(njit(**_INNER, error_model="numpy")(function))
+def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
+    """Compile a function as the decorator of this name in :mod:`coartic.motion.compiled` says."""
+    match kind:
+        case "entry":
+            return keep_on_disk(njit(**_OPTIONS)(function), function)
+        case "inner":
+            return for_any_number(njit(**_INNER)(function))
+        case "inlined":
+            return njit(**_INNER, inline="always")(function)
+        case "lanewise":
+            return for_any_number(njit(**_INNER, error_model="numpy")(function))
+        case "scalar":
+            return njit(nogil=True)(function)
+    made = intrinsic(function)
+    cpu_target.typing_context.refresh()  # which then knows it
+    made._numba_type_ = cpu_target.typing_context.resolve_value_type(made)
+    return made
 
 
 def for_any_number(dispatcher: Any) -> Any:
@@ -178,7 +173,8 @@ class MachineCode(FunctionCache):
     def load(self, *wanted: Any) -> Any:
         """The code of a signature, or None."""
         try:
-            return super().load_overload(*wanted)
+            # Not load_overload, which first lists all that Numba could compile.
+            return self._load_overload(*wanted)
         except Exception:  # an unpickler may say anything
             with contextlib.suppress(OSError):
                 self.flush()
@@ -212,18 +208,17 @@ class MachineCode(FunctionCache):
             self.lock = None
 
 
-def entry(function: Function) -> Any:
-    """Compile a function that Python calls, and keep its machine code on disk."""
-    compiled = njit(**_OPTIONS)(function)
+def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> Any:
+    """The compiled function itself, whose machine code is kept where there is a folder for it."""
     folder = cache_folder()
     if folder is not None:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder)
         try:
-            compiled._cache = MachineCode(function)
+            dispatcher._cache = MachineCode(function)
         finally:
             numba.config.CACHE_DIR = before
-    return compiled
+    return dispatcher
 
 
 def mangling_args(record: types.Record) -> tuple[str, tuple[int, ...]]:
@@ -235,35 +230,3 @@ def mangling_args(record: types.Record) -> tuple[str, tuple[int, ...]]:
 # number in the process that compiles, so a process that loads code of two such processes may call
 # one's function with the other's record. What is in the record is a name that holds everywhere.
 types.Record.mangling_args = property(mangling_args)
-
-
-def scalar(function: Function) -> Any:
-    """Compile a function of numbers, which compiled functions of others may call, too."""
-    return njit(nogil=True)(function)
-
-
-_BITS = types.NumPyRandomBitGeneratorType("bit_generator")
-_GENERATOR = types.NumPyRandomGeneratorType("generator")
-
-
-@intrinsic
-def _generator(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    def build(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
-        bits = cgutils.create_struct_proxy(_BITS)(context, builder)
-        bits.state, bits.fnptr_next_uint64, bits.fnptr_next_double = arguments
-        generator = cgutils.create_struct_proxy(_GENERATOR)(context, builder)
-        generator.bit_generator = bits._getvalue()
-        return generator._getvalue()
-
-    return _GENERATOR(state, next_uint64, next_double), build
-
-
-@inner
-def generator_at(addresses: Any, run: int) -> Any:
-    """See :func:`coartic.motion.compiled.generator_at`."""
-    return _generator(addresses[run, 0], addresses[run, 1], addresses[run, 2])
-
-
-def from_compiler(function: Function) -> Any:
-    """The kernel of this file that has the function's name."""
-    return {"generator_at": generator_at}[function.__name__]

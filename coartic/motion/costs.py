@@ -24,7 +24,7 @@ def joint_costs(robot: Robot, costly: CostlyJoints, factor: float) -> Array:
     return costs
 
 
-def segment_lengths(configurations: Array, costs: Array) -> Array:
+def segment_lengths(configurations: Array, costs: Array | float = 1.0) -> Array:
     """Weighted distances from each configuration ``(k, dof)`` to the next, shape ``(k - 1,)``.
 
     Euclidean in joint space, where a joint that costs 3 counts as if it had moved three times

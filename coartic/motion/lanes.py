@@ -37,7 +37,7 @@ class Lanes(NamedTuple):
     """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
     copied: some are integers."""
     moved: Any
-    """Those of one that moves."""
+    """The rows of an arm that moves."""
 
 
 def links_for(robot: Robot) -> int:

@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.compiled import entry, inner, joint_chain
+from coartic.motion.compiled import entry, inner
 from coartic.motion.costs import joint_costs
+from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Penalty, Point, Task
 

@@ -22,4 +22,4 @@ def hash_of_sources() -> str:
 
 
 FINGERPRINT = hash_of_sources()
-"""That hash when the package was imported."""
+"""The version of the model's code when the package was imported."""

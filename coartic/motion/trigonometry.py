@@ -12,10 +12,11 @@ for |angle| <= 1e5 rad (tested); beyond that the C library answers.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from coartic.motion.kernels import scalar
+from coartic.motion.compiled import chain_by, inner, scalar
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 
@@ -75,3 +76,9 @@ def cosine(angle: float) -> float:
 def sine(angle: float) -> float:
     """sin(angle), angle in rad."""
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
+
+
+@inner
+def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
+    """:func:`coartic.robot.chain` with this cosine and sine."""
+    chain_by(q, arm, xs, ys, cosine, sine)

@@ -16,7 +16,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import problems_inline
+from coartic.inputs import explain_inline
 from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
 from coartic.text import error_line, plain
@@ -128,7 +128,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         typed = method.Parameters(**parameters)
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
-        wrong, listed = problems_inline(error, names), ", ".join(names) or "none"
+        wrong, listed = explain_inline(error, names), ", ".join(names) or "none"
         words = f"method {method.name!r}: {wrong} (its parameters: {listed})"
         raise CoarticError(words) from None
     if question == "complete":

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_RUNS, MOST_TRIALS, problems_inline
+from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
 from coartic.model import PAPER, check_model, stored_model
 from coartic.robot import Array
 from coartic.runs.card import MethodCard
@@ -774,7 +774,7 @@ def explain_errors(folder: Path) -> Iterator[None]:
             ) from None
         raise CoarticError(f"cannot use {path}: {error}") from None
     except Exception as error:
-        wrong = problems_inline(error, []) if isinstance(error, ValidationError) else str(error)
+        wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
         raise CoarticError(
             f"{path} is damaged ({plain(wrong, 200) or type(error).__name__}). Move it away and "
             "repeat the `coartic run` command, or restore a copy."

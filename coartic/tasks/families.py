@@ -28,15 +28,17 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from coartic.errors import NotApplicableError, TaskError
-from coartic.inputs import MOST_CELLS, FileData, error_saying, problems, read_toml
+from coartic.inputs import MOST_CELLS, FileData, check_limits, error_saying, explain_file, read_toml
 from coartic.model import PAPER
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (
     INITIAL_POLICIES,
     MOST_GOALS,
+    SPLITS,
     Address,
     InitialPolicy,
+    Split,
     Task,
     address_of,
     parse_task,
@@ -44,6 +46,9 @@ from coartic.tasks.task import (
 from coartic.text import Line, counted, unknown
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
+COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
+"""Instances of each split that an agent is given, from the first one: of the test split those whose
+best known solutions are shipped."""
 MOST_ATTEMPTS = 10_000
 """Draws of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]
@@ -143,7 +148,7 @@ class Family(FileData):
     restrictions: _Bases = ()
     """Bases, beside its own, under which every instance can be done."""
     radius: Thousandths = 100
-    """Of every goal, length unit."""
+    """Radius of every goal, length unit."""
     region: Region
     """Where goals are: table ``[region]``."""
     line: Alignment | None = None
@@ -435,10 +440,31 @@ def read_family(path: Path) -> Family:
         family = Family(**content, name=name)
     except ValidationError as error:
         keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
-        raise TaskError(problems(str(path), error, keys)) from None
+        raise TaskError(explain_file(str(path), error, keys)) from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
     return family
+
+
+def instance_names(
+    family: str, split: Split, count: int | None = None, year: int | None = None
+) -> list[str]:
+    """Names of the first ``count`` instances of a split of a family, by default as :data:`COUNTS`.
+
+    Raises ValueError for another split, for a count that is not from 1 to 10,000, and where fresh
+    instances have no year or others have one; TaskError where there is no such family.
+    """
+    load_family(str(family))
+    if split not in COUNTS:
+        raise ValueError(f"split is {split!r}; it is one of {', '.join(map(repr, COUNTS))}")
+    if (year is None) == (split == "fresh"):
+        raise ValueError(f"year is {year!r}; fresh instances need one, such as 2027, others none")
+    if year is not None:
+        check_limits("year", year, 1000, 9999)
+    count = COUNTS[split] if count is None else count
+    check_limits("count", count, 1, MOST_CELLS)
+    streams = {name: stream for stream, name in SPLITS.items()} | {"fresh": f"{year}-"}
+    return [str(Address(family, streams[split], number)) for number in range(count)]
 
 
 def task_text(task: Task) -> str:

@@ -30,7 +30,7 @@ from coartic.inputs import (
     FileData,
     brief_value,
     error_saying,
-    problems,
+    explain_file,
     read_toml,
     real_array,
 )
@@ -48,10 +48,10 @@ MOST_PENALTY = 10_000.0
 """Ticks of each term of a penalty: many times what a task takes."""
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
-"""Of names of tasks and suites, which become names of files and parts of commands."""
+"""Form of names of tasks and suites, which become names of files and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
 TASK_PATTERN = _IN_FAMILY + NAME_PATTERN.removeprefix("^")
-"""Of names of tasks, those among them that are drawn from a family."""
+"""Form of names of tasks, those among them that are drawn from a family."""
 _ADDRESS = re.compile(_IN_FAMILY.removesuffix("?") + r"([di]|[0-9]{4}-)([0-9]{3,6})")
 WITHOUT_REACH = "without reach"
 
@@ -145,9 +145,9 @@ class Penalty(FileData):
     """A costly disc: ticks if an elbow of the arm that hits is at its centre, in proportion less
     towards its rim. The elbow that is deepest in it counts."""
     centre: Point | None = None
-    """Of the disc, length unit; the mean of the goals where left out."""
+    """Centre of the disc, length unit; the mean of the goals where left out."""
     radius: Length = 1.0
-    """Of the disc, length unit."""
+    """Radius of the disc, length unit."""
     distinct: Ticks = 0.0
     """Postures alike: ticks if the joints of the arm that hits are as they were at the goal before,
     in proportion less the more they differ. The first goal has none before it."""
@@ -446,7 +446,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(problems(source, error, all_keys())) from None
+        raise TaskError(explain_file(source, error, all_keys())) from None
 
 
 def all_keys() -> list[str]:
