@@ -17,7 +17,7 @@ from coartic.analysis.words import slugs
 from coartic.runs.card import BUILT_IN, MethodCard
 from coartic.text import did_you_mean, one_line
 
-PAPER = "shah2013"
+THE_PAPER = "shah2013"
 STATISTICS = (
     *("efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"),
 )
@@ -101,7 +101,7 @@ def bibliography(
     if released:
         works["coartic-results"] = results_of_version(released)
         reasons["coartic-results"] = ["the results that this version ships"]
-    reasons[PAPER] = ["the paper"]
+    reasons[THE_PAPER] = ["the paper"]
     others = []
     for name, method in methods.items():
         row = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None

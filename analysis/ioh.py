@@ -14,7 +14,7 @@ from typing import Any
 
 from coartic import Task
 from coartic.analysis.study import CellRuns, Study
-from coartic.analysis.topics.comparison.runtimes import BestSoFar, steps_of
+from coartic.analysis.topics.comparison.running_times import BestSoFar, steps_of
 from coartic.errors import CoarticError
 from coartic.optimisers import FAILED
 from coartic.tasks.task import address_of
@@ -44,7 +44,7 @@ def ioh_files(study: Study) -> dict[str, bytes]:
         folder, scenarios = f"{place:02}-{in_path(label)}", []
         for size, of_size in sorted(by_dimension.items()):
             path = f"data_{name}/IOHprofiler_f{number}_DIM{size}.dat"
-            runs, lines = zip(*runs_of(study, of_size), strict=True)
+            runs, lines = zip(*scenarios_of(study, of_size), strict=True)
             files[f"{folder}/{path}"] = "".join(lines)
             scenarios.append({"dimension": size, "path": path, "runs": runs})
         card = study.plan.methods[of_size[0].method]
@@ -78,7 +78,7 @@ def in_path(name: str) -> str:
     return re.sub(r"[^\w.=-]+", "-", name).strip("-")
 
 
-def runs_of(study: Study, cells: list[CellRuns]) -> Iterator[tuple[dict[str, Any], str]]:
+def scenarios_of(study: Study, cells: list[CellRuns]) -> Iterator[tuple[dict[str, Any], str]]:
     """Of each run that made trials, what the JSON file says, and its lines in the data file."""
     for cell in cells:
         address = address_of(cell.task)

@@ -21,7 +21,7 @@ from coartic.text import one_line
 
 LEARNER = METHOD_PREFIX
 """Beginning of the paper's learner's id; the exploration condition follows."""
-CONDITIONS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.CONDITIONS)
+LEARNERS = EC1, EC2, EC3, EC4 = tuple(LEARNER + name for name in conditions.CONDITIONS)
 """Labels of the learner under the paper's conditions: the first with one arm, the others with
 two, more exploration later."""
 TOGETHER = f"{LEARNER.rstrip('/')} ("
@@ -130,7 +130,7 @@ def look_alike(label: str) -> str:
         return EC4
     if not label.startswith(TOGETHER):
         return label
-    ends = (name for name in reversed(CONDITIONS) if name.removeprefix(LEARNER) in label)
+    ends = (name for name in reversed(LEARNERS) if name.removeprefix(LEARNER) in label)
     return next(ends, label)
 
 

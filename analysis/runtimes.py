@@ -16,7 +16,7 @@ from coartic.analysis.optima import locks_base
 from coartic.analysis.study import Study, load
 from coartic.analysis.topics.comparison import scores
 from coartic.analysis.topics.comparison.figures import draw_shares
-from coartic.analysis.topics.comparison.runtimes import SPENDS, TARGETS, ecdf, times_of
+from coartic.analysis.topics.comparison.running_times import SPENDS, TARGETS, ecdf, times_of
 from coartic.errors import CoarticError
 from coartic.robot import Array
 from coartic.text import unknown

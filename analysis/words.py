@@ -80,6 +80,14 @@ def estimate(value: Estimate, digits: int | None = None, unit: str = "") -> str:
     return f"{number(value.value, digits)}{unit} {interval}".strip()
 
 
+def interval_in_words(
+    row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
+) -> str:
+    """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
+    value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
+
+
 def marked(task: Task) -> str:
     """The one name of a task for people, with † where it is reconstructed (:data:`RECONSTRUCTED`).
 

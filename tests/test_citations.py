@@ -11,7 +11,7 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.citations import (
-    PAPER,
+    THE_PAPER,
     behind_analysis,
     bibliography,
     references,
@@ -67,14 +67,14 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
         # A multi-author work may be named in short; its first author is always named.
         assert plain(BIB[key]["author"]).partition(",")[0] in text
         title = re.sub("[{}]", "", plain(BIB[key]["title"])).lower().split(":")[0]
-        assert title in text.lower() or key in ("kanoun2011", PAPER)
+        assert title in text.lower() or key in ("kanoun2011", THE_PAPER)
 
 
 def test_every_method_has_a_row_and_every_entry_is_used():
     assert list(KNOWN_METHODS) == [method.name for method in BUILT_IN]
     behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
     text = (ROOT / "analysis" / "references.bib").read_text(encoding="utf-8")
-    assert {PAPER, *ANALYSIS} | behind_methods == set(BIB) == set(keys_in(text))
+    assert {THE_PAPER, *ANALYSIS} | behind_methods == set(BIB) == set(keys_in(text))
 
 
 def test_the_software_is_cited_by_the_facts_of_citation_cff():
@@ -85,7 +85,7 @@ def test_the_software_is_cited_by_the_facts_of_citation_cff():
     assert fields["note"] == f"Version {facts['version']}"
     assert fields["year"] == facts["date-released"][:4]
     assert fields["author"].strip("{}") in text
-    paper = BIB[PAPER]
+    paper = BIB[THE_PAPER]
     for fact in (f'title: "{paper["title"]}"', paper["journal"], f"year: {paper['year']}"):
         assert fact in text
 
@@ -99,9 +99,9 @@ def test_each_work_once_with_the_methods_that_rest_on_it():
     keys = keys_in(text)
     assert len(keys) == len(set(keys))
     assert set(keys) == {"coartic", *BIB} - set(ANALYSIS)
-    assert keys[:2] == ["coartic", PAPER]
+    assert keys[:2] == ["coartic", THE_PAPER]
     assert f"% cma-es/bandit, cma-es/every\n{references()['hansen2016']}\n" in text
-    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", PAPER, *ANALYSIS}
+    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *ANALYSIS}
 
 
 def test_methods_of_others_cite_themselves():
@@ -114,7 +114,7 @@ def test_methods_of_others_cite_themselves():
             "dual-process/EC9": declared("Of another version", "Ours (2030)."),
         }
     )
-    assert keys_in(text) == ["coartic", PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
+    assert keys_in(text) == ["coartic", THE_PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
     assert (
         r"  note = {A. B. C\_d (2020), me@here, 5 \% of "
         r"\textbraceleft{}x\textbraceright{}.}," in text
@@ -143,7 +143,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef with changes}," in text
-    assert keys_in(text) == ["coartic", PAPER, "whitney1969", "method-test-good"]
+    assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]
     assert "% the paper, corrective-alone/given\n" in text
     _, every, _ = call(monkeypatch, capsys, "cite", "--analysis")
     assert set(keys_in(every)) == {"coartic", "coartic-results", *BIB}

@@ -14,8 +14,9 @@ import pytest
 from coartic import load_task
 from coartic.analysis.claims.judge import judgements
 from coartic.analysis.report.contents import TABLES
+from coartic.analysis.statistics.correlations import rank_correlation_estimate
 from coartic.analysis.topics import fourteen
-from coartic.analysis.topics.families.hardness import FEATURES, features_of, rank_correlation
+from coartic.analysis.topics.families.hardness import FEATURES, features_of
 from coartic.baselines.cma_es import Bandit
 from coartic.baselines.random_search import Guesses
 from tests.support.made_up import row, study_of
@@ -138,7 +139,6 @@ def test_intervals_of_rank_correlations_cover_as_they_say():
     covered = 0
     for _ in range(1000):
         first, second = rng.standard_normal((2, 40))
-        pairs = pd.DataFrame({"a": first, "b": r * first + math.sqrt(1 - r**2) * second})
-        seen = rank_correlation(pairs, "a", "b")
+        seen = rank_correlation_estimate(first, r * first + math.sqrt(1 - r**2) * second)
         covered += seen.low < truth < seen.high
     assert 0.92 < covered / 1000 < 0.975

@@ -154,11 +154,11 @@ def test_findings_and_measures_are_of_one_another():
         assert named.keys() <= MODELS.keys()
 
 
-def test_rank_correlation_is_kendalls():
+def test_tau_is_kendalls():
     pairs = np.random.default_rng(2).integers(6, size=(14, 2)).astype(float)
     expected = stats.kendalltau(*pairs.T).statistic
-    assert measures.rank_correlation(pairs) == pytest.approx(expected)
-    assert measures.rank_correlation(np.column_stack([np.zeros(14), np.arange(14)])) == 0
+    assert measures.kendalls_tau(pairs) == pytest.approx(expected)
+    assert measures.kendalls_tau(np.column_stack([np.zeros(14), np.arange(14)])) == 0
 
 
 def test_statistics_of_all_tasks():

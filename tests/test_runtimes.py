@@ -8,7 +8,7 @@ import pytest
 import coartic
 from coartic import CoarticError, load_task
 from coartic.analysis.runtimes import draw, summary
-from coartic.analysis.topics.comparison.runtimes import SPENDS
+from coartic.analysis.topics.comparison.running_times import SPENDS
 from tests.support.commands import call
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 

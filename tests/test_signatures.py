@@ -617,7 +617,7 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
     assert found.contexts.method == EC1
     assert found.contexts.apart == pytest.approx(made_up["apart"])
     assert found.seen == seen
-    assert sentences.answer(study).startswith(answer)
+    assert sentences.answer_contexts(study).startswith(answer)
     if found.placebo is not None:
         assert found.placebo.apart == pytest.approx(made_up.get("of_placebo", 0.5))
         assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)

@@ -12,7 +12,7 @@ from coartic import load_task
 from coartic.analysis.optima import KnownOptimum, initial_reward
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
-from coartic.analysis.topics.comparison import runtimes, scores, sentences
+from coartic.analysis.topics.comparison import running_times, scores, sentences
 from coartic.analysis.topics.comparison.scores import BY_TRIAL, leaders
 from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
@@ -126,15 +126,15 @@ def test_crossings_by_brute_force():
     budgets = np.unique(np.concatenate([part.ravel() for part in spends]))
     for level in (0.1, 0.25, 0.5, 0.9):
         least = next((b for b in budgets if share(b) >= level - 1e-12), math.inf)
-        crossing = runtimes.budget_for(spends, level)
+        crossing = running_times.budget_for(spends, level)
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
-    steps, shares = runtimes.ecdf(spends)
+    steps, shares = running_times.ecdf(spends)
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
-    assert runtimes.share_reached(spends) == pytest.approx(share(1e300))
-    assert math.isnan(runtimes.budget_for([spends[0][:2]], 0.5).low)  # too few runs
+    assert running_times.share_reached(spends) == pytest.approx(share(1e300))
+    assert math.isnan(running_times.budget_for([spends[0][:2]], 0.5).low)  # too few runs
 
 
 def resampled_ends(spends, level):
@@ -174,7 +174,7 @@ def test_a_failed_run_reaches_nothing():
     assert scores.gaps(again).method.tolist() == [learner]
     assert TABLES["against-learner"](again).empty
     assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    (times,) = runtimes.running_times(again)[other, "solve_s"]
+    (times,) = running_times.running_times(again)[other, "solve_s"]
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 
@@ -183,7 +183,7 @@ def test_a_locked_base_is_another_problem():
     locked = seen.runs.assign(parameters=np.where(seen.runs.method == "mine", '{"base": ""}', "{}"))
     again = MadeUp(study_of(locked, list(seen.tasks.values())), optima=seen.optima)
     assert scores.gaps(again).method.tolist() == ["dual-process/EC1"]
-    assert list(runtimes.cells_compared(again)) == ["dual-process/EC1"]
+    assert list(running_times.cells_compared(again)) == ["dual-process/EC1"]
 
 
 def test_the_initial_reward_loses_the_penalty():
@@ -281,7 +281,7 @@ def test_trials_to_the_middle_of_the_way():
                 trials[trial - 1] = half[task]
             rewards[run_id] = trials
     vars(seen)["rewards"] = lambda: iter(rewards.items())
-    middle = runtimes.trials_to_half(seen, "dual-process (EC1, EC4)")
+    middle = running_times.trials_to_half(seen, "dual-process (EC1, EC4)")
     assert middle == {"ascending": 6.0, "two-armed-1": math.inf}
 
 

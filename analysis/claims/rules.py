@@ -172,9 +172,9 @@ def compare_instances(
 def reported_instances(data: Data, family: str) -> dict[str, KnownOptimum]:
     """The best known of a family's instances but for those of development, for tuning."""
     instances = sample(data.study)
-    names = instances.families.get(family, ()) if instances else ()
+    names = instances.families.get(family, ())
     reported = [name for name in names if data.task(name).split != "development"]
-    if instances is None or not reported:
+    if not reported:
         raise MissingError(f"this folder has no instances of {family} that can be judged")
     return {name: instances.references[name] for name in reported}
 

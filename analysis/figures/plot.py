@@ -17,11 +17,11 @@ from matplotlib.transforms import Bbox
 
 from coartic import CoarticError, Task
 from coartic.analysis.figures.style import (
+    BACKGROUND,
     BLUE,
     CURVE,
     GREY,
     INK,
-    PAPER,
     RC,
     SKY,
     TIP,
@@ -220,7 +220,7 @@ def shorten(attribute: re.Match[str]) -> str:
 def coloured(text: str) -> str:
     """SVG whose colours are the page's, so that they show on dark as well."""
     # The backend leaves black fills out: they inherit the root's.
-    text = text.replace(INK, "currentColor").replace(PAPER, "var(--paper, none)")
+    text = text.replace(INK, "currentColor").replace(BACKGROUND, "var(--paper, none)")
     for color, name in ((GREY, "grey"), (BLUE, "blue"), (SKY, "sky")):
         text = text.replace(color, f"var(--{name}, {color})")
     return text

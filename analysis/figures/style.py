@@ -12,12 +12,14 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
 
+import pandas as pd
 from matplotlib import rc_params_from_file, style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
+from numpy.typing import ArrayLike
 
 from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, is_built_in, look_alike
 from coartic.analysis.statistics import estimates
@@ -35,9 +37,9 @@ _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Matplotlib's settings of all figures."""
 SMALL, NORMAL = RC["font.size"], RC["axes.titlesize"]  # pt
-CONFIDENCE = f"{100 * estimates.CONFIDENCE:.0f} %"
+COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
-PAPER = "#ffffff"
+BACKGROUND = "#ffffff"
 TIP = "tip:"
 """How the id of a mark with a :func:`tip` begins."""
 CURVE = "curve:"
@@ -128,6 +130,26 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """A legend below all panels."""
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **more)
+
+
+def means(
+    axes: Axes,
+    places: ArrayLike,
+    rows: pd.DataFrame,
+    column: str,
+    *,
+    scale: float = 1.0,
+    bars: float | None = 0.8,
+    **line: Any,
+) -> None:
+    """Means of a table (``column``) at some places, with their intervals where it has them.
+
+    ``bars``: width of the intervals' lines, points. ``line``: looks of the line through the means.
+    """
+    if f"{column}_low" in rows:
+        ends = scale * rows[f"{column}_low"], scale * rows[f"{column}_high"]
+        axes.vlines(places, *ends, line["color"], linewidth=bars)
+    axes.plot(places, scale * rows[column], **{"marker": "o", "markersize": 3, **line})
 
 
 def tip(artist: Artist, text: str) -> None:

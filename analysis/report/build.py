@@ -23,7 +23,7 @@ from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
 from coartic.analysis.report.numbers import numbers_tex
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
-from coartic.analysis.report.text import answers, environment
+from coartic.analysis.report.text import answers, templates
 from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
@@ -151,7 +151,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
 def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
-    template = environment(escape=True).get_template("page.html.jinja")
+    template = templates(escape=True).get_template("page.html.jinja")
     ids = {section.id for section in visible_sections(study)}
     scripts = [(here / name).read_text("utf-8") for name in ("page.js", "address.js")]
     try:
@@ -177,7 +177,7 @@ def page(study: Study) -> str:
 
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
-    texts = environment(escape=False)
+    texts = templates(escape=False)
     texts.filters["inert"] = inert
     template = texts.get_template("summary.md.jinja")
     return template.render(

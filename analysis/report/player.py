@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from coartic import MotionModel, Movement, Trajectory, execute
-from coartic.analysis.methods import CONDITIONS, in_order, main_methods, name_of
+from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.topics.comparison.scores import labels_by_task
 from coartic.analysis.topics.comparison.sentences import most_improved
+from coartic.analysis.trajectories import postures
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS, Array
 
@@ -36,9 +37,10 @@ def player(study: Study) -> str:
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
         (up, down), first = shared.tasks, shared.method
         both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:]}
-        presets.append(both | {"runs": runs_of(study, [up.name, down.name])})
+        presets.append(both | {"runs": methods_played(study, [up.name, down.name])})
     alone = {
-        name: preset_of(study.tasks[name]) | {"runs": runs_of(study, [name])} for name in tasks
+        name: preset_of(study.tasks[name]) | {"runs": methods_played(study, [name])}
+        for name in tasks
     }
     alone = {name: preset for name, preset in alone.items() if preset["runs"]}
     presets += alone.values()
@@ -64,22 +66,22 @@ def player(study: Study) -> str:
     )
 
 
-def runs_of(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
+def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """Methods with solved runs on all of these tasks: their names, and of each task the movements
     of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
     which they share."""
     labels = [label for name, label in study.cells if name == tasks[0]]
     ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
-    shown = {*CONDITIONS, *main_methods(labels), *ranked}
+    shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
     for label in in_order([label for label in labels if label in shown]):
         cells = [(name, label) for name in tasks]
         if all(cell in study.cells and study.trajectories(*cell).runs for cell in cells):
             films = [typical_of(study, cell) for cell in cells]
             if len(tasks) > 1:
-                films = [
-                    film | postures(study, cell) for film, cell in zip(films, cells, strict=True)
-                ]
+                for film, cell in zip(films, cells, strict=True):
+                    hits = postures(study.trajectories(*cell).runs, 1)
+                    film["reached"] = hits.round(3).tolist()
             runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
 
@@ -92,14 +94,8 @@ def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
     return {
         "run": str(good.run_id.iloc[k]),
         "ticks": runs[k].ticks,
-        "movements": [plain(movement) for movement in shortened(runs[k], study.model)],
+        "movements": [for_script(movement) for movement in shortened(runs[k], study.model)],
     }
-
-
-def postures(study: Study, cell: CellKey) -> dict[str, Any]:
-    """Where the runs of a cell hit goal 1."""
-    runs = study.trajectories(*cell).runs
-    return {"reached": [run.execution.configurations[0].round(3).tolist() for run in runs]}
 
 
 def shortened(run: Trajectory, model: MotionModel) -> tuple[Movement, ...]:
@@ -149,7 +145,7 @@ def bends(points: Array, tolerance: float) -> Array:
     return points[sorted(kept)]
 
 
-def plain(movement: Movement) -> dict[str, Any]:
+def for_script(movement: Movement) -> dict[str, Any]:
     """A movement as ``model.js`` executes it."""
     made = {"goal": movement.goal - 1, "hand": HANDS.index(movement.hand), "kind": movement.kind}
     if movement.waypoints is not None:

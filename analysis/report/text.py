@@ -17,17 +17,17 @@ from coartic.analysis.topics.paper import sentences as paper
 from coartic.text import one_line
 
 ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
-    ("Which setting is best?", "Best", {"settings": settings.answer}),
+    ("Which setting is best?", "Best", {"settings": settings.answer_settings}),
     (
         "Does the next goal change the movement?",
         "Coarticulation",
         {
-            "coarticulation": coarticulation.answer,
-            "slopes": coarticulation.answer_by_slopes,
+            "coarticulation": coarticulation.answer_contexts,
+            "slopes": coarticulation.answer_slopes,
             "learning": comparison.answer_gain,
         },
     ),
-    ("Is the paper reproduced?", "Paper", {"paper": paper.answer}),
+    ("Is the paper reproduced?", "Paper", {"paper": paper.answer_paper}),
     ("Who comes nearest to the optimum?", "Nearest", {"nearest": comparison.answer_nearest}),
     ("What does it cost?", "Cost", {"runtimes": comparison.answer_runtimes}),
 )
@@ -38,9 +38,9 @@ By the section that says more. The first answer that is not empty counts.
 
 
 @cache
-def environment(*, escape: bool) -> Environment:
+def templates(*, escape: bool) -> Environment:
     """The templates; ``escape``: for HTML."""
-    templates = Environment(
+    environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         undefined=StrictUndefined,
         autoescape=escape,
@@ -49,12 +49,12 @@ def environment(*, escape: bool) -> Environment:
         keep_trailing_newline=True,
         finalize=lambda value: shown(value) if type(value) is str else value,
     )
-    templates.filters |= {
+    environment.filters |= {
         "number": words.number,
         "listed": words.listed,
         "capital": words.capital,
     }
-    return templates
+    return environment
 
 
 def shown(text: str) -> str:

@@ -22,6 +22,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.coarticulation.values import pairs_of_contexts
 from coartic.analysis.trajectories import Trajectories
+from coartic.analysis.words import interval_in_words
 
 RANDOM = "random"
 """Random tasks of all families together, a task alike."""
@@ -150,7 +151,7 @@ LOOKS: dict[str, tuple[str, str, Any]] = {
     "itself (0) to the whole task (1), judged by its noiseless replay. a: ticks by which postures "
     "leave the next goal nearer; b: by which the first movement is longer than the corrective "
     "process's; c: ticks saved, of the initial solution's. Means over random tasks with their "
-    f"{style.CONFIDENCE} interval. d: distance of the postures at the goal that ascending and "
+    f"{style.COVERAGE} interval. d: distance of the postures at the goal that ascending and "
     "descending share. Grey: the best of random guesses, which selects.",
 )
 def draw_dose(study: Study) -> Parts:
@@ -168,9 +169,8 @@ def draw_dose(study: Study) -> Parts:
                 axes.axhline(rows[name].iloc[0], color=color, linestyle=dash, label=words)
                 continue
             places = rows.dose + 0.01 * (counted == "later")
-            if name in MEASURES:
-                axes.vlines(places, rows[f"{name}_low"], rows[f"{name}_high"], color, linewidth=0.8)
-            axes.plot(places, rows[name], "o", ls=dash, color=color, markersize=3.5, label=words)
+            line: Any = {"color": color, "linestyle": dash, "markersize": 3.5, "label": words}
+            style.means(axes, places, rows, name, **line)
         axes.set_ylabel(MEASURES.get(name, "postures apart"))
         axes.set_xlabel("γ")
     style.letters(panels)
@@ -193,7 +193,7 @@ def finding_of_dose(study: Study) -> str:
         ("nearer", " ticks", "postures leave the next goal nearer by {}"),
         ("first", " ticks", "the first movement is longer by {}"),
     ):
-        values = [random_tasks.interval_in_words(by_dose[g], name, unit) for g in (0.0, 0.5, 1.0)]
+        values = [interval_in_words(by_dose[g], name, unit) for g in (0.0, 0.5, 1.0)]
         parts.append(words.format(f"{values[0]}, {values[1]} and {values[2]}"))
     return (
         f"On {by_dose[1.0]['tasks']} random tasks, where the rewards of the other movements count "
@@ -206,11 +206,7 @@ def learned_at(data: Data, name: str, dose: float = math.nan, counted: str = "al
     frame = dose_values(data.study)
     guesses = math.isnan(dose)
     kept = frame.dose.isna() if guesses else (frame.dose == dose) & (frame.counted == counted)
-    tasks = {task: data.task(task) for task in frame.task}
-    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
-    rows = frame[kept & frame.task.isin(drawn)]
-    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
-    return by_task(rows, name)
+    return by_task(random_tasks.judged(data, frame[kept]), name)
 
 
 @judges(

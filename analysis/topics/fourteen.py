@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import horizon, random_tasks
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.topics.families.tables import family_runs, instance_gaps
-from coartic.analysis.words import plural
+from coartic.analysis.words import interval_in_words, plural
 
 MANY = "fourteen-one/v1", "fourteen-two/v1"
 """Families with fourteen goals."""
@@ -40,7 +41,7 @@ def gains_by_horizon(study: Study) -> pd.DataFrame:
     no run has the horizon before, of each goal since the last that was run, alike. ``together``:
     the gains of all goals ahead up to this one. ``gap``: per cent of the best known.
     """
-    references = instances.references if (instances := sample(study)) else {}
+    references = sample(study).references
     rows = []
     for (name, *kind), plans in horizon.plans_by_horizon(study).items():
         task = study.tasks[name]
@@ -83,7 +84,7 @@ def fourteen(study: Study) -> Rows:
     "fourteen",
     "Sequences of fourteen goals",
     "Means over random tasks with fourteen goals, for one arm and for two, with their "
-    f"{style.CONFIDENCE} intervals (bootstrap over tasks). (a) Gap to the best known solution by "
+    f"{style.COVERAGE} intervals (bootstrap over tasks). (a) Gap to the best known solution by "
     "goals ahead; dotted: learner, dash-dotted: CMA-ES. (b) What each goal ahead gains at a "
     "movement that has it, in per cent of a mean movement; linear below 1 %. (c) Gains together, "
     "with fourteen goals and with seven (open): on each other if a horizon is a number of goals; "
@@ -97,10 +98,11 @@ def draw_fourteen(study: Study) -> Parts:
     drawing, panels = style.figure_of((1, 3), (style.TWO, 2.8))
     for color, name, *families in zip(style.PALETTE, ARMS, MANY, HALF, strict=False):
         rows, seven = (data[data.family == family] for family in families)
+        line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
         for axes, column in zip(panels, ("gap", "gain", "together"), strict=True):
-            horizon.curve(axes, rows.h, rows, column, color=color, label=name)
-        empty = {"color": color, "label": f"{name}, seven", "markerfacecolor": style.PAPER}
-        horizon.curve(panels[2], seven.h, seven, "together", **empty)
+            style.means(axes, rows.h, rows, column, **line, label=name)
+        empty = line | {"label": f"{name}, seven", "markerfacecolor": style.BACKGROUND}
+        style.means(panels[2], seven.h, seven, "together", **empty)
         for method, dash in (("dual-process", "dotted"), ("cma-es", "dashdot")):
             for gap in rows.gap[rows.method.str.startswith(method)]:
                 panels[0].axhline(100 * gap, color=color, linestyle=dash, linewidth=1)
@@ -124,7 +126,7 @@ def finding_of_fourteen(study: Study) -> str:
     data, seen = fourteen(study), []
     for arms, family in zip(ARMS, MANY, strict=True):
         rows = data[(data.family == family) & data.h.between(1, 4)].to_dict("records")
-        gains = [random_tasks.interval_in_words(row, "gain", scale=100) for row in rows]
+        gains = [interval_in_words(row, "gain", scale=100) for row in rows]
         if gains:
             seen.append(f"{', '.join(gains)} with {arms} ({plural(rows[0]['tasks'], 'task')})")
     start = "Of fourteen goals the first ones ahead gain, in per cent of a mean movement that has "
@@ -134,10 +136,8 @@ def finding_of_fourteen(study: Study) -> str:
 def values_at(data: Data, families: tuple[str, ...], h: int, column: str) -> pd.Series:
     """A column of the gains on the test tasks of families, with h goals ahead, by task."""
     every = gains_by_horizon(data.study)
-    rows = every[every.family.isin(families) & (every.h == h)].set_index("task")
-    rows = rows.loc[[name for name in rows.index if data.task(name).split != "development"]]
-    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
-    return rows[column]
+    rows = every[every.family.isin(families) & (every.h == h)]
+    return random_tasks.judged(data, rows).set_index("task")[column]
 
 
 def fourth_goal_gains(data: Data, *, family: str, side: int) -> Finding:
@@ -179,7 +179,9 @@ for _side, _name, _than in ((1, "number", "more"), (-1, "share", "less")):
     )(two_of_fourteen)
 
 
-def behind_planner(data: Data, *, who: str, labels: tuple[str, ...], h: int, arms: int) -> Finding:
+def loses_more_than_planner(
+    data: Data, *, who: str, labels: tuple[str, ...], h: int, arms: int
+) -> Finding:
     """Gap of a method less that of the planner with h goals ahead, for so many arms at most."""
     planned, gaps = values_at(data, MANY[:arms], h, "gap"), instance_gaps(data.study)
     behind = 100 * gaps[gaps.method.isin(labels)].set_index("task").gap - planned
@@ -197,7 +199,7 @@ judges(
     labels=(EC1, EC4),
     h=0,
     arms=2,
-)(behind_planner)
+)(loses_more_than_planner)
 judges(
     "cma-es-behind-one-goal-ahead",
     test="one-tailed bootstrap test over random tasks with fourteen goals for one arm: the gap of "
@@ -206,7 +208,7 @@ judges(
     labels=("cma-es/bandit",),
     h=1,
     arms=1,
-)(behind_planner)
+)(loses_more_than_planner)
 
 
 FOURTEEN = Section(

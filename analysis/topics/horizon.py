@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from coartic import Task
 from coartic.analysis.claims.data import Data, judges
 from coartic.analysis.claims.register import MARGINS, Finding
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.methods import most_exploring
-from coartic.analysis.optima import gap_share
 from coartic.analysis.section import Section
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.words import plural
+from coartic.analysis.words import interval_in_words, plural
 from coartic.motion.costs import joint_costs, segment_lengths
 from coartic.tasks.task import MOST_GOALS
 
@@ -87,7 +83,7 @@ def gaps_by_horizon(study: Study) -> pd.DataFrame:
     movement, four of five; ``cells`` behind the gaps by horizon. Of ticks, over the best known of
     the task; with costly joints over the shortest of all runs with the same costs.
     """
-    references = instances.references if (instances := sample(study)) else {}
+    references = sample(study).references
     seen = plans_by_horizon(study)
     rows = {}
     for (name, hands, costly), plans in seen.items():
@@ -198,7 +194,7 @@ PLACES = [str(h) for h in HORIZONS]
 @figure(
     "horizon",
     "Gap of a planner by how far it looks ahead",
-    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    f"Gap to the best known solution, mean over random tasks with its {style.COVERAGE} interval "
     "(bootstrap over tasks), linear below 1 %, at horizons that all of a line's tasks have. By "
     "goals of the task: a line ends where all goals are in view. Given hands: hands chosen by each "
     "plan, or those of the plan with all goals. Dear joints cost three times as much, by weighted "
@@ -219,7 +215,8 @@ def draw_horizon(study: Study) -> Parts:
                 rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
             rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
             at = rows.h.map(PLACES.index) + 0.08 * number
-            curve(axes, at, rows, "gap", color=color, label=str(name))
+            line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
+            style.means(axes, at, rows, "gap", **line, label=str(name))
         axes.set_xticks(range(len(PLACES)), PLACES)
         axes.set_xlabel("goals ahead")
         axes.set_title(titles[group])
@@ -235,24 +232,16 @@ def draw_horizon(study: Study) -> Parts:
     return drawing, data, f"Gain of each goal ahead where it exists. {'; '.join(each)}.", ()
 
 
-def curve(axes: Axes, at: pd.Series, rows: pd.DataFrame, column: str, **line: Any) -> None:
-    """Means at some places with their intervals."""
-    axes.vlines(
-        at, 100 * rows[f"{column}_low"], 100 * rows[f"{column}_high"], line["color"], lw=0.9
-    )
-    axes.plot(at, 100 * rows[column], marker="o", markersize=3, linewidth=1.2, **line)
-
-
 def finding_of_horizon(study: Study) -> str:
     """Gaps without and with one goal ahead, and what further goals gain on tasks that have them."""
     data = horizon(study)
     by_h = data[data.group == "all"].set_index("h").to_dict("index")
     if not {"0", "1"} <= by_h.keys():
         return ""
-    gaps = [random_tasks.interval_in_words(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
+    gaps = [interval_in_words(by_h[h], "gap", " %", scale=100) for h in ("0", "1")]
     names = {"2": "the second gains", "3": "the third gains", "4": "the fourth gains"}
     further = [
-        f"{words} {random_tasks.interval_in_words(by_h[h], 'gain', ' %', scale=100)} "
+        f"{words} {interval_in_words(by_h[h], 'gain', ' %', scale=100)} "
         f"({plural(by_h[h]['tasks'], 'task')})"
         for h, words in {**names, BEYOND: "the others together gain"}.items()
         if h in by_h and not math.isnan(by_h[h]["gain"])
@@ -285,6 +274,17 @@ def gaps_of(
     return pd.DataFrame({**gaps, **there, "ahead": MOST_GOALS})
 
 
+@judges(
+    "first-of-several-goals-ahead-gains-most",
+    test="one-tailed bootstrap test over random tasks with three goals or more: the gap of the "
+    "planner falls by more from no goal ahead to one than from one to all",
+)
+@judges(
+    "first-goal-ahead-gains-most",
+    test="one-tailed bootstrap test over random tasks: the gap of the planner falls by more from "
+    "no goal ahead to one than from one to all",
+    flawed=True,
+)
 def first_goal_gains_most(data: Data, *, flawed: bool = False) -> Finding:
     """Gain of the first goal ahead less that of all further ones."""
     gaps = gaps_of(data, flawed=flawed)
@@ -293,18 +293,18 @@ def first_goal_gains_most(data: Data, *, flawed: bool = False) -> Finding:
     return random_tasks.means_over_tasks({sentence: (more.where(gaps.ahead > 1), 0.0, 1)})
 
 
-judges(
-    "first-of-several-goals-ahead-gains-most",
-    test="one-tailed bootstrap test over random tasks with three goals or more: the gap of the "
-    "planner falls by more from no goal ahead to one than from one to all",
-)(first_goal_gains_most)
-judges(
-    "first-goal-ahead-gains-most",
-    test="one-tailed bootstrap test over random tasks: the gap of the planner falls by more from "
-    "no goal ahead to one than from one to all",
-)(partial(first_goal_gains_most, flawed=True))
-
-
+@judges(
+    "further-goals-gain-little-where-they-are",
+    test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
+    "planner falls by more than {gain:g} % on tasks with three goals or more, and from three to "
+    "four by less on those with five or more",
+)
+@judges(
+    "further-goals-gain-little",
+    test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
+    "planner falls by more than {gain:g} %, and from three to four by less",
+    flawed=True,
+)
 def further_goals_gain_little(data: Data, *, flawed: bool = False) -> Finding:
     """Gains of the second and of the fourth goal ahead."""
     gaps, least = gaps_of(data, flawed=flawed), MARGINS["gain"]
@@ -314,19 +314,6 @@ def further_goals_gain_little(data: Data, *, flawed: bool = False) -> Finding:
             "the fourth gains {} points": (gaps[3] - gaps[4], least, -1),
         }
     )
-
-
-judges(
-    "further-goals-gain-little-where-they-are",
-    test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
-    "planner falls by more than {gain:g} % on tasks with three goals or more, and from three to "
-    "four by less on those with five or more",
-)(further_goals_gain_little)
-judges(
-    "further-goals-gain-little",
-    test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
-    "planner falls by more than {gain:g} %, and from three to four by less",
-)(partial(further_goals_gain_little, flawed=True))
 
 
 @judges(
@@ -345,6 +332,19 @@ def most_of_the_loss_is_posture(data: Data) -> Finding:
     return random_tasks.means_over_tasks({sentence: (given - share * planned, 0.0, 1)})
 
 
+@judges(
+    "dear-joints-keep-the-horizon-where-goals-are",
+    test="one-tailed bootstrap tests over random tasks, of the weighted path length that was "
+    "executed: from one goal ahead to two the gap falls by more than {gain:g} % on tasks with "
+    "four goals or six, and from four to all by less on those with six, with either dear",
+)
+@judges(
+    "dear-joints-keep-the-horizon",
+    test="one-tailed bootstrap tests over random tasks with four goals or six, of the weighted "
+    "path length that was executed: from one goal ahead to two the gap falls by more than "
+    "{gain:g} %, and from four to all by less, with either dear",
+    flawed=True,
+)
 def dear_joints_keep_the_horizon(data: Data, *, flawed: bool = False) -> Finding:
     """Gains of the second goal ahead, and of those beyond the fourth, with dear joints."""
     parts, least = {}, MARGINS["gain"]
@@ -357,20 +357,6 @@ def dear_joints_keep_the_horizon(data: Data, *, flawed: bool = False) -> Finding
     return random_tasks.means_over_tasks(parts)
 
 
-judges(
-    "dear-joints-keep-the-horizon-where-goals-are",
-    test="one-tailed bootstrap tests over random tasks, of the weighted path length that was "
-    "executed: from one goal ahead to two the gap falls by more than {gain:g} % on tasks with "
-    "four goals or six, and from four to all by less on those with six, with either dear",
-)(dear_joints_keep_the_horizon)
-judges(
-    "dear-joints-keep-the-horizon",
-    test="one-tailed bootstrap tests over random tasks with four goals or six, of the weighted "
-    "path length that was executed: from one goal ahead to two the gap falls by more than "
-    "{gain:g} %, and from four to all by less, with either dear",
-)(partial(dear_joints_keep_the_horizon, flawed=True))
-
-
 @judges(
     "learner-behind-one-goal-ahead",
     test="one-tailed bootstrap test over random tasks: the learner's gap is higher by more than "
@@ -378,14 +364,11 @@ judges(
 )
 def learner_behind_one_goal_ahead(data: Data) -> Finding:
     """Gap of the learner less that of the planner with one goal ahead."""
-    gaps, instances = gaps_of(data), sample(data.study)
-    references = instances.references if instances else {}
-    learner = {}
+    gaps, instances, learner = gaps_of(data), sample(data.study), {}
     for name in gaps.index:
-        cell = data.study.cells.get((name, most_exploring(data.task(name))))
-        if cell is not None and len(cell.good):
-            share = gap_share(cell.rewards, references[name].reward)
-            learner[name] = 100 * float(share.mean())
+        gap, cell = instances.gap(name, "learner"), instances.cell(name, "learner")
+        if gap is not None and cell is not None:
+            learner[name] = 100 * float(gap.mean())
             data.run_ids.extend(cell.good.run_id)
     behind = pd.Series(learner, dtype=np.float64) - gaps[1]
     sentence = "The learner loses {} points more than the planner with one goal ahead"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from coartic.analysis.statistics.estimates import FEWEST, RESAMPLES, SEED, TAILS
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
-from coartic.analysis.words import capital, estimate, number
+from coartic.analysis.words import capital, estimate, interval_in_words, number
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
@@ -211,7 +210,7 @@ def crossings(study: Study) -> Rows:
     "objectives",
     "Regret by how wrong a planner's objective is",
     "Regret under the true reward, which loses a penalty of this weight beside 1 a tick: mean over "
-    f"random tasks with its {style.CONFIDENCE} interval (bootstrap over tasks), in per cent of the "
+    f"random tasks with its {style.COVERAGE} interval (bootstrap over tasks), in per cent of the "
     "best known reward. Bands: the interval of the weight at which the learner (blue) and CMA-ES "
     "(green), which are told nothing, overtake the planner of ticks. Horizontally by the square "
     "root.",
@@ -236,9 +235,9 @@ def draw_objectives(study: Study) -> Parts:
             axes.axvspan(*np.minimum([at["crossing_low"], at["crossing_high"]], edge), **band)
         for who, (words, color, dash) in WHO.items():
             rows = data[(data.term == term) & (data.who == who)]
-            line: Any = {"color": color, "linestyle": dash, "marker": "o", "markersize": 3}
-            axes.vlines(rows.weight, rows.regret_low, rows.regret_high, color, linewidth=0.8)
-            axes.plot(rows.weight, rows.regret, **line, label=words.removeprefix("the "))
+            line: Any = {"color": color, "linestyle": dash}
+            label = words.removeprefix("the ")
+            style.means(axes, rows.weight, rows, "regret", **line, label=label)
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("regret (%)")
     style.letters(panels)
@@ -264,7 +263,7 @@ def finding_of_objectives(study: Study) -> str:
         f"learner {', '.join(f'{number(regret, 1)} %' for regret in regrets.learner)}."
     )
     overtakes = [
-        f"{random_tasks.interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
+        f"{interval_in_words(row, 'crossing', digits=0)} with {words[row['term']]}"
         for row in crossings(study).to_dict("records")
         if row["who"] == "learner"
     ]
@@ -307,7 +306,11 @@ for _claim, (_first, _second, _weight, _terms) in CLAIMED.items():
         _claim,
         test="one-tailed bootstrap tests over random tasks that the first regrets less than the "
         "second by more than {regret:g} % of the best known reward",
-    )(partial(less_regret, first=_first, second=_second, weight=_weight, terms=_terms))
+        first=_first,
+        second=_second,
+        weight=_weight,
+        terms=_terms,
+    )(less_regret)
 
 
 OBJECTIVES = Section(

@@ -20,7 +20,7 @@ from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.words import capital, estimate, number
+from coartic.analysis.words import capital, estimate, interval_in_words, number
 
 AGENTS, PLANNER, UNPRACTISED = "agents", "planner", "corrective process"
 WHOSE = {
@@ -35,13 +35,13 @@ KEYS = ["who", "practice", "ahead"]
 
 
 @cached
-def gaps(study: Study) -> pd.DataFrame:
+def practice_values(study: Study) -> pd.DataFrame:
     """Gaps to the best known of each random task, per cent, a row for each solved cell.
 
     Columns ``who``, ``practice`` (trials, 0 without), ``ahead``, ``agent``, ``task``, ``goals``,
     ``gap``, ``cell``. Empty without agents.
     """
-    references = instances.references if (instances := sample(study)) else {}
+    references = sample(study).references
     cells, rows = random_tasks.solved_cells(study), []
     for method, who in WHOSE.items() if next(iter(WHOSE)) in cells else ():
         for cell, asked in cells.get(method, ()):
@@ -104,7 +104,7 @@ def practice(study: Study) -> Rows:
 
     ``best_agent``, ``worst_agent``: means of single agents. ``gain``: of the last goal in view.
     """
-    frame = gaps(study)
+    frame = practice_values(study)
     groups: Any = frame.groupby(KEYS, sort=False)
     for (who, trials, ahead), rows in groups:
         by_agent = of(frame, who, trials, ahead) / 100
@@ -123,7 +123,7 @@ def practice(study: Study) -> Rows:
 @figure(
     "practice",
     "What practice on other tasks gains, by goals ahead",
-    f"Gap to the best known solution, mean over random tasks with its {style.CONFIDENCE} interval "
+    f"Gap to the best known solution, mean over random tasks with its {style.COVERAGE} interval "
     "(bootstrap over tasks). a: agents that see 0 to 4 goals ahead, by trials of practice; 0 is "
     "the corrective process. b: by goals ahead, agents after all practice (dots: single ones) "
     "beside the planner.",
@@ -136,17 +136,18 @@ def draw_practice(study: Study) -> Parts:
         raise missing(study, "no agents that have practised")
     drawing, (left, right) = style.figure_of((1, 2), (style.TWO, 2.8), sharey=True)
     counts, views = [0, *sorted(agents.practice.unique())], [*map(str, AHEAD), "all"]
+    line: Any = {"scale": 100, "bars": 0.9}
     for color, ahead in zip(style.PALETTE, AHEAD, strict=False):
         rows = agents[agents.h == str(ahead)].sort_values("practice")
         rows = pd.concat([data[data.who == UNPRACTISED], rows])
-        curve(
-            left, rows, [counts.index(n) + 0.06 * ahead for n in rows.practice], color, str(ahead)
-        )
-        single = of(gaps(study), AGENTS, counts[-1], ahead).mean()
+        places = [counts.index(n) + 0.06 * ahead for n in rows.practice]
+        style.means(left, places, rows, "gap", color=color, label=str(ahead), **line)
+        single = of(practice_values(study), AGENTS, counts[-1], ahead).mean()
         right.plot([ahead + 0.15] * len(single), single, ".", color=style.BLUE, markersize=3)
     last = agents[agents.practice == counts[-1]]
     for rows, color, name in ((last, style.BLUE, "agents"), (planner, style.VERMILLION, "planner")):
-        curve(right, rows, list(map(views.index, rows.h)), color, name)
+        places = list(map(views.index, rows.h))
+        style.means(right, places, rows, "gap", color=color, label=name, **line)
     left.set_xticks(range(len(counts)), [f"{n:,}".replace(",", " ") for n in counts])
     left.set_xlabel("trials of practice")
     left.set_ylabel("gap (%)")
@@ -160,17 +161,11 @@ def draw_practice(study: Study) -> Parts:
     return drawing, data, f"Gaps by practice and goals ahead. {'; '.join(each)}.", ()
 
 
-def curve(axes: Any, rows: pd.DataFrame, places: list[float], color: str, name: str) -> None:
-    """Means with their intervals."""
-    axes.vlines(places, 100 * rows.gap_low, 100 * rows.gap_high, color=color, linewidth=0.9)
-    axes.plot(places, 100 * rows.gap, color=color, marker="o", markersize=3, label=name)
-
-
 def finding_of_practice(study: Study) -> str:
     """Gaps without and with a goal ahead after all practice, and what further goals gain."""
     data = practice(study)
     try:
-        silent = why_silent(gaps(study))
+        silent = why_silent(practice_values(study))
     except MissingError:
         return ""
     if silent:
@@ -179,7 +174,7 @@ def finding_of_practice(study: Study) -> str:
         data.loc[f"{AGENTS} {ALL_TRIALS} h={h}"].to_dict() for h in (0, 1, 2, 4)
     )
     words = [
-        random_tasks.interval_in_words(row, name, " %", scale=100)
+        interval_in_words(row, name, " %", scale=100)
         for row, name in ((none, "gap"), (one, "gap"), (two, "gain"), (four, "gain"))
     ]
     return (
@@ -196,24 +191,9 @@ def over_agents(values: pd.Series) -> Estimate:
     return Estimate(float(values.mean()), p=p, n=(len(values),))
 
 
-Part = tuple[str, pd.DataFrame, float, int]
-"""A sentence with a place for a mean, values by task and agent, a bound, and 1 where their mean
-should be above it, -1 below."""
-
-
-def finding(parts: list[Part]) -> Finding:
-    """The finding of a claim: over tasks and over agents means are on the side they should."""
-    tests: dict[int, list[Estimate]] = {1: [], -1: []}
-    seen = []
-    for sentence, values, bound, sign in parts:
-        by_task, by_agent = values.mean(axis=1), values.mean()
-        for side, estimates in tests.items():
-            estimates += [random_tasks.over_tasks(side * sign * by_task, side * sign * bound)]
-            estimates += [over_agents(side * sign * (by_agent - bound))]
-        single = f"agents {number(by_agent.min(), 2)} to {number(by_agent.max(), 2)}"
-        seen.append(f"{sentence.format(estimate(mean(by_task), 2))} ({single})")
-    holds = all(test.value > 0 for test in tests[1])
-    return Finding(holds, f"{capital('; '.join(seen))}.", tuple(tests[1]), tuple(tests[-1]))
+Sides = list[tuple[str, pd.DataFrame, float, int]]
+"""Of each part a sentence with a place for a mean, values by task and agent, a bound, and 1 where
+their mean should be above it, -1 below."""
 
 
 def of_agents(frame: pd.DataFrame, first: tuple[int, int], second: tuple[int, int]) -> pd.DataFrame:
@@ -221,28 +201,28 @@ def of_agents(frame: pd.DataFrame, first: tuple[int, int], second: tuple[int, in
     return (of(frame, AGENTS, *first) - of(frame, AGENTS, *second)).dropna()
 
 
-def gains_more(frame: pd.DataFrame) -> list[Part]:
+def gains_more(frame: pd.DataFrame) -> Sides:
     """Practice with two goals ahead against none."""
     two, none = (of_agents(frame, (EARLY, h), (ALL_TRIALS, h)) for h in (2, 0))
     words = "practice gains {} points more with two goals ahead than with none"
     return [(words, (two - none).dropna(), 0.0, 1)]
 
 
-def gains_longer(frame: pd.DataFrame) -> list[Part]:
+def gains_longer(frame: pd.DataFrame) -> Sides:
     """The last three quarters with four goals ahead against none."""
     four, none = (of_agents(frame, (LATER, h), (ALL_TRIALS, h)) for h in (4, 0))
     words = "the last three quarters gain {} points more with four goals ahead than with none"
     return [(words, (four - none).dropna(), 0.0, 1)]
 
 
-def lengthens(frame: pd.DataFrame) -> list[Part]:
+def lengthens(frame: pd.DataFrame) -> Sides:
     """Goals beyond the first ahead, after practice against early on."""
     after, before = (of_agents(frame, (trials, 1), (trials, 4)) for trials in (ALL_TRIALS, EARLY))
     words = "the second to fourth goals ahead gain {} points more after practice"
     return [(words, (after - before).dropna(), 0.0, 1)]
 
 
-def first_most(frame: pd.DataFrame) -> list[Part]:
+def first_most(frame: pd.DataFrame) -> Sides:
     """Goals beyond the first ahead after practice, and the first against them."""
     first, further = (
         of_agents(frame, (ALL_TRIALS, fewer), (ALL_TRIALS, more))
@@ -254,7 +234,7 @@ def first_most(frame: pd.DataFrame) -> list[Part]:
     ]
 
 
-def stays_behind(frame: pd.DataFrame) -> list[Part]:
+def stays_behind(frame: pd.DataFrame) -> Sides:
     """Agents against the planner that sees as much, with two goals or more."""
     words = {
         2: "with two goals ahead agents are {} points behind",
@@ -264,15 +244,25 @@ def stays_behind(frame: pd.DataFrame) -> list[Part]:
     return [(words[h], behind_planner(frame, h), MARGINS["gain"], 1) for h in words]
 
 
-def judge(data: Data, *, parts: Any) -> Finding:
-    """A claim on tasks that methods were not tuned on. Raises MissingError where the agents have
-    not learned."""
-    frame = gaps(data.study)
-    frame = frame[[data.task(name).split != "development" for name in frame.task]]
-    data.run_ids.extend(run for cell in frame.cell for run in cell.good.run_id)
+def judge_parts(data: Data, *, parts: Any) -> Finding:
+    """Whether over tasks and over agents the means of some parts are on the side they should.
+
+    Raises MissingError where the agents have not learned.
+    """
+    frame = random_tasks.judged(data, practice_values(data.study))
     if silent := why_silent(frame):
         raise MissingError(f"the agents have not learned: {silent}")
-    return finding(parts(frame))
+    tests: dict[int, list[Estimate]] = {1: [], -1: []}
+    seen = []
+    for sentence, values, bound, sign in parts(frame):
+        by_task, by_agent = values.mean(axis=1), values.mean()
+        for side, estimates in tests.items():
+            estimates += [random_tasks.over_tasks(side * sign * by_task, side * sign * bound)]
+            estimates += [over_agents(side * sign * (by_agent - bound))]
+        single = f"agents {number(by_agent.min(), 2)} to {number(by_agent.max(), 2)}"
+        seen.append(f"{sentence.format(estimate(mean(by_task), 2))} ({single})")
+    holds = all(test.value > 0 for test in tests[1])
+    return Finding(holds, f"{capital('; '.join(seen))}.", tuple(tests[1]), tuple(tests[-1]))
 
 
 for claim, parts, words in (
@@ -290,7 +280,7 @@ for claim, parts, words in (
      "than {gain:g} points than that of the planner that sees as much"),
 ):  # fmt: skip
     test = f"one-tailed tests over random tasks (bootstrap) and over agents (Student): {words}"
-    judges(claim, test, parts=parts)(judge)
+    judges(claim, test, parts=parts)(judge_parts)
 
 
 PRACTICE = Section(

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.claims.data import MissingError
+from coartic.analysis.claims.data import Data, MissingError
 from coartic.analysis.claims.register import Finding
 from coartic.analysis.statistics.estimates import FEWEST, Estimate, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row
-from coartic.analysis.words import capital, estimate, in_brackets, number
+from coartic.analysis.words import capital, estimate
 from coartic.robot import Array
 
 RECEDING_HORIZON = "receding-horizon"
@@ -34,6 +34,18 @@ def solved_cells(study: Study) -> dict[str, list[tuple[CellRuns, dict[str, Any]]
             parameters = json.loads(str(cell.good.parameters.iloc[0]))
             cells.setdefault(cell.method, []).append((cell, parameters))
     return cells
+
+
+def judged(data: Data, rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table on random tasks that methods were not tuned on, as a claim reads them.
+
+    Columns ``task`` and ``cell``, whose runs are the claim's.
+    """
+    tasks = {name: data.task(name) for name in rows.task}
+    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
+    rows = rows[rows.task.isin(drawn)]
+    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
+    return rows
 
 
 def over_tasks(values: pd.Series, margin: float = 0.0) -> Estimate:
@@ -69,11 +81,3 @@ def mean_or_nan(values: Sequence[float] | Array) -> float:
     there = np.asarray(values, dtype=np.float64)
     there = there[~np.isnan(there)]
     return float(there.mean()) if len(there) else math.nan
-
-
-def interval_in_words(
-    row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
-) -> str:
-    """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
-    value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
-    return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from functools import partial
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from coartic.analysis.claims.data import Data, judges
 from coartic.analysis.claims.register import MARGINS, Finding
@@ -18,10 +16,12 @@ from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import EC1, INITIAL, LEARNER, in_order, name_of
 from coartic.analysis.section import Section
 from coartic.analysis.signatures.locus import moved_goals
+from coartic.analysis.statistics.correlations import rank_correlation
 from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
+from coartic.analysis.words import interval_in_words
 from coartic.robot import Array
 from coartic.tasks.task import address_of
 
@@ -39,41 +39,23 @@ FEWEST_GOALS = 5
 """Goals of a task: three inner ones are the fewest that are ranked."""
 
 
-class Slopes(NamedTuple):
-    """How far postures follow neighbours, per length unit, each ``(..., G - 1)``."""
-
-    carried: Array
-    """Of the posture at goals 2 to G on the place of the goal before."""
-    ahead: Array
-    """Of the posture at goals 1 to G - 1 on the place of the next goal."""
-
-    def shuffled(self, rng: np.random.Generator) -> Slopes:
-        """The same slopes of one task in :data:`SHUFFLES` orders, each direction by itself."""
-        return Slopes(*(rng.permuted(np.tile(each, (SHUFFLES, 1)), axis=1) for each in self))
+def correlations(carried: Array, ahead: Array) -> Array:
+    """Rank correlation of resistance and aggression over the inner goals, of slopes
+    (:func:`slopes_of`) of shape ``(..., G - 1)``."""
+    return rank_correlation(*resistance_and_aggression(carried, ahead))
 
 
-def resistance_and_aggression(slopes: Slopes) -> tuple[Array, Array]:
+def correlation_by_chance(carried: Array, ahead: Array) -> float:
+    """Mean of that of a task's slopes in :data:`SHUFFLES` orders, each direction by itself."""
+    rng = np.random.default_rng(SEED)
+    shuffled = [rng.permuted(np.tile(each, (SHUFFLES, 1)), axis=1) for each in (carried, ahead)]
+    return random_tasks.mean_or_nan(correlations(*shuffled))
+
+
+def resistance_and_aggression(carried: Array, ahead: Array) -> tuple[Array, Array]:
     """Of each inner goal, ``(..., G - 2)``: minus the mean slope of its posture on its neighbours'
     places, and the mean slope of its neighbours' postures on its own."""
-    carried, ahead = slopes
     return -(carried[..., :-1] + ahead[..., 1:]) / 2, (carried[..., 1:] + ahead[..., :-1]) / 2
-
-
-def rank_correlation(first: Array, second: Array) -> Array:
-    """Spearman's correlation along the last axis; NaN where one does not vary."""
-    ranks = [centred_ranks(each) for each in (first, second)]
-    lengths = np.prod([np.linalg.norm(each, axis=-1) for each in ranks], axis=0)
-    products = (ranks[0] * ranks[1]).sum(axis=-1)
-    rho: Array = np.full_like(products, np.nan)
-    np.divide(products, lengths, out=rho, where=lengths > 0)
-    return rho
-
-
-def centred_ranks(values: Array) -> Array:
-    """Ranks along the last axis, less their mean."""
-    ranks = np.asarray(stats.rankdata(values, axis=-1), dtype=np.float64)
-    centred: Array = ranks - ranks.mean(axis=-1, keepdims=True)
-    return centred
 
 
 def slope_size(postures: Array, places: Array) -> Array:
@@ -109,19 +91,17 @@ def resist_values(study: Study) -> pd.DataFrame:
         for label in labels:
             cells = [study.cells[name, label] for name in names if (name, label) in study.cells]
             if len(cells) == len(names) and all(len(cell.good) for cell in cells):
-                slopes = slopes_of(study, label, by_goal)
-                shuffled = slopes.shuffled(np.random.default_rng(SEED))
-                rho = float(rank_correlation(*resistance_and_aggression(slopes)))
-                chances = rank_correlation(*resistance_and_aggression(shuffled))
-                chance = random_tasks.mean_or_nan(chances)
+                carried, ahead = slopes_of(study, label, by_goal)
+                rho = float(correlations(carried, ahead))
+                chance = correlation_by_chance(carried, ahead)
                 rows.append(
                     {
                         "task": base,
                         "label": label,
                         "links": len(task.robot.right_links),
                         "base": "locked" if task.locked_base else "free",
-                        "carried": slopes.carried.mean(),
-                        "ahead": slopes.ahead.mean(),
+                        "carried": carried.mean(),
+                        "ahead": ahead.mean(),
                         "rho": rho,
                         "chance": chance,
                         "beyond": rho - chance,
@@ -132,15 +112,21 @@ def resist_values(study: Study) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "cells"])
 
 
-def slopes_of(study: Study, label: str, by_goal: dict[int, dict[str, Array]]) -> Slopes:
-    """Slopes between neighbours of a method, of the learner by its noiseless replays."""
+def slopes_of(
+    study: Study, label: str, by_goal: dict[int, dict[str, Array]]
+) -> tuple[Array, Array]:
+    """How far postures of a method follow neighbouring goals, per length unit, each ``(G - 1,)``.
+
+    Of the posture at goals 2 to G on the place of the goal before, and of that at goals 1 to G - 1
+    on the place of the next goal; of the learner by its noiseless replays.
+    """
     replayed = label.startswith(LEARNER)
     sizes = []
     for _, places in sorted(by_goal.items()):
         means = [study.hits(name, label, replayed=replayed).mean(axis=0) for name in places]
         sizes.append(slope_size(np.array(means), np.array(list(places.values()))))
     by_place = np.array(sizes).T  # posture at the goal of the row, place of the goal of the column
-    return Slopes(np.diagonal(by_place, -1).copy(), np.diagonal(by_place, 1).copy())
+    return np.diagonal(by_place, -1).copy(), np.diagonal(by_place, 1).copy()
 
 
 @table("group, method, tasks, carried[], ahead[], rho[], chance, beyond[]")
@@ -166,7 +152,7 @@ def resist(study: Study) -> Rows:
     "Do goals whose posture resists also impose theirs?",
     "Rank correlation over the inner goals of a task between resistance (how little the posture "
     "follows a neighbouring goal that moves) and aggression (how much the neighbours' postures "
-    f"follow this goal), beyond chance: mean over random tasks with its {style.CONFIDENCE} "
+    f"follow this goal), beyond chance: mean over random tasks with its {style.COVERAGE} "
     "interval. Of tongues it is highly positive. a: all tasks, b: by the number of links.",
 )
 def draw_resist(study: Study) -> Parts:
@@ -182,9 +168,8 @@ def draw_resist(study: Study) -> Parts:
         for number, label in enumerate(labels):
             rows = data[(data.method == label) & data.group.isin(groups)].set_index("group")
             places = [groups.index(g) + 0.11 * (number - len(labels) / 2) for g in rows.index]
-            color = colors[label]
-            axes.vlines(places, rows.beyond_low, rows.beyond_high, color)
-            axes.plot(places, rows.beyond, "o", color=color, markersize=4, label=name_of(label))
+            dots: Any = {"color": colors[label], "linestyle": "", "markersize": 4, "bars": None}
+            style.means(axes, places, rows, "beyond", **dots, label=name_of(label))
         axes.axhline(0, color=style.GREY, linewidth=0.8)
         axes.set_xlim(-0.5, len(groups) - 0.5)
         axes.set_xticks(range(len(groups)), [group.replace("all", "all tasks") for group in groups])
@@ -201,8 +186,7 @@ def finding_of_resist(study: Study) -> str:
     data = resist(study)
     rows = data[data.group == "all"].to_dict("records")
     parts = [
-        f"{name_of(row['method'])} {random_tasks.interval_in_words(row, 'beyond', digits=2)}"
-        for row in rows
+        f"{name_of(row['method'])} {interval_in_words(row, 'beyond', digits=2)}" for row in rows
     ]
     if not parts:
         return ""
@@ -221,30 +205,32 @@ def beyond_chance(data: Data, label: str) -> pd.Series:
     return rows.set_index("task").beyond
 
 
-def correlations_below(data: Data, bound: float, labels: Sequence[str]) -> Finding:
+TEST = (
+    "one-tailed bootstrap tests over random tasks of the rank correlation of resistance and "
+    "aggression over inner goals, less that of the same slopes in any order: "
+)
+
+
+@judges(
+    "learner-yields-where-it-imposes", TEST + "below 0 for the learner, by replays", labels=(EC1,)
+)
+@judges(
+    "reaction-yields-where-it-imposes",
+    TEST + "below 0 for the corrective process",
+    labels=(INITIAL,),
+)
+@judges(
+    "not-as-in-tongues",
+    TEST + "below {tongues:g} for every method",
+    labels=JUDGED,
+    bound=MARGINS["tongues"],
+)
+def correlations_below(data: Data, labels: Sequence[str], bound: float = 0.0) -> Finding:
     """Whether the correlations of some methods are below a bound, each."""
     return random_tasks.means_over_tasks({
         f"{name_of(label)}: {{}} beyond chance": (beyond_chance(data, label), bound, -1)
         for label in labels
     })  # fmt: skip
-
-
-TEST = (
-    "one-tailed bootstrap tests over random tasks of the rank correlation of resistance and "
-    "aggression over inner goals, less that of the same slopes in any order: "
-)
-judges("learner-yields-where-it-imposes", test=TEST + "below 0 for the learner, by replays")(
-    partial(correlations_below, bound=0.0, labels=(EC1,))
-)
-judges("reaction-yields-where-it-imposes", test=TEST + "below 0 for the corrective process")(
-    partial(correlations_below, bound=0.0, labels=(INITIAL,))
-)
-
-
-@judges("not-as-in-tongues", test=TEST + "below {tongues:g} for every method")
-def not_as_in_tongues(data: Data) -> Finding:
-    """Of learner, planner, and reactive control."""
-    return correlations_below(data, MARGINS["tongues"], JUDGED)
 
 
 RESIST = Section(

@@ -10,11 +10,11 @@ import pandas as pd
 
 from coartic.analysis.section import Section
 from coartic.analysis.settings import compares_settings, name_in, varied
-from coartic.analysis.statistics.estimates import LEVEL, Estimate, interval, mean
+from coartic.analysis.statistics.estimates import LEVEL, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.words import estimate, marked, number, plural
+from coartic.analysis.words import interval_in_words, marked, number, plural
 
 MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
@@ -46,7 +46,7 @@ def settings(study: Study) -> Rows:
             yield f"{task} {cell.label}", row | runs_of(cell)
 
 
-def answer(study: Study) -> str:
+def answer_settings(study: Study) -> str:
     """The best setting of each task, and whether it is surely better than the next."""
     rows = settings(study)
     tasks = list(dict.fromkeys(rows.task))
@@ -68,8 +68,8 @@ def setting_in(study: Study, label: str) -> str:
 def on_task(study: Study, rows: pd.DataFrame) -> str:
     """A sentence on the settings of a task."""
     first, *others = rows.to_dict("records")
-    reward = Estimate(first["reward"], first["reward_low"], first["reward_high"])
-    text = f"{first['task']}: {setting_in(study, first['method'])}: {estimate(reward, 1)} ticks"
+    reward = interval_in_words(first, "reward")
+    text = f"{first['task']}: {setting_in(study, first['method'])}: {reward} ticks"
     if not others:
         return f"{text}."
     p = np.array([row["p_holm"] for row in others])
@@ -87,7 +87,7 @@ SETTINGS = Section(
     short="Settings",
     title="Which setting is best?",
     caption="Mean reward of each setting (ticks), the best of each task first",
-    finding=answer,
+    finding=answer_settings,
     table="settings",
     note=(
         "Behind: ticks behind the best setting of the task. p is corrected for the settings of "

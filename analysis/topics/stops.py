@@ -19,6 +19,7 @@ from coartic.analysis.signatures.subtasks import turning_angles
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
+from coartic.analysis.words import interval_in_words
 from coartic.robot import Array
 
 SMOOTH = "trajectory-optimisation/"
@@ -123,7 +124,7 @@ TIMES = {"free": ("free times", style.SOLID), "fixed": ("equal times", style.DAS
     "stops",
     "What a stop at the goals leaves of coarticulation",
     "Smooth plans from passing through the goals (0) to a full stop at each (1), means over tasks, "
-    f"of random ones with their {style.CONFIDENCE} interval. a: ticks by which postures leave the "
+    f"of random ones with their {style.COVERAGE} interval. a: ticks by which postures leave the "
     "next goal nearer, against the corrective process's. b: the angle by "
     "which the path turns at goals, which passing makes 0. Movements have a constant speed here, "
     "so that the direction is all that is left of a plan's velocity.",
@@ -145,8 +146,7 @@ def draw_stops(study: Study) -> Parts:
         line: Any = {"color": color, "linestyle": dash, "marker": marker, "markersize": 3.5}
         places = part.stop + 0.008 * number
         for axes, name in zip(panels, ("nearer", "turn"), strict=True):
-            axes.vlines(places, part[f"{name}_low"], part[f"{name}_high"], color, linewidth=0.8)
-            axes.plot(places, part[name], **line, label=f"{group}: {cost}, {words}")
+            style.means(axes, places, part, name, **line, label=f"{group}: {cost}, {words}")
     panels[0].set_ylabel("next goal nearer (ticks)")
     panels[1].set_ylabel("turn at goals (rad)")
     for axes, title in zip(panels, ("posture", "velocity"), strict=True):
@@ -173,8 +173,8 @@ def finding_of_stops(study: Study) -> str:
         rows = data[(data.timing == timing) & (data.goals_per_stop == 1)]
         by_stop = rows.set_index("stop").to_dict("index")
         if {0.0, 1.0} <= by_stop.keys():
-            passing = random_tasks.interval_in_words(by_stop[0.0], "nearer", " ticks")
-            stopping = random_tasks.interval_in_words(by_stop[1.0], "nearer")
+            passing = interval_in_words(by_stop[0.0], "nearer", " ticks")
+            stopping = interval_in_words(by_stop[1.0], "nearer")
             sentences.append(
                 f"At {words} times postures of minimum-jerk plans leave the next goal nearer by "
                 f"{passing} when passing and by {stopping} with a full stop."
@@ -187,11 +187,7 @@ def next_goal_nearer(data: Data, timing: str, stop: int) -> pd.Series:
     rows = stop_values(data.study)
     asked = [STOPPING, timing, stop, 1]
     rows = rows[(rows[KEYS[1:]] == asked).all(axis=1)]
-    tasks = {name: data.task(name) for name in rows.task}
-    drawn = [n for n, task in tasks.items() if task.family and task.split != "development"]
-    rows = rows[rows.task.isin(drawn)]
-    data.run_ids.extend(run for cell in rows.cell for run in cell.good.run_id)
-    return rows.set_index("task").nearer.astype(np.float64)
+    return random_tasks.judged(data, rows).set_index("task").nearer.astype(np.float64)
 
 
 @judges(

@@ -18,7 +18,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.drawing import MARKERS
 
-_OUTLINE = [withStroke(linewidth=3.2, foreground=style.PAPER)]
+_OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
 
 
 @figure(

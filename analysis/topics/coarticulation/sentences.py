@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from coartic.analysis.methods import CONDITIONS, is_variant, main_methods, name_of
+from coartic.analysis.methods import LEARNERS, is_variant, main_methods, name_of
 from coartic.analysis.section import Section
 from coartic.analysis.signatures.between import TwoContexts
 from coartic.analysis.statistics.estimates import LEVEL, Estimate
@@ -18,7 +18,7 @@ from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import estimate, number, p_value, plural
 
 
-def answer(study: Study) -> str:
+def answer_contexts(study: Study) -> str:
     """Whether the posture at the goal that two tasks share depends on the next goal, in short."""
     found = difference(study)
     if found is None:
@@ -116,7 +116,7 @@ def steepest_slope(study: Study) -> Any:
     chosen = [selects(study, str(label)) for label in rows.method]
     beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
     rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
-    for label in (*CONDITIONS, *main_methods(rows.method)):
+    for label in (*LEARNERS, *main_methods(rows.method)):
         of_method = rows[rows.method == label].sort_values(["seen", "size"])
         if len(of_method):
             return of_method.iloc[-1]
@@ -129,7 +129,7 @@ def tests_of(slope: Any) -> str:
     return p_value(slope.p_holm) + (f"; beyond random guesses {p}" if p else "")
 
 
-def answer_by_slopes(study: Study) -> str:
+def answer_slopes(study: Study) -> str:
     """Whether postures follow the next goal when that moves, in short."""
     slope = steepest_slope(study)
     if slope is None:

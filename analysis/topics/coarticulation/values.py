@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.methods import CONDITIONS, main_methods
+from coartic.analysis.methods import LEARNERS, main_methods
 from coartic.analysis.signatures.between import (
     NOWHERE,
     BesideMovedGoal,
@@ -176,7 +176,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     None where no method has solved runs on two such tasks.
     """
     labels = [label for _, label in study.cells]
-    for label in dict.fromkeys([*CONDITIONS, *main_methods(labels), *labels]):
+    for label in dict.fromkeys([*LEARNERS, *main_methods(labels), *labels]):
         for *names, _ in pairs_of_contexts(study):
             keys = [(name, label) for name in names]
             if all(key in study.cells and len(study.cells[key].good) for key in keys):

@@ -19,7 +19,7 @@ from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spok
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.settings import compares_settings, name_in, shown_methods
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.topics.comparison import runtimes, scores, tables
+from coartic.analysis.topics.comparison import running_times, scores, tables
 from coartic.analysis.words import capital, in_brackets, marked, number
 from coartic.robot import Array
 
@@ -31,7 +31,7 @@ WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
 POINTS = 120
 """Trials of a learning curve that are drawn."""
-CURVES = (*methods.CONDITIONS, "random-search/climbing", "cma-es/bandit")
+CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
 """Built-in methods whose learning curves are drawn; of others they all are."""
 
 
@@ -39,7 +39,7 @@ CURVES = (*methods.CONDITIONS, "random-search/climbing", "cma-es/bandit")
     "ranking",
     "Gap to the optimum",
     "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
-    f"there are several), with its {style.CONFIDENCE} bootstrap interval over runs. Methods that "
+    f"there are several), with its {style.COVERAGE} bootstrap interval over runs. Methods that "
     "are run once have no interval. Diamonds and bold names: the paper's learner.",
 )
 def gaps_to_optimum(study: Study) -> Parts:
@@ -93,10 +93,10 @@ def draw_group(
 @figure(
     "runtimes",
     "What it costs to come near",
-    f"Share of {len(runtimes.TARGETS)} reward targets reached within a budget (mean over all tasks "
-    "where there are several). Targets are evenly spaced from the initial solution to the optimum; "
-    "a run counts for each target that it has reached. a: trials; planners make none and are "
-    "lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
+    f"Share of {len(running_times.TARGETS)} reward targets reached within a budget (mean over all "
+    "tasks where there are several). Targets are evenly spaced from the initial solution to the "
+    "optimum; a run counts for each target that it has reached. a: trials; planners make none and "
+    "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
 def ecdf_of_runtimes(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
@@ -130,11 +130,11 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     ``share``.
     """
     parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
-    times = runtimes.running_times(study)
+    times = running_times.running_times(study)
     for label in methods.in_order(shown_methods(study, tables.runtimes(study).index)):
         for spend in PANELS:
             if (label, spend) in times:
-                budget, share = runtimes.ecdf(times[label, spend])
+                budget, share = running_times.ecdf(times[label, spend])
                 count = min(len(budget), ECDF_STEPS)
                 at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
                 rows = {"budget": budget[at], "share": share[at]}
@@ -238,7 +238,7 @@ def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
             for label in methods.in_order(solved)
             if label in CURVES or not methods.is_built_in(label) or compares_settings(study)
         ]
-        two_armed = {*methods.CONDITIONS} & {*labels} - {methods.EC1}
+        two_armed = {*methods.LEARNERS} & {*labels} - {methods.EC1}
         yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
 
 

@@ -148,7 +148,7 @@ def best_condition(study: Study, task: str) -> str | None:
     rewards = {
         label: float(cell.rewards.mean())
         for (name, label), cell in study.cells.items()
-        if name == task and label in methods.CONDITIONS and len(cell.good)
+        if name == task and label in methods.LEARNERS and len(cell.good)
     }
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 

@@ -12,7 +12,7 @@ from coartic.analysis.section import Section
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import LEVEL, Estimate
 from coartic.analysis.study import CellKey, Study, cached, one_by_one
-from coartic.analysis.topics.comparison import runtimes, scores, tables
+from coartic.analysis.topics.comparison import running_times, scores, tables
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import marked, number, plural, two_figures
 
@@ -259,7 +259,7 @@ def finding_of_costs(study: Study) -> str:
 
 def costs_by_task(study: Study, learner: str, rival: str) -> str:
     """A sentence about trials of the median run on each of several tasks, or nothing."""
-    ours, theirs = (runtimes.trials_to_half(study, label) for label in (learner, rival))
+    ours, theirs = (running_times.trials_to_half(study, label) for label in (learner, rival))
     by_task = [
         f"{number(trials)} trials ({methods.name_of(rival)} {number(theirs[task])}) on "
         f"{marked(study.tasks[task])}"

@@ -15,7 +15,7 @@ from coartic.analysis.study import Study, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.comparison import scores
-from coartic.analysis.topics.comparison.runtimes import (
+from coartic.analysis.topics.comparison.running_times import (
     budget_for,
     cells_compared,
     running_times,
@@ -131,7 +131,7 @@ def variants(study: Study) -> Rows:
             row[f"on {task}"] = scores.run_gaps(study, task, label).mean()
         by_family: dict[str, list[Runs]] = {}
         for task, label in labels.items():
-            of_instance = instances.gap(task, label) if instances else None
+            of_instance = instances.gap(task, label)
             if of_instance is not None:
                 by_family.setdefault(str(study.tasks[task].family), []).append((of_instance,))
         row["instances"] = sum(map(len, by_family.values()))

@@ -14,7 +14,7 @@ from coartic.analysis.claims.rules import (
     no_trial_fails,
     reported_instances,
 )
-from coartic.analysis.methods import CONDITIONS, EC1, EC2, EC3, EC4, PLACEBO, most_exploring
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNERS, PLACEBO, most_exploring
 
 OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -148,5 +148,5 @@ def other_arm_coarticulation_in_general(data: Data) -> Finding:
 def corrective_ensures_in_general(data: Data) -> Finding:
     """No trial fails."""
     names = [name for family in EVERY_FAMILY for name in reported_instances(data, family)]
-    cells = [(name, label) for name in names for label in CONDITIONS]
+    cells = [(name, label) for name in names for label in LEARNERS]
     return no_trial_fails(data, [cell for cell in cells if cell in data.study.cells])

@@ -16,7 +16,7 @@ from coartic.analysis.topics.families.tables import instance_gaps
 
 _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 _MEANS = (
-    f"Diamonds: mean over instances with its {style.CONFIDENCE} interval about other tasks of the "
+    f"Diamonds: mean over instances with its {style.COVERAGE} interval about other tasks of the "
     "family (bootstrap over instances and runs)."
 )
 
@@ -62,7 +62,7 @@ def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: s
     axes.plot(rows[name], heights, "o", linestyle="", **dot)
     first = rows.iloc[0]
     axes.plot([first.mean_low, first.mean_high], [y, y], color=style.INK, linewidth=1)
-    diamond: Any = {"markersize": 4, "markerfacecolor": style.PAPER, "zorder": 4}
+    diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
     axes.plot(first["mean"], y, "D", color=style.INK, **diamond)
 
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import special, stats
 
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing, spoken
 from coartic.analysis.methods import is_variant, name_of
 from coartic.analysis.section import Section
-from coartic.analysis.statistics.estimates import TAILS, Estimate, interval
+from coartic.analysis.statistics.correlations import rank_correlation_estimate
+from coartic.analysis.statistics.estimates import interval
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, table
-from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
+from coartic.analysis.words import interval_in_words
 from coartic.robot import BASE_DOF
 
 FEATURES = "goals", "way between goals", "turns", "spare joints"
@@ -50,27 +49,14 @@ def features_of(task: Task) -> dict[str, float]:
 @cached
 def features_and_gaps(study: Study) -> pd.DataFrame:
     """Features of every instance and, by method that was run on all of them, its mean gap."""
-    instances = sample(study)
-    rows = {}
-    for name in instances.references if instances else ():
-        assert instances is not None
+    instances, rows = sample(study), {}
+    for name in instances.references:
         task = instances.tasks[name]
         gaps = {label: instances.gap(name, label) for label in ("learner", *instances.labels)}
         means = {label: gap.mean() for label, gap in gaps.items() if gap is not None}
         rows[name] = {"family": task.family, **features_of(task), **means}
     frame = pd.DataFrame.from_dict(rows, orient="index").dropna(axis="columns")
     return frame[[name for name in frame.columns if name == "learner" or not is_variant(name)]]
-
-
-def rank_correlation(rows: pd.DataFrame, first: str, second: str) -> Estimate:
-    """Spearman's rank correlation of two columns with its interval by Fisher's transform.
-
-    Its variance there is 1.06 / (n − 3): Fieller, Hartley & Pearson (1957), Biometrika 44, 470.
-    """
-    value = float(stats.spearmanr(rows[first], rows[second]).statistic)
-    half = special.ndtri(TAILS[1]) * math.sqrt(1.06 / (len(rows) - 3))
-    low, high = np.tanh(np.arctanh(value) + np.array([-half, half]))
-    return Estimate(value, float(low), float(high), n=(len(rows),))
 
 
 @table("method, feature, tasks, correlation[], in *")
@@ -82,7 +68,8 @@ def hardness(study: Study) -> Rows:
         row: Row = {"method": method, "feature": feature, "tasks": len(frame)}
         for family, rows in (("", frame), *frame.groupby("family")):
             if len(rows) >= LEAST_TASKS and np.ptp(rows[feature]) and np.ptp(rows[method]):
-                seen = rank_correlation(rows, feature, method)
+                pair = rows[feature].to_numpy(), rows[method].to_numpy()
+                seen = rank_correlation_estimate(*pair)
                 row |= {f"in {family}": seen.value} if family else interval("correlation", seen)
         if "correlation" in row:
             yield f"{method} {feature}", row
@@ -93,7 +80,7 @@ def hardness(study: Study) -> Rows:
     "What makes a task hard, and for whom",
     "(a) Tasks by number of goals and mean way between them, of an arm's reach: which families can "
     "tell what. (b) Rank correlation of features of tasks and the gap of each method, over all "
-    f"tasks, with {style.CONFIDENCE} intervals: to the right, more of it makes a task harder.",
+    f"tasks, with {style.COVERAGE} intervals: to the right, more of it makes a task harder.",
 )
 def draw_hardness(study: Study) -> Parts:
     """Features by family, and their correlations with gaps."""
@@ -131,7 +118,7 @@ def finding_of_hardness(study: Study) -> str:
     most = data.sort_values("correlation").drop_duplicates("feature", keep="last").sort_index()
     seen = [
         f"{row['feature']}, {name_of(row['method'])} "
-        f"{random_tasks.interval_in_words(row, 'correlation', digits=2)}"
+        f"{interval_in_words(row, 'correlation', digits=2)}"
         for row in most.to_dict("records")
     ]
     words = f"Over {data.tasks.max()} random tasks gaps go most with (rank correlations): "

@@ -9,12 +9,12 @@ from functools import cached_property
 import pandas as pd
 
 from coartic import Task
-from coartic.analysis.methods import CONDITIONS, PLACEBO, most_exploring
+from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.optima import KnownOptimum, gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.instances import Runs, Scores
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 
@@ -77,16 +77,21 @@ class Sample:
         """Label of a method on an instance: ``learner`` is the condition that explores most."""
         return most_exploring(self.tasks[name]) if label == "learner" else label
 
+    def cell(self, name: str, label: str) -> CellRuns | None:
+        """Runs of a method on an instance with a reference; None where none has a solution."""
+        cell = self.study.cells.get((name, self.label_on(name, label)))
+        return cell if cell is not None and name in self.references and len(cell.good) else None
+
     def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
         """Gaps of the solved runs (n,), as shares of the best known reward; None without any.
 
         The gap to the optimum is at least this. To the proven bound, which it is at most, it is
         None where nothing is proven.
         """
-        cell = self.study.cells.get((name, self.label_on(name, label)))
-        reference = self.references.get(name)
-        if cell is None or reference is None or not len(cell.good):
+        cell = self.cell(name, label)
+        if cell is None:
             return None
+        reference = self.references[name]
         to = reference.bound if to_bound else reference.reward
         return None if to is None else gap_share(cell.rewards, to)
 
@@ -134,10 +139,9 @@ class Sample:
 
 
 @cached
-def sample(study: Study) -> Sample | None:
-    """The instances of a folder; None where it has none with a solution."""
-    instances = Sample(study)
-    return instances if instances.tasks and instances.references else None
+def sample(study: Study) -> Sample:
+    """The instances of a folder, which may have none."""
+    return Sample(study)
 
 
 THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
@@ -153,9 +157,8 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     value for each run that has one. A sign without any is left out.
     """
     by_cell = {}
-    instances = sample(study)
-    for name in instances.references if instances else ():
-        for label in (*CONDITIONS, PLACEBO):
+    for name in sample(study).references:
+        for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.trajectories(name, label)

@@ -6,11 +6,10 @@ from typing import Any
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.section import Section
-from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.study import Study
 from coartic.analysis.topics.families import tables
 from coartic.analysis.topics.families.sample import sample
-from coartic.analysis.words import estimate, number
+from coartic.analysis.words import interval_in_words, number
 
 MOST_GAPS = 4
 """Methods whose gaps a sentence tells."""
@@ -19,7 +18,7 @@ MOST_GAPS = 4
 def finding_of_families(study: Study) -> str:
     """How far the nearest methods end from the best known reward, over families with two arms."""
     instances = sample(study)
-    if instances is None:
+    if not instances.references:
         return ""
     families = len(instances.families)
     where = "1 family" if families == 1 else f"{families} families"
@@ -48,10 +47,9 @@ def finding_of_exploration(study: Study) -> str:
     rows = rows[(rows.family == tables.ALL) & ~initial]
     gains = []
     for row in rows.itertuples():
-        gain = Estimate(100 * row.gain, 100 * row.gain_low, 100 * row.gain_high)
+        gain = interval_in_words(row._asdict(), "gain", " %", scale=100)
         gains.append(
-            f"{row.contrast} gains {estimate(gain, 1, ' %')} and is better on {row.better} of "
-            f"{row.instances} tasks"
+            f"{row.contrast} gains {gain} and is better on {row.better} of {row.instances} tasks"
         )
     return f"Over all families, {'; '.join(gains)}." if gains else ""
 

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import (
-    CONDITIONS,
     EC1,
     EC2,
     EC3,
     EC4,
     INITIAL,
+    LEARNERS,
     PLACEBO,
     is_variant,
     name_of,
@@ -30,7 +30,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.families.sample import THERE, Sample, sample, scores_of
 from coartic.robot import Array
 
-Part = TypeVar("Part")
+OfFamily = TypeVar("OfFamily")
 CONTRASTS = (
     (EC2, INITIAL),
     (EC1, INITIAL),
@@ -51,8 +51,6 @@ ALL = "all"
 def family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
     instances = sample(study)
-    if instances is None:
-        return
     two_armed = [
         name
         for name, tasks in instances.families.items()
@@ -119,7 +117,7 @@ def told_apart(first: Array, second: Array) -> bool:
     return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
-def each_and_all(by_family: dict[str, Part]) -> Iterator[tuple[str, dict[str, Part]]]:
+def each_and_all(by_family: dict[str, OfFamily]) -> Iterator[tuple[str, dict[str, OfFamily]]]:
     """Every family by itself, and ``all`` of them where there are several."""
     for family, part in by_family.items():
         yield family, {family: part}
@@ -142,8 +140,7 @@ def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
 def exploration(study: Study) -> Rows:
     """More exploration against less, by family and over all of them."""
     instances = sample(study)
-    for first, second in CONTRASTS if instances else ():
-        assert instances is not None
+    for first, second in CONTRASTS:
         less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
         contrast = f"{name_of(first)} over {less}"
         for family, names in each_and_all(instances.shared(first, second)):
@@ -172,8 +169,7 @@ def exploration(study: Study) -> Rows:
 def family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
     instances = sample(study)
-    for label, sign in itertools.product((*CONDITIONS, PLACEBO), THERE if instances else ()):
-        assert instances is not None
+    for label, sign in itertools.product((*LEARNERS, PLACEBO), THERE):
         for family, scores in each_and_all(scores_of(instances, label, sign)):
             means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]
             row: Row = {
@@ -197,8 +193,7 @@ def instance_gaps(study: Study) -> pd.DataFrame:
     """
     instances = sample(study)
     rows: list[Row] = []
-    for label in instances.labels if instances else ():
-        assert instances is not None
+    for label in instances.labels:
         for family, scores in instances.gaps(label).items() if " " not in label else ():
             mean = interval("mean", other_tasks({family: scores}))
             names = instances.shared(label)[family]

@@ -25,8 +25,7 @@ from coartic.analysis.topics.human.measures import (
     Statistic,
     run_ids,
 )
-from coartic.analysis.topics.random_tasks import interval_in_words
-from coartic.analysis.words import listed, read_beside
+from coartic.analysis.words import interval_in_words, listed, read_beside
 from coartic.robot import Array
 
 FINDINGS: dict[str, dict[str, Any]] = read_beside(__file__, "human")

@@ -193,7 +193,7 @@ def norms_and_benefits(study: Study, model: Model) -> ByTask:
     }
 
 
-def rank_correlation(pairs: Array) -> float:
+def kendalls_tau(pairs: Array) -> float:
     """Kendall's τ (b, for ties); 0 where one of both is the same on all tasks."""
     first, second = (np.sign(column[:, None] - column) for column in pairs.T)
     ordered = np.abs(first).sum() * np.abs(second).sum()
@@ -357,7 +357,7 @@ MEASURES: dict[str, tuple[Measure, Statistic]] = {
     "slope norm at distance -1": (partial(slope_norms, distance=-1), mean_of_rows),
     "rise of the slope norm at distance 2": (norms_by_practice, horizon_rise),
     "rise of the ratio of slope norms": (norms_by_practice, ratio_rise),
-    "benefit correlation": (norms_and_benefits, rank_correlation),
+    "benefit correlation": (norms_and_benefits, kendalls_tau),
     "sufficient horizon": (sufficient_horizon, mean_of_rows),
     "bow slope": (bows_by_task, slope_of_bows),
     "turn saved at goals": (turn_saved, mean_of_rows),

@@ -23,7 +23,7 @@ from coartic.learner.learning import TRIALS
 
 _MARKS = {
     "equivalent": (style.BLUE, "o", style.BLUE),
-    "undecided": (style.INK, "s", style.PAPER),
+    "undecided": (style.INK, "s", style.BACKGROUND),
     "different": (style.VERMILLION, "D", style.VERMILLION),
     "": (style.INK, "x", style.INK),
 }
@@ -32,7 +32,7 @@ _MARKS = {
 @figure(
     "published",
     "Published and ours",
-    f"Our mean learned reward minus the published one, with its {style.CONFIDENCE} interval. Grey: "
+    f"Our mean learned reward minus the published one, with its {style.COVERAGE} interval. Grey: "
     f"margin of equivalence, ±{100 * MARGIN:.0f} % of the published reward. Filled circles: the "
     "interval lies within the margin (equivalent). Open squares: it crosses the margin "
     "(undecided). Diamonds: it lies outside (different). ↳: runs with one hand sequence; in "

@@ -105,7 +105,7 @@ def finding_of_claims(study: Study) -> str:
     return words
 
 
-def answer(study: Study) -> str:
+def answer_paper(study: Study) -> str:
     """Whether the paper is reproduced, by its claims."""
     entries = papers_claims(study)
     if not entries:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic.analysis.claims.ensemble import held_by, held_in_words
 from coartic.analysis.claims.judge import judgements, words_of_test
-from coartic.analysis.methods import CONDITIONS, LEARNER
+from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import interval, standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
@@ -158,7 +158,7 @@ def published_differences(study: Study) -> pd.DataFrame:
         if comparable and row["published"] is not None and (several or not row["hands"]):
             shown.append(row | {"task": cell.task, "method": cell.label})
     order = list(study.tasks)
-    shown.sort(key=lambda row: (order.index(row["task"]), CONDITIONS.index(row["method"])))
+    shown.sort(key=lambda row: (order.index(row["task"]), LEARNERS.index(row["method"])))
     return pd.DataFrame(shown)
 
 
