@@ -57,8 +57,8 @@ def compared_cells(first: Study, second: Study) -> pd.DataFrame:
 
     ``runs_a`` and ``runs_b``; ``identical``: runs with the same seed and the same status, joints,
     ticks and rewards of all trials, of those ``shared``; mean rewards ``reward_a`` and
-    ``reward_b``; ``difference`` of B less A with its 95 % BCa interval, paired by seed where at
-    least three are shared; ``p`` of a two-tailed test (pairs: sign flips) after Holm's correction
+    ``reward_b``, of the runs that are compared; ``difference`` of B less A with its 95 % BCa
+    interval, paired by seed where at least three are shared; ``p`` of a two-tailed test (pairs: sign flips) after Holm's correction
     over all cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few
     runs, or not compared; ``remarks``.
     """
@@ -105,6 +105,7 @@ def _compared(a: CellRuns, b: CellRuns, same_task: bool) -> dict[str, Any]:
     samples: tuple[Array, Array | float] = (b.rewards, a.rewards)
     if len(x) >= FEWEST:
         samples = y - x, 0.0
+        row |= {"reward_a": x.mean(), "reward_b": y.mean()}
     difference = difference_of_means(*samples)
     test = sign_flip_test(y - x) if len(x) >= FEWEST else bootstrap_test(*samples, "two-sided")
     few = min(len(a.good), len(b.good)) < FEWEST

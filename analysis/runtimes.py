@@ -37,7 +37,7 @@ def runtimes(
     results: str | Path | Study,
     *,
     by: By | None = None,
-    methods: Sequence[str] = (),
+    methods: str | Sequence[str] = (),
     targets: Sequence[float] | Array = TARGETS,
 ) -> pd.DataFrame:
     """Share of reward targets that methods reach within a budget: the ECDF of running times.
@@ -48,9 +48,10 @@ def runtimes(
         A results folder, or a study of one.
     by : {"task", "family"}, optional
         One ECDF for each; over all tasks by default. Tasks of a group count alike.
-    methods : sequence of str, optional
+    methods : str or sequence of str, optional
         Methods with their variants, such as ``"cma-es/bandit trials=200"``; by default all that
-        are compared in the report. A method needs runs on all tasks of a group.
+        are compared in the report and have runs on all tasks of a group. Where methods are named,
+        a group has the tasks on which all of them have runs.
     targets : sequence of float, shape (n,), optional
         As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
         default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
@@ -76,6 +77,7 @@ def runtimes(
     if by is not None and by not in get_args(By):
         raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
     by_method = scores.labels_by_task(study)
+    methods = [methods] if isinstance(methods, str) else methods
     for name in methods:
         if name not in by_method:
             raise CoarticError(unknown("method", name, by_method))
@@ -85,6 +87,14 @@ def runtimes(
         groups.setdefault(group, []).append(name)
     if not groups:
         raise CoarticError("no task has a known optimum that is better than its initial solution")
+    if methods:
+        groups = {
+            group: [task for task in tasks if all(task in by_method[name] for name in methods)]
+            for group, tasks in groups.items()
+        }
+        groups = {group: tasks for group, tasks in groups.items() if tasks}
+        if not groups:
+            raise CoarticError(f"no task has runs of all of {', '.join(methods)}")
     compared = [name for name in by_method if scores.is_compared(study, name)]
     rows: list[tuple[str, str, str, float, float]] = []
     for group, tasks in groups.items():

@@ -94,6 +94,15 @@ def test_budgets_to_a_share(study):
     assert len(draw(curves).axes) == len(SPENDS)
 
 
+def test_methods_that_are_named_share_their_tasks(study):
+    """The learner has runs on one of the two tasks alone."""
+    curves = coartic.runtimes(study, methods=["own", LEARNER], targets=[0.5, 1.0])
+    for method, steps in curves[curves.spend == "trials"].groupby("method"):
+        assert steps.share.max() == share_by_hand([TWO], method, [0.5, 1.0], 5)
+    assert {*curves.method} == {"own", LEARNER}
+    assert {*coartic.runtimes(study, by="task", methods=LEARNER).group} == {TWO}
+
+
 def test_what_cannot_be_shown(study, tmp_path):
     for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]]):
         with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):

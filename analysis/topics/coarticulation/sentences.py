@@ -34,10 +34,11 @@ def answer_contexts(study: Study) -> str:
     elif found.seen:
         guesses = "" if placebo is None else f"; random guesses {number(placebo.apart, 2)}"
         units = f"{apart} in length units and rad{guesses}"
+        whose = f"posture of the {name_of(shared.method)}"
         sd = f"by {number(shared.spreads, 1)} standard deviations of the runs, "
         sd = "" if math.isnan(shared.spreads) else sd
         text = (
-            f"Yes: at the same goal {goal} the posture differs {sd}depending on the next goal "
+            f"Yes: at the same goal {goal} the {whose} differs {sd}depending on the next goal "
             f"({', '.join(filter(None, (p, units)))})."
         )
     elif found.differ and placebo is None:

@@ -359,8 +359,8 @@ def answer_gain(study: Study) -> str:
     first = ", with a slower first movement" if slower else ""
     return (
         "Not tested here: it takes two tasks with the same first goals. "
-        f"On {marked(study.tasks[task])} the {methods.name_of(label)} gets from "
-        f"{number(initial, 0)} to {number(learned, 0)} ticks{first}."
+        f"On {marked(study.tasks[task])} the {methods.name_of(label)} gets from a "
+        f"reward of {number(initial, 0)} to {number(learned, 0)} ticks{first}."
         + failed_runs(study, [(task, label)], " and are not counted")
     )
 
