@@ -58,8 +58,9 @@ def compared_cells(first: Study, second: Study) -> pd.DataFrame:
     ``runs_a`` and ``runs_b``; ``identical``: runs with the same seed and the same status, joints,
     ticks and rewards of all trials, of those ``shared``; mean rewards ``reward_a`` and
     ``reward_b``, of the runs that are compared; ``difference`` of B less A with its 95 % BCa
-    interval, paired by seed where at least three are shared; ``p`` of a two-tailed test (pairs: sign flips) after Holm's correction
-    over all cells; ``verdict``: identical, equivalent within 1 %, undecided, different, too few
+    interval, paired by seed where at least three are shared; ``p`` of a two-tailed test (pairs:
+    sign flips) after Holm's correction over all cells; ``verdict``: identical, equivalent within
+    1 %, undecided, different, too few
     runs, or not compared; ``remarks``.
     """
     ours, theirs = facts_of(first), facts_of(second)
