@@ -11,6 +11,9 @@ import zipfile
 
 import pytest
 
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.released import released_hashes, results_folder
+from coartic.runs.store import open_store
 from tests.support.suites import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -28,6 +31,17 @@ def do(*command, cwd):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def test_shipped_results_are_of_this_code():
+    """Otherwise nobody's runs of a built-in method go beside them."""
+    for suite in released_hashes():
+        with results_folder("released", suite) as folder, open_store(folder) as store:
+            shipped = store.plan().methods
+        now = built_in()
+        assert {name: card.code for name, card in shipped.items()} == {
+            name: now[name].code for name in shipped
+        }
 
 
 @pytest.fixture(scope="module")

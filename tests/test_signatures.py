@@ -602,7 +602,7 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_t
 @pytest.mark.parametrize(
     ("made_up", "seen", "answer"),
     [
-        ({"apart": 2.0}, True, "Yes: at the same goal 1 the posture differs"),
+        ({"apart": 2.0}, True, "Yes: at the same goal 1 the posture"),
         ({"apart": 0.5}, False, "Not shown:"),
         ({"apart": 0.5, "of_placebo": 2.0}, False, "Not shown:"),
         ({"apart": 0.0}, False, "No significant difference:"),
