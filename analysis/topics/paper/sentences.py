@@ -84,12 +84,12 @@ def finding_of_claims(study: Study) -> str:
     by_verdict = counts(entries)
     judged = sum(by_verdict.values())
     if mostly_undecided(entries):
-        return (
+        words = (
             f"These runs do not decide {by_verdict['undecided']} of {judged} claims: tasks, "
             "methods, runs or trials are missing. Claims without runs are only in "
             "tables/claims.csv."
         )
-    if central := central_claims(entries):
+    elif central := central_claims(entries):
         each = [
             f"{len(claims)} {is_or_are(len(claims))} {verdict}: {listed(claims)}"
             for verdict, claims in central.items()
