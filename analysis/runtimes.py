@@ -19,7 +19,7 @@ from coartic.analysis.topics.comparison.figures import draw_shares
 from coartic.analysis.topics.comparison.running_times import SPENDS, TARGETS, ecdf, times_of
 from coartic.errors import CoarticError
 from coartic.robot import Array
-from coartic.text import unknown
+from coartic.text import id_named, unknown
 
 By = Literal["task", "family"]
 AXES = {
@@ -49,7 +49,8 @@ def runtimes(
     by : {"task", "family"}, optional
         One ECDF for each; over all tasks by default. Tasks of a group count alike.
     methods : str or sequence of str, optional
-        Methods with their variants, such as ``"cma-es/bandit trials=200"``; by default all that
+        Methods with their variants, such as ``"cma-es/bandit trials=200"`` or ``"CMA-ES"``; by
+        default all that
         are compared in the report and have runs on all tasks of a group. Where methods are named,
         a group has the tasks on which all of them have runs.
     targets : sequence of float, shape (n,), optional
@@ -77,10 +78,12 @@ def runtimes(
     if by is not None and by not in get_args(By):
         raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
     by_method = scores.labels_by_task(study)
-    methods = [methods] if isinstance(methods, str) else methods
+    called = {name: known.name_of(name) for name in by_method}
+    asked = [methods] if isinstance(methods, str) else methods
+    methods = [id_named(name, called) for name in asked]
     for name in methods:
         if name not in by_method:
-            raise CoarticError(unknown("method", name, by_method))
+            raise CoarticError(unknown("method", name, by_method, called))
     groups: dict[str, list[str]] = {}
     for name in scores.initial_and_optimum(study):
         group = {None: EVERYTHING, "task": name, "family": study.tasks[name].family or name}[by]

@@ -101,6 +101,7 @@ def test_methods_that_are_named_share_their_tasks(study):
         assert steps.share.max() == share_by_hand([TWO], method, [0.5, 1.0], 5)
     assert {*curves.method} == {"own", LEARNER}
     assert {*coartic.runtimes(study, by="task", methods=LEARNER).group} == {TWO}
+    assert {*coartic.runtimes(study, methods="null-space control, current goal").method} == {PLAN}
 
 
 def test_what_cannot_be_shown(study, tmp_path):
