@@ -16,6 +16,7 @@ from coartic.analysis.claims.judge import judge_claims
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import numbers, render
+from coartic.analysis.report.about import limits
 from coartic.analysis.report.build import SECTIONS, inert, report_files, write_report
 from coartic.analysis.report.contents import FIGURES, TABLES
 from coartic.analysis.report.text import answers
@@ -26,6 +27,7 @@ from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.cli.draw import median_run
 from coartic.runs.store import RUNS_FILE
+from tests.support import made_up
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
 
@@ -311,3 +313,21 @@ def test_sections_name_figures_and_tables():
         assert section.figure in {"", *FIGURES}
         assert section.table in {"", *TABLES}
         assert bool(section.caption) == bool(section.table)
+
+
+def test_limits_count_the_runs_of_the_papers_cells_and_all_trials_of_learners():
+    """20 runs under EC1 are as many as the paper's; two of a control and 200 trials are told."""
+    rows = [made_up.row("dual-process/EC1", -300, task="ascending", run=n, trials=10_000)
+            for n in range(20)]  # fmt: skip
+    rows += [
+        made_up.row("dual-process/EC1-subtask", -320, task="ascending", run=n, trials=10_000)
+        for n in range(2)
+    ]
+    runs = pd.DataFrame(rows).assign(commit="")
+    found = limits(made_up.study_of(runs, [load_task("ascending")]))
+    assert (found["few"], found["trials"]) == (0, [])
+    short = runs.assign(trials=200, variant="trials=200")
+    found = limits(made_up.study_of(short, [load_task("ascending")]))
+    assert (found["few"], found["trials"]) == (0, [200])
+    found = limits(made_up.study_of(runs[runs.run < 7], [load_task("ascending")]))
+    assert found["few"] == 7

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from shlex import quote
 from typing import Any
 
-from coartic.analysis.methods import LEARNERS
+from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.published import RUNS
 from coartic.analysis.words import RECONSTRUCTED, listed, marked
@@ -19,9 +19,10 @@ def limits(study: Study) -> dict[str, Any]:
     """What the results cannot show, as far as it depends on the folder."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
-    learners = [cell for (_, label), cell in study.cells.items() if label in LEARNERS]
+    learners = [cell for cell in study.cells.values() if cell.method.startswith(LEARNER)]
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
-    fewest = min((len(cell.runs) for cell in learners), default=0)
+    of_paper = [len(cell.runs) for cell in learners if cell.method in LEARNERS]
+    fewest = min(of_paper, default=0)
     tasks = {name: study.tasks[name] for name in study.tasks if name in one_by_one(study)}
     optima = {name: study.optima.get(name) for name in tasks}
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)

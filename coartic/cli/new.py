@@ -45,7 +45,7 @@ def new_method(
     registered = registry()
     add_cards(registered, [card_of(mine, "new method", "", "")])
     names = given.method_names(built_in())
-    if id_named(name, names) != name or name in names:
+    if id_named(name, names) != name:
         raise CoarticError(f"{name!r} is a name of a method here: choose another")
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)

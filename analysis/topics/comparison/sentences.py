@@ -159,7 +159,8 @@ def from_files(study: Study) -> list[Any]:
 
 def foreign_in_words(row: Any) -> str:
     """A sentence about a method from a file, beginning with a space."""
-    text = f" Method {row.method}, not of this project, ends {number(100 * row.gap, 1)} % away"
+    gap = number(100 * row.gap, 1)
+    text = f" Method {row.method}, from outside this project, ends {gap} % away"
     if not row.beside:
         return f"{text}."
     if math.isnan(row.better):
