@@ -3,6 +3,7 @@
 import json
 import sqlite3
 import tomllib
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ def test_a_suite_has_variants_of_tasks_and_its_folder_can_be_checked(tmp_path):
     run_suite(tmp_path / "own.toml", folder, executor=InProcess())
     report = checker.check_runs(folder)
     assert (report.wrong, report.runs) == ([], 9)
-    with sqlite3.connect(folder / "runs.sqlite") as db:
+    with closing(sqlite3.connect(folder / "runs.sqlite", isolation_level=None)) as db:
         names = {name for (name,) in db.execute("SELECT name FROM tasks")}
         words = ("distinct-50", "distinct-100", "region-50-radius-2")
         assert names == {f"two-armed-1.{n}" for n in words}
