@@ -286,6 +286,8 @@ grid = { noise_sd = [0.02, 0.05, 0.1] }
     first = answers(study)[0]
     assert first["id"] == "settings"
     assert f"{rows.reward.iloc[0]:.1f}".replace("-", "−") in first["text"]
+    # Of two tests of four runs against four, none can reject: p is 2 · 2/70 at least.
+    assert first["text"].count("the runs are too few, or too alike, to tell") == 2
     (default,) = {text for text in render.texts_of(rows, "method") if "default" in text}
     assert "0.05" in default
 

@@ -249,6 +249,19 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
 
 
+def test_what_was_not_tested_is_not_said_to_be_alike():
+    """A method with one run, or runs that are all alike, as those of the learner."""
+    once = {(task, "mine"): [reward] for (task, _), (reward, *_) in TEN.items()}
+    alike = {(task, name): [reward - better] * 3
+             for (task, learner), (reward, *_) in TEN.items()
+             for name, better in ((learner, 0), ("mine", 3))}  # fmt: skip
+    for rewards in (TEN | once, alike):
+        seen = study(rewards)
+        assert TABLES["against-learner"](seen).least_p.isna().all()
+        (row,) = sentences.from_files(seen)
+        assert "; the runs are too few, or too alike, to tell" in sentences.foreign_in_words(row)
+
+
 def test_a_method_from_a_file_stands_with_its_parameters():
     """In ranking, tests and headline; a setting of a built-in method is a variant."""
     rewards = TEN | strangers(("mine", 2), ("random-search/climbing", 5), runs=10)

@@ -60,7 +60,7 @@ class Estimate:
     """Values in each sample; a number taken as known is no sample."""
     resamples: int = 0
     """Resamples that p was counted in; 0 for an exact test."""
-    least_p: float = 0.0
+    least_p: float = math.nan
     """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
 
 

@@ -20,12 +20,13 @@ MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
 
 
-@table("task, method, runs, solved, reward[], behind, p_holm")
+@table("task, method, runs, solved, reward[], behind, p_holm, least_p")
 def settings(study: Study) -> Rows:
     """Mean reward of each setting, the best of each task first.
 
     ``behind``: ticks behind the best of its task; ``p_holm``: of the two-tailed bootstrap test of
-    that difference, corrected for the settings of the task. Empty where folders compare methods.
+    that difference, corrected for the settings of the task; ``least_p``: the smallest that this
+    test can give, uncorrected. Empty where folders compare methods.
     """
     for task in study.tasks if compares_settings(study) else ():
         cells = [cell for (on, _), cell in study.cells.items() if on == task and len(cell.good)]
@@ -33,7 +34,8 @@ def settings(study: Study) -> Rows:
         cells.sort(key=lambda cell: -cell.rewards.mean())
         tests = [bootstrap_test(cells[0].rewards, cell.rewards, "two-sided") for cell in cells[1:]]
         p = [math.nan, *holm([test.p for test in tests])]
-        for cell, corrected in zip(cells, p, strict=True):
+        least = [math.nan, *(test.least_p for test in tests)]
+        for cell, corrected, least_p in zip(cells, p, least, strict=True):
             row = {
                 "task": marked(study.tasks[task]),
                 "method": cell.label,
@@ -42,6 +44,7 @@ def settings(study: Study) -> Rows:
                 **interval("reward", mean(cell.rewards)),
                 "behind": cells[0].rewards.mean() - cell.rewards.mean(),
                 "p_holm": corrected,
+                "least_p": least_p,
             }
             yield f"{task} {cell.label}", row | runs_of(cell)
 
@@ -76,8 +79,8 @@ def on_task(study: Study, rows: pd.DataFrame) -> str:
     after = f"next {setting_in(study, others[0]['method'])}: {number(others[0]['reward'], 1)}"
     if (p < LEVEL).all():
         return f"{text}, significantly better than all others; {after}."
-    if np.isnan(p).any():
-        return f"{text}; {after}; too few runs to tell."
+    if not np.isfinite(p).sum() * others[0]["least_p"] < LEVEL:
+        return f"{text}; {after}; the runs are too few, or too alike, to tell."
     surely = "significantly worse" if p[0] < LEVEL else "no significant difference"
     return f"{text}; {after}, {surely}."
 

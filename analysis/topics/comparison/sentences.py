@@ -83,7 +83,7 @@ def settings_in_words(rows: list[Any]) -> str:
     if others:
         rest = ", ".join(f"{row.name} {gap_in_words(row)}" for row in others)
         text += f"; then {rest}"
-        if others[0].least_p > LEVEL:
+        if not others[0].least_p <= LEVEL:
             text += f". Too few runs to tell it from {others[0].name}"
         elif not others[0].p < LEVEL:
             text += f". No significant difference from {others[0].name}"
@@ -101,9 +101,9 @@ def nearest_by_trial(rows: list[Any]) -> list[str]:
     else:
         beginning = f"The only algorithm here that learns from the rewards of trials is {best.name}"
     beside = ""
-    if second and second.least_p > LEVEL:
+    if second and not second.least_p <= LEVEL:
         beside = f"; too few runs to tell it from {second.name}"
-    elif second and not math.isnan(second.p):
+    elif second:
         sure = "significantly" if second.p < LEVEL else "not significantly"
         beside = f", {sure} better than {second.name} ({words.p_value(second.p)})"
     away = gap_in_words(best, interval=True)
@@ -164,7 +164,7 @@ def foreign_in_words(row: Any) -> str:
     if not row.beside:
         return f"{text}."
     if math.isnan(row.better):
-        return f"{text}; too few runs to tell it from the learner."
+        return f"{text}; the runs are too few, or too alike, to tell it from the learner."
     if row.better or row.worse:
         better = plural(row.better, "task")
         return (
@@ -381,7 +381,8 @@ NEAREST = Section(
         "formula, or nothing. Intervals describe new runs on the same tasks. Better on, worse on: "
         "number of tasks on which the mean reward differs significantly from that of the paper's "
         "learner (EC1 with one arm, EC4 with two), by two-tailed bootstrap tests, corrected for "
-        "the tasks of the method (table against-learner). Empty: too few runs to tell."
+        "the tasks of the method (table against-learner). Empty: the runs are too few, or too "
+        "alike, to tell."
     ),
     single=True,
 )

@@ -89,7 +89,7 @@ def ranking(study: Study) -> Rows:
         of_labels = tested.index.isin([f"{task} {label}" for task, label in labels.items()])
         tests = tested[of_labels]
         # With Holm's correction over its tasks: could any of its tests have told them apart?
-        if len(tests) and len(tests) * tests.least_p.min() < LEVEL:
+        if tests.least_p.count() * tests.least_p.min() < LEVEL:
             sure = tests[tests.p_holm < LEVEL]
             row |= {"better": sum(sure.reward > sure.learner)}
             row |= {"worse": sum(sure.reward < sure.learner)}
