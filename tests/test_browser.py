@@ -216,6 +216,14 @@ def test_printing_shows_every_picture_once(opened):
     assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
 
 
+def test_heads_of_tables_are_printed_on_every_page(opened):
+    """Chromium leaves buttons out of the heads that it repeats."""
+    page = opened()
+    page.emulate_media(media="print")
+    boxes = "all => all.map(button => getComputedStyle(button).display)"
+    assert set(page.locator("thead button").evaluate_all(boxes)) == {"contents"}
+
+
 OVERFLOWS = """[...document.querySelectorAll("main *")].filter(each => each.checkVisibility()
     && !each.closest("svg") && getComputedStyle(each).display != "inline"
     && (each.scrollHeight > each.clientHeight + 1 || each.scrollWidth > each.clientWidth + 1))
