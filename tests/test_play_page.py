@@ -47,7 +47,7 @@ def ticks(page, who):
 def settled(page):
     """Wait until nothing is to come."""
     page.evaluate(DRAWN)
-    page.wait_for_selector(".play[data-settled]")
+    page.wait_for_selector(".play[data-settled]", timeout=120_000)
     return page
 
 
@@ -90,6 +90,7 @@ def distance_in_spreads(trials, seeds=5):
 def test_coarticulation_appears_by_the_reward_of_the_whole_and_goes_with_that_of_movements(opened):
     page = settled(opened())
     trials = trials_made(page)
+    assert trials == 10_000  # on every machine
     for role, task in (("Blue", "ascending"), ("Orange", "descending")):
         assert ticks(page, role) == -learn(task, "EC1", seed=0, trials=trials).reward
     spreads = distance_in_spreads(trials)
@@ -105,6 +106,13 @@ def test_coarticulation_appears_by_the_reward_of_the_whole_and_goes_with_that_of
     page.get_by_role("radio", name="each movement").check()
     settled(page)
     assert "alike" in text(page, "finding")
+
+
+def test_evolution_reports_every_run_to_its_end(opened):
+    """Ten runs, which end at different times: none loses its last trials."""
+    page = settled(opened("who=cma-es"))
+    assert trials_made(page) == 10_000
+    assert "(5 runs each" in text(page, "finding")
 
 
 def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
@@ -186,11 +194,14 @@ def test_the_link_holds_the_whole_state(opened):
     settled(page)
     page.get_by_role("slider", name="Trials").fill("400")
     page.get_by_role("slider", name="Tick").fill("123")
+    shown = trials_made(settled(page))
+    assert f"trials={shown}&" in page.url
     state = """() => [...document.querySelectorAll('.play :is(select, input, .score, .handle)')]
         .map(each => [each.value, each.checked, each.innerText, each.ariaLabel])"""
     again = settled(opened(page.url.partition("#")[2]))
     assert again.evaluate(state) == page.evaluate(state)
     assert again.url == page.url
+    assert trials_made(settled(opened("trials=9000"))) == 9000  # on every machine
     # What no state is is left out.
     odd = settled(opened("who=learner&trials=x&preset=99&goals=1,a&nothing=1"))
     assert ticks(odd, "Blue") > 0

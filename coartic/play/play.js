@@ -3,8 +3,7 @@
    from coartic/play/page.py, or from a report, which has runs of its own to show. */
 
 const SEEDS = 5;
-const BUDGETS = [500, 1000, 2000, 5000, 10000];
-const RUN_S = 1.5; // a run of the learner should take no longer
+const TRIALS = 10000; // of a run
 const PACE = 90; // ticks a second
 const HOLD_S = 0.9; // at a hit
 const MOST_GOALS = 6;
@@ -68,7 +67,7 @@ class Mover {
 
 class Play {
   constructor(root, data, saved) {
-    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), playing: false, rate: 0 });
+    Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), playing: false });
     this.find = (name) => root.querySelector(`[data-is="${name}"]`);
     this.stage = new Picture(this.find("stage"));
     this.inset = new Picture(this.find("inset"));
@@ -78,7 +77,6 @@ class Play {
     this.first = { ...AT_FIRST, ...data.first };
     this.worker = new Worker(URL.createObjectURL(new Blob([data.source], { type: "text/javascript" })));
     this.worker.onmessage = ({ data: message }) => this.hear(message);
-    this.worker.postMessage({ measure: data.presets[0].task });
     this.fresh = new Set(); // what answers the present question
     root.classList.add("live");
     this.restore(saved);
@@ -131,12 +129,6 @@ class Play {
     return reward === "movement" ? { ...rules, credit: "subtask" } : rules;
   }
 
-  get budget() {
-    const cost = this.state.who === "cma-es" ? 5 : 1; // of a trial, beside that of a trial of the learner
-    const most = (RUN_S * this.rate) / cost;
-    return BUDGETS.findLast((trials) => trials <= most) || BUDGETS[0];
-  }
-
   /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
   ask() {
     if (!(this.state.who in NAMES || this.stored(this.state.who))) {
@@ -151,7 +143,7 @@ class Play {
   }
 
   send() {
-    if (!this.rate || (this.busy && this.held)) return;
+    if (this.busy && this.held) return;
     this.stale = false;
     this.busy = true;
     this.order += 1;
@@ -165,7 +157,7 @@ class Play {
       if (learns && !this.stored(who)) {
         const seeds = this.state.others ? SEEDS : 1;
         for (let seed = 0; seed < seeds; seed += 1) {
-          jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: this.budget, turn: seed && seed + 1 });
+          jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 });
         }
       }
       if (who === "plan") jobs.push({ key: `${k} plan`, task, model, horizon: this.state.ahead, trials: 1 });
@@ -176,12 +168,7 @@ class Play {
     this.worker.postMessage({ order: this.order, jobs });
   }
 
-  hear({ rate, order, reports }) {
-    if (rate) {
-      this.rate = rate;
-      this.ask();
-      return;
-    }
+  hear({ order, reports }) {
     if (order !== this.order) return;
     this.busy = false;
     reports.forEach(({ key, made, done, snapshots, rewards }) => {
@@ -414,7 +401,7 @@ class Play {
 
   /* Ticks needed against trials, on a logarithmic scale: what was learned, and the range of what was tried. */
   drawCurve() {
-    const { curve, colours, budget } = this;
+    const { curve, colours } = this;
     const learns = ["learner", "cma-es"].includes(this.state.who) && !this.stored(this.state.who);
     this.find("learning").hidden = !learns;
     if (!learns) return;
@@ -428,12 +415,12 @@ class Play {
     curve.begin([0, 0, 1, 1]);
     const { context, size: [width, height] } = curve;
     const [left, right, top, bottom] = [40, width - 10, 8, height - 22];
-    const x = (trials) => left + ((right - left) * Math.log(trials)) / Math.log(budget);
+    const x = (trials) => left + ((right - left) * Math.log(trials)) / Math.log(TRIALS);
     const y = (ticks) => bottom - ((bottom - top) * (ticks - low)) / (high - low);
-    for (let trials = 1; trials <= budget; trials *= 10) {
+    for (let trials = 1; trials <= TRIALS; trials *= 10) {
       context.fillStyle = colours.line;
       context.fillRect(x(trials), top, 1, bottom - top);
-      curve.text(trials.toLocaleString("en").replace(",", "\u202f"), [x(trials), height - 10], colours.soft, trials === 1 ? "left" : trials === budget ? "right" : "center", 12);
+      curve.text(trials.toLocaleString("en").replace(",", "\u202f"), [x(trials), height - 10], colours.soft, trials === 1 ? "left" : trials === TRIALS ? "right" : "center", 12);
     }
     const step = [5, 10, 20, 50, 100, 200, 500, 1000].find((each) => (high - low) / each < 5) || 5000;
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
@@ -481,7 +468,7 @@ class Play {
       });
       context.stroke();
     });
-    const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)), budget);
+    const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
     context.fillRect(x(at) - 0.75, top, 1.5, bottom - top);
     context.restore();
@@ -535,7 +522,7 @@ class Play {
     this.find("progress").textContent = progress;
     if (state.who === "you") this.find("hand").value = this.own[state.edited - 1].hand;
     const slider = this.find("trials");
-    slider.value = at ? (1000 * Math.log(at)) / Math.log(this.budget) : 0;
+    slider.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
     slider.setAttribute("aria-valuetext", progress);
     const tick = this.find("tick");
     tick.max = this.last;
@@ -546,7 +533,7 @@ class Play {
     this.find("stage").setAttribute("aria-label", words([
       `${main.length > 1 ? "Two robots" : "A robot"} and ${this.problems[0].goals.length} goals; ${name}.`, finding,
     ]));
-    const open = this.busy || this.stale || !this.rate || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked;
+    const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked;
     this.root.toggleAttribute("data-settled", !open);
     const spoken = words([...this.find("score").children].map((line) => `${line.textContent};`).concat(finding));
     if (!this.playing && !open && !this.held && spoken !== this.spoken) {
@@ -755,9 +742,8 @@ class Play {
       this.keep();
     });
     on("trials", "input", (event) => {
-      const run = this.results.get("0 run 0");
-      const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(this.budget))));
-      this.state.trials = run && trials >= run.made ? 0 : trials;
+      const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(TRIALS))));
+      this.state.trials = trials < TRIALS ? trials : 0;
       this.showMeeting();
       this.answer();
     });

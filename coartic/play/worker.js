@@ -35,28 +35,15 @@ class Job {
   }
 }
 
-/* Trials a second of this device, by the learner on a task: the most in short spans, since others use it as well. */
-function trials_a_second(task) {
-  const problem = problem_of(task);
-  const learner = new Learner(problem, { ...CONDITIONS.EC4, hands: problem.hands }, 0);
-  let most = 0;
-  for (let span = 0; span < 6; span += 1) {
-    const [begin, before] = [performance.now(), learner.trials];
-    while (performance.now() < begin + 25) learner.step();
-    most = Math.max(most, (1000 * (learner.trials - before)) / (performance.now() - begin));
-  }
-  return most;
-}
-
 if (typeof document === "undefined" && typeof self !== "undefined" && typeof module === "undefined") {
   let [order, jobs, reported] = [0, [], 0];
+  const worked = new Set(); // since the last report
   const work = (current) => {
     if (current !== order) return;
     const open = jobs.filter((job) => !job.done);
     const turn = Math.min(...open.map((job) => job.turn));
     const now = open.filter((job) => job.turn === turn);
     const end = performance.now() + SLICE_MS;
-    const worked = new Set();
     while (now.some((job) => !job.done) && performance.now() < end) {
       now.forEach((job) => { if (!job.done) job.step(); });
     }
@@ -64,15 +51,13 @@ if (typeof document === "undefined" && typeof self !== "undefined" && typeof mod
     if (performance.now() > reported + REPORT_MS || now.every((job) => job.done)) {
       reported = performance.now();
       self.postMessage({ order, reports: [...worked].map((job) => job.report()) });
+      worked.clear();
     }
     if (jobs.some((job) => !job.done)) setTimeout(work, 0, current);
   };
   self.onmessage = ({ data }) => {
-    if (data.measure) {
-      self.postMessage({ rate: trials_a_second(data.measure) });
-      return;
-    }
     order = data.order;
+    worked.clear();
     jobs = data.jobs.map((job) => new Job(job));
     reported = performance.now();
     work(order);
