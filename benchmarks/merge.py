@@ -115,7 +115,7 @@ def gather(first: Path, others: Sequence[Path], out: Path) -> dict[Path, str]:
 def complete_plan(store: Store) -> Plan:
     """What a folder was asked for. Raises CoarticError where it lacks runs of that."""
     plan = store.plan()
-    if (lacking := plan.size - sum(1 for _ in store.present())) > 0:
+    if (lacking := plan.size - len(store.present())) > 0:
         raise CoarticError(f"{store.folder} lacks {counted(lacking, 'run')}: finish it first")
     return plan
 

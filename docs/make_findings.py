@@ -139,8 +139,8 @@ def filled_pages() -> dict[str, str]:
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
         "seen": seen, "expect": expect, "name_of": name_of,
         "printed": tomllib.loads(published.read_text("utf-8"))["general"],
-        "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
-        "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
+        "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
+        "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}

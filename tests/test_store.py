@@ -455,6 +455,25 @@ def test_a_folder_that_only_its_owner_can_put_right(tmp_path):
         raise sqlite3.OperationalError("attempt to write a readonly database")
 
 
+def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, tmp_path):
+    """Only its own rows are, and only what SQLite cannot use is to be moved away."""
+    for error in (ValueError("another folder"), MemoryError(), CoarticError("the disk is full")):
+        with pytest.raises(type(error)) as caught, open_store(undisturbed.folder):
+            raise error
+        assert caught.value is error
+    shutil.copytree(undisturbed.folder, tmp_path / "sick")
+    step = "UPDATE settings SET model = json_set(model, '$.step', 1e-9)"
+    sql(step)(tmp_path / "sick" / RUNS_FILE)
+    with (
+        pytest.raises(CoarticError) as caught,
+        open_store(undisturbed.folder) as whole,
+        open_store(tmp_path / "sick") as sick,
+    ):
+        whole.plan(), sick.plan()
+    assert str(caught.value).startswith(f"{tmp_path / 'sick' / RUNS_FILE} holds what")
+    assert "ove it away" not in str(caught.value)
+
+
 def test_a_run_of_absurd_constants_is_refused(undisturbed, tmp_path):
     (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
     sql("UPDATE settings SET model = json_set(model, '$.step', 1e-6)")(tmp_path / RUNS_FILE)

@@ -277,6 +277,8 @@ def movements_by_run(
     if paths is not None:
         for key, points in paths.sort_values("waypoint").groupby(["run_id", "order"]):
             waypoints[key] = points[joints].to_numpy(dtype=np.float64)
+    if not all(np.isfinite(each).all() for each in (targets, *waypoints.values())):
+        raise ValueError("a joint is not a finite number")
     columns = (rows[name].tolist() for name in ("run_id", "order", "goal", "hand", "kind", "ticks"))
     movements: dict[str, list[Movement]] = {}
     for target, run_id, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):

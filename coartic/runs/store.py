@@ -17,11 +17,12 @@ import sqlite3
 import time
 import warnings
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import fields
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,23 +178,42 @@ _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
 _WAYPOINT = ("result_id", "order", "waypoint")
 
 
+UNREADABLE = (
+    *(sqlite3.DatabaseError, zlib.error),
+    *(ValueError, KeyError, TypeError, RecursionError),
+)
+"""What is raised where content of a file is not as coartic writes it."""
+
+Given = ParamSpec("Given")
+Returned = TypeVar("Returned")
+
+
+def explained(
+    read: Callable[Concatenate[Store, Given], Returned],
+) -> Callable[Concatenate[Store, Given], Returned]:
+    """A method of :class:`Store` that reads, with its errors explained (:func:`explain_errors`)."""
+
+    @wraps(read)
+    def explain(store: Store, /, *given: Given.args, **named: Given.kwargs) -> Returned:
+        with explain_errors(store.folder):
+            return read(store, *given, **named)
+
+    return explain
+
+
 class Store:
     """The runs of one results folder. Made by :func:`open_store` and :func:`writing`."""
 
-    def __init__(self, folder: Path, connection: sqlite3.Connection, *, reads: bool) -> None:
+    def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
         self._db = connection
-        self._reads = reads
         self._file = identity(folder / RUNS_FILE)
 
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+    def __exit__(self, *_: object) -> None:
         self._db.close()
-        if isinstance(error, Exception if self._reads else sqlite3.DatabaseError):
-            with explain_errors(self.folder):
-                raise error
 
     # What was asked for.
 
@@ -202,13 +222,13 @@ class Store:
 
         Raises CoarticError for a folder of another suite.
         """
-        for row in self._db.execute("SELECT name FROM suite"):
-            if row["name"] != plan.suite:
-                raise CoarticError(
-                    f"{self.folder} holds results of suite {row['name']!r}: name another folder "
-                    f"for suite {plan.suite!r}"
-                )
         with self._writing():
+            for row in self._db.execute("SELECT name FROM suite"):
+                if row["name"] != plan.suite:
+                    raise CoarticError(
+                        f"{self.folder} holds results of suite {row['name']!r}: name another "
+                        f"folder for suite {plan.suite!r}"
+                    )
             for table in ("suite", "tasks", "methods", "cells"):
                 self._db.execute(f"DELETE FROM {table}")
             self._insert("suite", {
@@ -234,6 +254,7 @@ class Store:
             robots = [task.robot for task in plan.tasks.values()]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
 
+    @explained
     def plan(self) -> Plan:
         """What was asked for last. Raises CoarticError where nothing was yet."""
         row = self._one("SELECT * FROM suite")
@@ -273,6 +294,7 @@ class Store:
             raise ValueError("two cells have one setting")
         return plan
 
+    @explained
     def made_with(self) -> dict[str, Any]:
         """With what the suite was run last: versions, platform, commit, command, date."""
         row = self._one(
@@ -284,16 +306,19 @@ class Store:
 
     # Which runs there are.
 
-    def present(self) -> Iterator[tuple[int, int, str, float | None]]:
+    @explained
+    def present(self) -> list[tuple[int, int, str, float | None]]:
         """Position of the cell, number, status and time limit of the runs asked for that there
         are."""
         columns = "position, results.run, status, time_limit_s"
-        yield from map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}"))
+        return list(map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}")))
 
+    @explained
     def count(self) -> int:
         """Number of runs, asked for or not."""
         return int(self._db.execute("SELECT count(*) FROM results").fetchone()[0])
 
+    @explained
     def stale(self) -> int:
         """Runs of what is asked for now that other code made."""
         rows = self._db.execute(
@@ -333,6 +358,7 @@ class Store:
                 "command with this folder to go on"
             )
 
+    @explained
     def run(self, prefix: str) -> Run:
         """The one run whose id begins so. Raises CoarticError where there is none, or several."""
         ids = self.ids(prefix)
@@ -368,6 +394,7 @@ class Store:
             [None if reward == FAILED_TRIAL else reward for reward in rewards],
         )
 
+    @explained
     def ids(self, prefix: str) -> list[str]:
         """Ids of all runs, asked for or not, that begin so."""
         rows = self._db.execute(
@@ -375,12 +402,14 @@ class Store:
         )
         return [run_id for (run_id,) in rows]
 
+    @explained
     def frame(self, view: str) -> pd.DataFrame:
         """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""
         inner = ["result_id", "part"]
         table = self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
         return check_runs(table) if view == "runs" else table
 
+    @explained
     def movements(self, part: str, most: int) -> pd.DataFrame:
         """Movements of one part (:data:`PARTS`), as view ``solutions``, of the first runs of each
         cell that are ok, so many at most."""
@@ -389,6 +418,7 @@ class Store:
             WHERE {_FIRST} ORDER BY cells.position, results.run, "order" """
         return self._table(query, part, most).drop(columns=["result_id", "part"])
 
+    @explained
     def waypoints(self, most: int) -> pd.DataFrame:
         """View ``paths`` of the same runs."""
         query = f"""SELECT results.run_id, waypoints.* {_ASKED_FOR}
@@ -399,13 +429,14 @@ class Store:
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
-        rows = self._db.execute(
-            f"SELECT run_id, rewards, trials {_ASKED_FOR} "
-            "JOIN learning ON learning.result_id = results.id ORDER BY cells.position, results.run"
-        )
-        for run_id, blob, trials in rows:
-            stored = unpack(blob, trials)
-            yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
+        with explain_errors(self.folder):
+            rows = self._db.execute(
+                f"SELECT run_id, rewards, trials {_ASKED_FOR} JOIN learning "
+                "ON learning.result_id = results.id ORDER BY cells.position, results.run"
+            )
+            for run_id, blob, trials in rows:
+                stored = unpack(blob, trials)
+                yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
     # Inside.
 
@@ -463,6 +494,8 @@ class Store:
                     self._db.rollback()
         except sqlite3.OperationalError as error:
             raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
+        except sqlite3.DatabaseError as error:
+            raise CoarticError(damage(self.folder / RUNS_FILE, error)) from None
 
     def _wait_for(self, statement: str) -> None:
         """Execute it as soon as other programs that have the file open let it."""
@@ -555,7 +588,8 @@ def to_frame(names: list[str], rows: list[Any], texts: dict[str, str]) -> pd.Dat
         dtype = _DTYPES.get(name, "float64")  # joints
         content = [texts.setdefault(v, v) if type(v) is str else v for v in column]
         try:
-            arrays[name] = pd.array(content, dtype=dtype)
+            with np.errstate(invalid="ignore"):  # of numbers that are too large, which it refuses
+                arrays[name] = pd.array(content, dtype=dtype)
         except (ValueError, TypeError, OverflowError) as error:
             raise ValueError(f"{name}: {error}") from None
     return pd.DataFrame(arrays)
@@ -588,7 +622,7 @@ def open_store(folder: Path) -> Store:
                     f"another `coartic run` is at work in {folder}: {done} of "
                     f"{counted(asked, 'run')} are done; wait for it"
                 )
-    return Store(folder, connection, reads=True)
+    return Store(folder, connection)
 
 
 @contextmanager
@@ -619,7 +653,7 @@ def writing(folder: Path) -> Iterator[Store]:
             connection.execute("PRAGMA journal_mode = DELETE")
             if not has_tables(connection, folder):
                 connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
-        with Store(folder, connection, reads=False) as store:
+        with Store(folder, connection) as store:
             yield store
 
 
@@ -773,12 +807,20 @@ def explain_errors(folder: Path) -> Iterator[None]:
                 "folder cannot be written. Copy the whole folder, and use the copy."
             ) from None
         raise CoarticError(f"cannot use {path}: {error}") from None
-    except Exception as error:
-        wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
-        raise CoarticError(
-            f"{path} is damaged ({plain(wrong, 200) or type(error).__name__}). Move it away and "
-            "repeat the `coartic run` command, or restore a copy."
-        ) from None
+    except UNREADABLE as error:
+        raise CoarticError(damage(path, error)) from None
+
+
+def damage(path: Path, error: Exception) -> str:
+    """What is wrong with a file, and what to do where SQLite cannot use it at all."""
+    wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
+    wrong = plain(wrong, 200) or type(error).__name__
+    if type(error) is sqlite3.DatabaseError:  # malformed, or no database
+        return (
+            f"{path} is damaged ({wrong}). Move it away and repeat the `coartic run` command, or "
+            "restore a copy."
+        )
+    return f"{path} holds what coartic does not write ({wrong})"
 
 
 def is_locked(error: sqlite3.OperationalError) -> bool:
