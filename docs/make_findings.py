@@ -19,6 +19,8 @@ import pandas as pd
 
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
+from coartic.analysis.statistics.hypotheses import bootstrap_test, independence_test
+from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
@@ -115,6 +117,17 @@ def interval(values: Row, column: str, digits: int = 1, scale: float = 1.0) -> s
     return f"{number(value, digits)} {in_brackets(low, high, digits)}".strip()
 
 
+def p_of_shares(values: Row, printed_runs: int) -> float:
+    """p of Fisher's exact test that runs learn a hand sequence as often as printed ones."""
+    counts = (values.published_runs, printed_runs), (values.runs, values.of_runs)
+    return independence_test(*([int(n), int(of - n)] for n, of in counts)).p
+
+
+def p_above(values: pd.Series, bound: float) -> float:
+    """One-tailed p that a mean over tasks is above a bound, as claims test it, uncorrected."""
+    return bootstrap_test(values, bound, resamples=RESAMPLES_OF_STUDIES).p
+
+
 def expect(holds: bool, what: str) -> str:
     """Nothing, where a sentence holds. Raises ValueError where the results no longer bear it."""
     if not holds:
@@ -137,7 +150,8 @@ def filled_pages() -> dict[str, str]:
     published = ANALYSIS / "topics" / "paper" / "published.toml"
     environment.globals |= {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "seen": seen, "expect": expect, "name_of": name_of,
+        "seen": seen, "expect": expect, "name_of": name_of, "p_of_shares": p_of_shares,
+        "p_above": p_above,
         "printed": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
         "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),

@@ -5,6 +5,8 @@ apart. The learner's runs on ascending differ, all else has no spread.
 """
 
 import math
+from operator import itemgetter
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -197,3 +199,23 @@ def test_contexts(study, monkeypatch):
     frame = coarticulation.contexts(MadeUp(study, trajectories=made(unsolved)))
     same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
     assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]
+
+
+@pytest.mark.parametrize(
+    ("learner", "said"),
+    [
+        (7.9, "is last of the 3 that learn, at 7.9 %, ahead of random guesses (12.3 %)."),
+        (2.0, "is second of the 3 that learn, at 2.0 %, ahead of random guesses (12.3 %)."),
+        (15.0, "is last of the 3 that learn, at 15.0 %, behind random guesses (12.3 %)."),
+        (0.1, ""),
+    ],
+)
+def test_methods_that_only_try_do_not_count_among_those_that_learn(learner, said):
+    gaps = {"cma-es/bandit": 0.5, "random-search/climbing": 6.3, "dual-process/EC1": learner}
+    gaps |= {"placebo/guesses": 12.3, "corrective-alone/every": 13.9}
+    rows = [
+        SimpleNamespace(method=label, gap=gap, low=math.nan, high=math.nan)
+        for label, gap in sorted(gaps.items(), key=itemgetter(1))
+    ]
+    text = sentences.place_of_learner(rows)
+    assert text.removeprefix("The paper's learner ") == said

@@ -17,6 +17,8 @@ from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import marked, number, plural, two_figures
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+TRIES = methods.PLACEBO, "corrective-alone/every"
+"""Methods that take the best of their trials: they learn nothing from one for the next."""
 LEVELS = {"trials_to_quarter": "a quarter", "trials_to_half": "half"}
 """Columns of the table of costs, and in words the share of targets that each is about."""
 
@@ -52,7 +54,7 @@ def finding_of_ranking(study: Study) -> str:
         return ""
     if compares_settings(study):
         return words.capital(settings_in_words(by_trial or by_formula or others))
-    sentences = nearest_by_trial(by_trial) if by_trial else []
+    sentences = nearest_by_trial(by_trial)
     without = "best method that does not use the reward"
     if by_formula:
         away = f"{gap_in_words(by_formula[0])} away{as_declared(by_formula[0])}"
@@ -90,8 +92,16 @@ def settings_in_words(rows: list[Any]) -> str:
     return f"{text}."
 
 
-def nearest_by_trial(rows: list[Any]) -> list[str]:
-    """Sentences on methods that learn from the rewards of trials."""
+def that_learn(by_trial: list[Any]) -> list[Any]:
+    """Those of the methods that see only rewards of trials that learn from them."""
+    return [row for row in by_trial if row.method not in TRIES]
+
+
+def nearest_by_trial(by_trial: list[Any]) -> list[str]:
+    """Sentences on methods that learn from the rewards of trials, and the learner among them."""
+    rows = that_learn(by_trial)
+    if not rows:
+        return []
     best, second = rows[0], rows[1] if len(rows) > 1 else None
     if second:
         beginning = (
@@ -108,19 +118,29 @@ def nearest_by_trial(rows: list[Any]) -> list[str]:
         beside = f", {sure} better than {second.name} ({words.p_value(second.p)})"
     away = gap_in_words(best, interval=True)
     sentences = [f"{beginning}: {away} from the optimum{beside}{as_declared(best)}."]
-    rank, learner = learner_among(rows)
-    if rank > 1:
-        away = gap_in_words(learner, interval=True)
-        sentences.append(f"The paper's learner ranks {ORDINALS[rank - 1]}, {away} away.")
+    if place := place_of_learner(by_trial, interval=True):
+        sentences.append(place)
     return sentences
 
 
-def learner_among(rows: list[Any]) -> tuple[int, Any]:
-    """Rank of the learner, from 1, and its row; 0 without it."""
-    for rank, row in enumerate(rows, 1):
-        if methods.is_learner(row.method):
-            return rank, row
-    return 0, None
+def place_of_learner(by_trial: list[Any], *, interval: bool = False) -> str:
+    """A sentence on where the learner ends among methods that learn, and beside random guesses.
+
+    Nothing where it comes nearest, or did not run.
+    """
+    rows = that_learn(by_trial)
+    ranks = [rank for rank, row in enumerate(rows) if methods.is_learner(row.method)]
+    if not ranks or ranks[0] == 0:
+        return ""
+    rank, count, learner = ranks[0], len(rows), rows[ranks[0]]
+    place = "last" if rank == count - 1 else ORDINALS[rank]
+    text = f"The paper's learner is {place} of the {count} that learn, at "
+    text += gap_in_words(learner, interval=interval)
+    for row in by_trial:
+        if row.method == methods.PLACEBO:
+            beside = "ahead of" if learner.gap < row.gap else "behind"
+            text += f", {beside} random guesses ({gap_in_words(row)})"
+    return f"{text}."
 
 
 def answer_nearest(study: Study) -> str:
@@ -130,17 +150,16 @@ def answer_nearest(study: Study) -> str:
         return ""
     if compares_settings(study):
         return settings_in_words(next(rows for rows in (by_trial, *others) if rows))
-    best = next(row for rows in (by_trial, *others) for row in rows)
+    learn = that_learn(by_trial)
+    best = next(row for rows in (learn, *others, by_trial) for row in rows)
     who = (
-        f"Among methods that see only rewards: {best.name}"
-        if by_trial
+        f"Among methods that learn from rewards alone: {best.name}"
+        if learn
         else words.capital(best.name)
     )
     text = f"{who}, {gap_in_words(best)} away{as_declared(best)}."
-    rank, learner = learner_among(by_trial)
-    if rank > 1:
-        place = f"{ORDINALS[rank - 1]} of {len(by_trial)} reward-only methods"
-        text += f" The paper's learner is {place}, at {gap_in_words(learner)}."
+    if place := place_of_learner(by_trial):
+        text += f" {place}"
     foreign = from_files(study)
     text += "".join(map(foreign_in_words, foreign[:3]))
     if len(foreign) > 3:
