@@ -1,20 +1,17 @@
-"""CMA-ES over target configurations, with two ways of finding the hand sequence.
+"""CMA-ES over target configurations, with a bandit that finds the hand sequence.
 
 Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) over the
 targets of all its explored joints, which sees the total reward of each trial and nothing
 else. Its first mean are the configurations of the corrective process **A** alone, which takes
 one trial; its first step size is the learner's noise; where it stops by its own
 criteria it begins anew there with twice the population (IPOP, Auger & Hansen 2005). A
-failed trial ranks last. Two forms differ in which strategy makes the next generation of trials:
+failed trial ranks last. UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each
+sequence, scaled by the spread of the first rewards, decides which strategy makes the next
+generation of trials.
 
-``bandit``: UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each sequence,
-scaled by the spread of the first rewards.
-``every``: successive halving (Karnin, Koren & Somekh 2013): rounds of equal budget, equal
-shares within a round, the worse half of the sequences leaves after each.
-
-Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: up
-to 0.05 it can settle on RRRR in two-armed-2 with the other arm still (-339 in the mean, where
-0.1 and more give -331); no other reward differs by more than 2.4. Step sizes 0.02, 0.05, 0.1
+Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: no
+reward differs by more than 2.4; with the other arm kept still, up to 0.05 can settle on RRRR in
+two-armed-2 (-339 in the mean, where 0.1 and more give -331). Step sizes 0.02, 0.05, 0.1
 and 0.2 within one given sequence are within 5 of each other after 2000 trials; after 300
 0.05 leads or is 2 behind. Handing the strategy the configurations in which the goals were hit
 instead of the targets (Lamarckian) cost 6 to 9 after 2000 trials, so it is not done.
@@ -23,7 +20,6 @@ instead of the targets (Lamarckian) cost 6 to 9 after 2000 trials, so it is not 
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from typing import Annotated
 
 import numpy as np
@@ -83,15 +79,19 @@ class Strategy:
 
 
 class CMAES(Method):
-    """CMA-ES with a strategy for each hand sequence; base of both forms."""
+    """CMA-ES for each hand sequence; the upper confidence bound says which goes on."""
 
+    name = "cma-es/bandit"
+    title = "CMA-ES, a bandit over hand sequences"
     citation = (
         "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
         "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
         "size. IEEE Congress on Evolutionary Computation. "
+        "P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
+        "bandit problem. Machine Learning."
     )
     told = TOLD
-    Parameters = UninformedParameters
+    Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
         """Search until the trials are used up; the solution is the best trial's."""
@@ -105,23 +105,8 @@ class CMAES(Method):
                 self._allot(promising, attempts)
         return attempts.result(trials={s.hands: s.trials for s in strategies})
 
-    @abstractmethod
     def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
-        """Spend the trials that are left."""
-
-
-class Bandit(CMAES):
-    """The next generation goes where the upper confidence bound is highest."""
-
-    name = "cma-es/bandit"
-    title = "CMA-ES, a bandit over hand sequences"
-    citation = CMAES.citation + (
-        "P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
-        "bandit problem. Machine Learning."
-    )
-    Parameters = BanditParameters
-
-    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
+        """Spend the trials that are left, generation by generation."""
         first = [strategy.reward for strategy in strategies]
         width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
         generations = len(strategies)
@@ -135,30 +120,4 @@ class Bandit(CMAES):
             generations += 1
 
 
-class Every(CMAES):
-    """All hand sequences, halved again and again."""
-
-    name = "cma-es/every"
-    title = "CMA-ES, every hand sequence, successive halving"
-    citation = CMAES.citation + (
-        "Z. Karnin, T. Koren, O. Somekh (2013). Almost optimal exploration in multi-armed "
-        "bandits. International Conference on Machine Learning."
-    )
-
-    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
-        rounds = math.ceil(math.log2(len(strategies))) + 1  # the last is for one alone
-        budget = attempts.left / rounds
-        # Best first from the start: of very many sequences a round does not reach all.
-        strategies = sorted(strategies, key=lambda s: -s.reward)
-        for _ in range(rounds):
-            for strategy in strategies:
-                enough = strategy.trials + budget / len(strategies)
-                while strategy.trials < enough and attempts.left > 0:
-                    strategy.generation()
-            strategies = sorted(strategies, key=lambda s: -s.reward)
-            strategies = strategies[: math.ceil(len(strategies) / 2)]
-        while attempts.left > 0:
-            strategies[0].generation()
-
-
-METHODS: tuple[type[Method], ...] = (Bandit, Every)
+METHODS: tuple[type[Method], ...] = (CMAES,)

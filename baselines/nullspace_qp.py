@@ -1,4 +1,4 @@
-"""Prioritised nullspace control by quadratic programmes, one method a secondary objective.
+"""Prioritised nullspace control by quadratic programmes, with a view to the next goal or not.
 
 The controller keeps a **posture** for the current goal and for each goal that it looks ahead to.
 Both the postures and the control steps are answers of one cascade (:mod:`coartic.baselines.
@@ -20,18 +20,15 @@ Postures are found once for each goal to come and kept up by a step of the same 
 control step. The objective decides which posture hits the current goal:
 
 - none: the nearest to where the robot stands when the last goal is hit;
-- velocity: the same, and half of the joint rates of the step before (smoothness);
 - next goal: the posture from which the way on to the next goal's posture is shortest, too
   (coarticulation by concurrent subgoals of lower priority). The next goal's posture is itself
-  chosen with a view to the goal after it;
-- preshaping: the nearest, but for the other arm, which heeds the posture in which it hits the
-  goal it is to hit next; that may lie several goals ahead.
+  chosen with a view to the goal after it.
 
 Tuned on thirty development instances (``d000`` to ``d009`` of families one-armed, two-armed and
 aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before
 that some 50 of a prototype (other first postures, 8 to 24 faces, control steps of 1 to 10 ticks,
 posture steps of 0.05 to 0.2 and gains of 0.1 to 0.7 for them, horizons, weights). Mean gap to
-``optimum/dynamic-programming`` of ``next-goal``, one setting changed at a time, * the value used:
+the best path known of ``next-goal``, one setting changed at a time, * the value used:
 
 =========================  ====================================================================
 hand comes nearer, at      0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
@@ -41,15 +38,15 @@ weight of ways to come     0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 
 goals ahead (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
 =========================  ====================================================================
 
-On the same instances velocity (inertia 0.5) has 20.5 %, preshaping, of those with two hands,
-13.4 %, and the corrective process alone with its best hand sequence 24.8 %. A controller whose
+On the same instances the corrective process alone with its best hand sequence has 24.8 %; half of
+the joint rates of the step before, kept (smoothness is no part of the reward), 20.5 % where
+``none`` has 20.1 %. A controller whose
 level 1 moves the hand straight to the goal's centre, with the least rates at every step, had
 43.6 % with the next goal as level 2 and 60 % without one.
 
 The remaining gap is local: postures are found by descent from where the robot is, and another
 branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty). First
 postures sought from a straight arm, too, mended one instance and spoiled others as often.
-Smoothness is no part of the reward: keeping velocity does not gain any.
 """
 
 from __future__ import annotations
@@ -94,8 +91,6 @@ class Aim(NamedTuple):
 
     hand: Hand
     goal: int  # 0-based
-    arm_only: bool = False
-    """Whether postures for the goals before this one heed it with this hand's arm alone."""
 
 
 class Leg(NamedTuple):
@@ -105,8 +100,6 @@ class Leg(NamedTuple):
     ticks: int
     q: Array
     """Configuration in which the goal is hit, shape ``(dof,)``."""
-    rates: Array
-    """Joint rates of the last control step, shape ``(joints,)``."""
     postures: dict[Aim, Array]
     """Postures of the goals looked ahead to."""
 
@@ -123,8 +116,6 @@ class Controller:
     task: Task
     period: int
     """Ticks from one control step to the next."""
-    inertia: float = 0.0
-    """Share of the rates of the step before in those preferred now."""
     modelling: Literal["none", "cvxpy"] = "none"
     """Whether cvxpy states the programmes, or their matrices go to the solver as they are."""
     solves: int = 0
@@ -140,7 +131,7 @@ class Controller:
 
         Raises StuckError if the hand does not get there, MethodError if the solver fails.
         """
-        (hand, goal, _), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
+        (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         short = beyond_reach(self.task, hand, self.task.goals[goal], model.correction_tolerance)
         if short > radius:
@@ -150,7 +141,6 @@ class Controller:
             )
         length = model.step * self.period
         q = start = self.session.q0 if before is None else before.q
-        rates = np.zeros(len(self.moving)) if before is None else before.rates
         waypoints: list[Array] = []
         postures = self.find_postures(q, aims, {} if before is None else before.postures)
         nearest, since = np.inf, 0
@@ -165,8 +155,7 @@ class Controller:
                 )
             if waypoints:
                 self.sweep(q, aims, postures)
-            rates = self.next_rates(q, aims[0], postures[0], rates, length)
-            q = self.add(q, length * rates)
+            q = self.add(q, length * self.next_rates(q, aims[0], postures[0], length))
             waypoints.append(q)
         path = np.array(waypoints or [start])
         followed = follow(
@@ -175,7 +164,7 @@ class Controller:
         self.session.spend(forward_kinematics=followed.evaluations)
         movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
         ahead = dict(zip(aims[1:], postures[1:], strict=True))
-        return Leg(movement, followed.ticks, followed.q, rates, ahead)
+        return Leg(movement, followed.ticks, followed.q, ahead)
 
     def try_leg(self, way: tuple[Leg, ...], aims: tuple[Aim, ...]) -> Leg | StuckError:
         """The next leg of a way, or the error that says why there is none."""
@@ -214,13 +203,12 @@ class Controller:
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
-            preferred = before.copy()
+            preferred = before
             if k + 1 < len(aims):
-                after, (hand, _, arm_only) = postures[k + 1], aims[k + 1]
+                after = postures[k + 1]
                 to = 1.0 / max(float(np.linalg.norm(postures[k] - before)), _SHORTEST)
                 on = 1.0 / max(float(np.linalg.norm(after - postures[k])), _SHORTEST)
-                heeding = self.session.joints(hand) if arm_only else slice(None)
-                preferred[heeding] += on / (to + on) * (after - before)[heeding]
+                preferred = before + on / (to + on) * (after - before)
             postures[k], change = self.step_nearer(postures[k], preferred, aim)
             largest = max(largest, change)
         return largest
@@ -242,14 +230,13 @@ class Controller:
         length = float(np.linalg.norm(change))
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
-    def next_rates(self, q: Array, aim: Aim, posture: Array, last: Array, length: float) -> Array:
+    def next_rates(self, q: Array, aim: Aim, posture: Array, length: float) -> Array:
         """Joint rates of one control step of a ``length``, of norm 1 at most."""
         way = (posture - q)[self.moving]
         steps = max(1.0, float(np.linalg.norm(way)) / length)
         rows, outside = self.faces(q, aim)
         shrunk = outside.max() * (1.0 - _CLOSING / steps)
-        preferred = (1.0 - self.inertia) * way / (steps * length) + self.inertia * last
-        rates = self.solve(length * rows, outside - shrunk, preferred)
+        rates = self.solve(length * rows, outside - shrunk, way / (steps * length))
         rates /= max(1.0, float(np.linalg.norm(rates)))
         return rates
 
@@ -283,10 +270,6 @@ class Controller:
 class NullspaceParameters(Parameters):
     """Parameters of the controller."""
 
-    hands: Literal["every", "nearest"] = "every"
-    """``every``: all hand sequences are simulated and the shortest is kept; ``nearest``:
-    at each goal the hand that is nearest when the last one is hit, without a secondary
-    objective (the other one where it does not get there)."""
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
     modelling: Literal["none", "cvxpy"] = "none"
@@ -313,31 +296,23 @@ class NullspaceQP(Method):
     )
     stochastic = False
     Parameters = NullspaceParameters
-    inertia: ClassVar[float] = 0.0
-    """Share of the rates of the step before in those preferred now."""
-    quick: ClassVar[dict[str, Any]] = {"hands": "nearest", "period": 20}
+    quick: ClassVar[dict[str, Any]] = {"period": 20}
 
     def why_not(self, task: Outline) -> str | None:
         """The reason why there are too many sequences to simulate, if there are."""
-        return task.too_many_sequences if self.parameters.hands == "every" else None
+        return task.too_many_sequences
 
     def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
         """``goal`` (0-based), and the goals that are prepared for on the way there."""
         return (Aim(hands[goal], goal),)
 
     def solve(self, session: Session) -> Result:
-        """Simulate the candidate hand sequences and hand over the best one's paths."""
+        """Simulate the hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
-        controller = Controller(
-            session, task, self.parameters.period, self.inertia, self.parameters.modelling
-        )
+        controller = Controller(session, task, self.parameters.period, self.parameters.modelling)
         with session.solving():
             ordered = [hand for hand in HANDS if hand in task.hands]
-            candidates = (
-                list(itertools.product(ordered, repeat=len(task.goals)))
-                if self.parameters.hands == "every"
-                else [nearest_hands(controller)]
-            )
+            candidates = list(itertools.product(ordered, repeat=len(task.goals)))
             return self.search(controller, candidates)
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
@@ -351,7 +326,6 @@ class NullspaceQP(Method):
             for index, hands in enumerate(candidates)
         ]
         heapq.heapify(heap)
-        solves = controller.solves
         legs: dict[Any, Leg | StuckError] = {}  # sequences share their beginnings
         stuck: list[StuckError] = []
         while heap:
@@ -362,7 +336,7 @@ class NullspaceQP(Method):
                     "sequences": len(candidates),
                     "stuck_sequences": len(stuck),
                     "simulated_movements": len(legs),
-                    "solves": controller.solves - solves,
+                    "solves": controller.solves,
                 }
                 return Result(tuple(leg.movement for leg in way), details)
             plan = tuple(self.aims(hands, g) for g in range(goal + 1))
@@ -374,37 +348,6 @@ class NullspaceQP(Method):
             else:
                 heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*way, leg)))
         raise MethodError("infeasible", str(stuck[0]))
-
-
-def nearest_hands(controller: Controller) -> HandSequence:
-    """At each goal the hand that is nearest when the last goal is hit, and gets there.
-
-    Raises MethodError if no hand gets to a goal.
-    """
-    way: tuple[Leg, ...] = ()
-    for goal in range(len(controller.task.goals)):
-        q = way[-1].q if way else controller.session.q0
-        aims = [Aim(hand, goal) for hand in HANDS if hand in controller.task.hands]
-        stuck = []
-        for aim in sorted(aims, key=lambda aim: controller.distance(q, aim)):
-            leg = controller.try_leg(way, (aim,))
-            if isinstance(leg, Leg):
-                way = (*way, leg)
-                break
-            stuck.append(str(leg))
-        else:
-            raise MethodError("infeasible", "; ".join(stuck))
-    return tuple(leg.movement.hand for leg in way)
-
-
-class KeepVelocity(NullspaceQP):
-    """Level 2 keeps the joint rates of the step before."""
-
-    name = "nullspace-qp/velocity"
-    title = "Prioritised nullspace QP, keeping velocity"
-    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("smoothness: joint velocity is kept",)
-    inertia = 0.5
 
 
 class NextGoal(NullspaceQP):
@@ -425,26 +368,4 @@ class NextGoal(NullspaceQP):
         return tuple(Aim(hand, g) for g, hand in enumerate(hands))[goal : goal + 1 + GOALS_AHEAD]
 
 
-class Preshaping(NullspaceQP):
-    """Level 2 prepares the other hand for the goal it hits next."""
-
-    name = "nullspace-qp/preshaping"
-    title = "Prioritised nullspace QP, preshaping of the other arm"
-    citation = NextGoal.citation
-    told = NullspaceQP.told | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("preshaping: the other arm's posture at the goal it hits next",)
-
-    def why_not(self, task: Outline) -> str | None:
-        """The reason why there is nothing to preshape, or the reason of the others."""
-        if len(task.hands) < 2:
-            return f"task {task.name!r} has one hand; there is no other arm to preshape"
-        return super().why_not(task)
-
-    def aims(self, hands: HandSequence, goal: int) -> tuple[Aim, ...]:
-        """``goal``, and the first to come that the other hand hits."""
-        later = range(goal + 1, len(hands))
-        others = (Aim(hands[g], g, True) for g in later if hands[g] != hands[goal])
-        return (Aim(hands[goal], goal), *itertools.islice(others, 1))
-
-
-METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, KeepVelocity, NextGoal, Preshaping)
+METHODS: tuple[type[NullspaceQP], ...] = (NullspaceQP, NextGoal)

@@ -26,7 +26,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ from pydantic import Field
 
 from coartic import Movement
 from coartic.baselines.posture_graph import HandSequence
-from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
+from coartic.method import Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.compiled import chain_by, entry, joint_lever
 from coartic.robot import BASE_DOF, Array, Hand
 
@@ -54,7 +53,6 @@ _INSIDE = 0.999  # part of the tolerated error that is aimed at
 _SPREAD = 1.0  # largest SD of stored postures about the starting posture, rad
 _FIRST_SD = 0.3  # first SD of the diffusion, length unit (base) or rad (joints)
 _LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
-_PLANS_AT_ONCE = 16  # more take memory, and no less time
 
 
 class PostureBasedParameters(Parameters):
@@ -63,20 +61,15 @@ class PostureBasedParameters(Parameters):
     Tried by hand. Over 5 seeds on each shipped task, 50, 300 and 1000 stored postures (mean rewards
     within 3 of each other). Over 6 seeds on the first two goals of three tasks, 60 and 100 rounds
     of 60, 40 of 100, first SDs of 0.1 and 0.3, last ones of 0.001 and 0.01 of these (within 3
-    ticks); equal weights, and diffusion at all widths in each round (up to 4 ticks).
-    ``hands="every"`` matters where a goal's cheapest hand is the wrong one for the next:
-    two-armed-1 with one goal gets -520 so, -624 with hands chosen goal by goal.
+    ticks); equal weights, and diffusion at all widths in each round (up to 4 ticks). Hands are
+    chosen by cost of travel, goal by goal. That matters where a goal's cheapest hand is the wrong
+    one for the next: two-armed-1 with one goal gets -624, and -520 with the best hand sequence.
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
     """Random postures in the store, beside the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
     """Rounds of generation until the deadline."""
-    hands: Literal["chosen", "every"] = "chosen"
-    """By cost of travel, goal by goal; or every sequence, of which the one with the best reward
-    expected is kept."""
-    other_arm: Literal["still", "free"] = "still"
-    """Whether the arm that is not to hit the goal may move as well."""
 
 
 class PostureBased(Method):
@@ -99,22 +92,13 @@ class PostureBased(Method):
     Parameters = PostureBasedParameters
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
-    def why_not(self, task: Outline) -> str | None:
-        """The reason why there are too many sequences to plan one by one, if there are."""
-        return task.too_many_sequences if self.parameters.hands == "every" else None
-
     def solve(self, session: Session) -> Result:
         """Plan goal by goal, each from where the movement before it will have ended."""
-        options: list[list[HandSequence]] = [[session.hands] * session.goals_count]
-        if self.parameters.hands == "every":
-            sequences = itertools.product(sorted(session.hands), repeat=session.goals_count)
-            options = [[(hand,) for hand in hands] for hands in sequences]
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
         with session.solving():
-            plans = planner.plans(options)
-        best = min(plans, key=lambda plan: sum(plan.ticks))
-        return Result(tuple(best.movements), {"expected_ticks": best.ticks})
+            movements, ticks = planner.plan()
+        return Result(movements, {"expected_ticks": ticks})
 
 
 class OneGoal(PostureBased):
@@ -138,28 +122,9 @@ class TwoGoals(PostureBased):
 METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
-@dataclass
-class GrowingPlan:
-    """A plan in the making."""
-
-    options: list[HandSequence]
-    """Hands to choose from for each goal."""
-    noise: list[Array]
-    """Noise for the goals to come, if it was drawn beforehand."""
-    store: Array
-    """Stored postures, shape ``(stored, dof)``."""
-    q: Array
-    """Configuration in which the movements so far will have ended."""
-    movements: list[Movement] = field(default_factory=list)
-    ticks: list[int] = field(default_factory=list)
-    """Expected ticks of each movement."""
-
-
 class Neighbourhood(NamedTuple):
     """The postures for successive goals around which others are generated."""
 
-    q: Array
-    """Configuration from which they are reached, shape ``(dof,)``."""
     hands: HandSequence
     promising: Array
     """Shape ``(goals, dof)``."""
@@ -168,7 +133,7 @@ class Neighbourhood(NamedTuple):
 
 
 class PosturePlanner:
-    """Makes plans side by side, from one store of postures."""
+    """Makes a plan from a store of postures ``(stored, dof)``; ``q`` is where it is so far."""
 
     def __init__(
         self, session: Session, parameters: PostureBasedParameters, horizon: Literal[1, 2]
@@ -186,123 +151,75 @@ class PosturePlanner:
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
         self.movable: Mask = np.logical_or.reduce(list(self.base_and_arm.values()))
         self.movable[:BASE_DOF] = [c not in session.locked_base for c in ("x", "y")]
-        self.free = {
-            hand: self.movable & (mask if parameters.other_arm == "still" else True)
-            for hand, mask in self.base_and_arm.items()
-        }
+        self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
         """Joints that may move towards a posture for each hand."""
         # SDs from zero up: dense near the start, sparse far from it.
         sds = _SPREAD * session.rng.uniform(size=(parameters.stored, 1))
         noise = session.rng.standard_normal((parameters.stored, session.dof))
+        self.q = session.q0
         self.store = np.vstack([session.q0, session.q0 + sds * noise * self.movable])
         # Weights of the better postures, best first: logarithmic in the rank.
         better = math.ceil(PER_ROUND / 4)
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
-    def plans(self, options: list[list[HandSequence]]) -> list[GrowingPlan]:
-        """The plans that hit every goal; ``options``: hands per goal, of each plan.
+    def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
+        """The movement to each goal, and the ticks that it is expected to take.
 
-        Raises MethodError if there is none, for a goal that no posture hits.
+        Raises MethodError for a goal that no posture hits.
         """
-        plans = []
-        failure: MethodError | None = None
-        for first in range(0, len(options), _PLANS_AT_ONCE):
-            batch = options[first : first + _PLANS_AT_ONCE]
-            try:
-                plans += self.plan_together(batch, beforehand=len(options) > 1)
-            except MethodError as error:
-                failure = error
-        if failure is not None and not plans:
-            raise failure
-        return plans
+        movements, ticks = [], []
+        for goal in range(len(self.goals)):
+            ahead = range(goal, min(goal + self.horizon, len(self.goals)))
+            retrieved = self.retrieve(ahead)
+            seeds = self.seeds(retrieved, ahead)
+            if not seeds:
+                raise self.out_of_reach(retrieved)
+            _, (hand, *_), postures = min(self.generate(seeds, ahead), key=lambda chain: chain[0])
+            self.store = np.vstack([self.store, postures])
+            movements.append(Movement(goal + 1, hand, "planned", postures[0]))
+            self.q, expected = self.simulate(self.q, postures[0], hand, goal)
+            ticks.append(expected)
+        return tuple(movements), ticks
 
-    def plan_together(
-        self, options: list[list[HandSequence]], *, beforehand: bool
-    ) -> list[GrowingPlan]:
-        """Plans side by side; noise is drawn ``beforehand``, plan after plan, or as needed."""
-        goals = range(len(self.goals))
-        plans = [
-            GrowingPlan(
-                hands,
-                [self.draw_noise(self.goals_ahead(goal)) for goal in goals if beforehand],
-                self.store,
-                self.session.q0,
-            )
-            for hands in options
-        ]
-        for goal in goals:
-            ahead = self.goals_ahead(goal)
-            retrieved = self.retrieve(plans, ahead)
-            seeds = [self.seeds(*entry, ahead) for entry in zip(plans, retrieved, strict=True)]
-            possible = [bool(choices) for choices in seeds]
-            if not any(possible):
-                raise self.out_of_reach(plans[-1], retrieved[-1])
-            plans = list(itertools.compress(plans, possible))
-            generated = iter(self.generate([seed for choices in seeds for seed in choices], ahead))
-            for plan, choices in zip(plans, filter(None, seeds), strict=True):
-                chains = itertools.islice(generated, len(choices))
-                _, (hand, *_), postures = min(chains, key=lambda chain: chain[0])
-                plan.store = np.vstack([plan.store, postures])
-                plan.movements.append(Movement(goal + 1, hand, "planned", postures[0]))
-                plan.q, ticks = self.simulate(plan.q, postures[0], hand, goal)
-                plan.ticks.append(ticks)
-        return plans
-
-    def goals_ahead(self, goal: int) -> range:
-        """A goal, and as many after it as the horizon has."""
-        return range(goal, min(goal + self.horizon, len(self.goals)))
-
-    def draw_noise(self, goals: range) -> Array:
-        """Standard noise for ``goals``, ``(rounds, PER_ROUND, goals, dof)``."""
-        shape = self.rounds, PER_ROUND, len(goals), self.session.dof
-        return self.session.rng.standard_normal(shape)
-
-    def retrieve(self, plans: list[GrowingPlan], goals: range) -> list[Layers]:
-        """First aspect: stored postures of the arm with the hand at the goal, for each plan."""
-        retrieved: list[Layers] = [{} for _ in plans]
+    def retrieve(self, goals: range) -> Layers:
+        """First aspect: stored postures of the arm with the hand at the goal."""
+        retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
-            asking = [i for i, plan in enumerate(plans) if hand in plan.options[goal]]
-            if not asking:
-                continue
-            stores = np.stack([plans[i].store for i in asking])
-            postures = np.empty_like(stores)
-            postures[:] = np.stack([plans[i].q for i in asking])[:, None]
+            postures = np.tile(self.q, (len(self.store), 1))
             arm = self.session.joints(hand)
-            postures[..., arm] = stores[..., arm]
+            postures[:, arm] = self.store[:, arm]
             miss = self.goals[goal] - self.session.forward_kinematics(postures, hand)
-            postures[..., :BASE_DOF] += miss * self.movable[:BASE_DOF]
-            there = self.correct(postures, goal, hand, _RETRIEVED)
-            for i, candidates, reached in zip(asking, postures, there, strict=True):
-                retrieved[i][goal, hand] = candidates[reached]
+            postures[:, :BASE_DOF] += miss * self.movable[:BASE_DOF]
+            retrieved[goal, hand] = postures[self.correct(postures, goal, hand, _RETRIEVED)]
         return retrieved
 
-    def seeds(self, plan: GrowingPlan, retrieved: Layers, goals: range) -> list[Neighbourhood]:
+    def seeds(self, retrieved: Layers, goals: range) -> list[Neighbourhood]:
         """A neighbourhood for each choice of hands that all have a posture."""
         seeds = []
-        for hands in itertools.product(*(plan.options[goal] for goal in goals)):
+        for hands in itertools.product(self.session.hands, repeat=len(goals)):
             layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
             if all(len(layer) for layer in layers):
-                promising = self.most_promising(plan.q, hands, layers)
-                noise = plan.noise.pop(0) if plan.noise else self.draw_noise(goals)
-                seeds.append(Neighbourhood(plan.q, hands, promising, noise))
+                shape = self.rounds, PER_ROUND, len(goals), self.session.dof
+                noise = self.session.rng.standard_normal(shape)
+                seeds.append(Neighbourhood(hands, self.most_promising(hands, layers), noise))
         return seeds
 
-    def out_of_reach(self, plan: GrowingPlan, retrieved: Layers) -> MethodError:
-        """The error that says why a plan cannot go on."""
+    def out_of_reach(self, retrieved: Layers) -> MethodError:
+        """The error that says why the plan cannot go on."""
+        hands = self.session.hands
         for goal in sorted({goal for goal, _ in retrieved}):
-            hands = plan.options[goal]
             if not any(len(retrieved[goal, hand]) for hand in hands):
                 break
         return MethodError(
             "infeasible",
-            f"goal {goal + 1}: no correction of any of {len(plan.store)} stored postures "
+            f"goal {goal + 1}: no correction of any of {len(self.store)} stored postures "
             f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
         )
 
-    def most_promising(self, q: Array, hands: HandSequence, layers: list[Array]) -> Array:
+    def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
         """Second aspect: the cheapest of the retrieved postures, one for each goal."""
         first = layers[0]
-        cost = np.linalg.norm(first - q, axis=1)
+        cost = np.linalg.norm(first - self.q, axis=1)
         if len(layers) == 1:
             return first[[np.argmin(cost)]]
         second = layers[1]
@@ -320,15 +237,14 @@ class PosturePlanner:
     ) -> list[tuple[float, HandSequence, Array]]:
         """The cheapest postures ``(goals, dof)`` found around each seed by the deadline, after
         their cost and their hands."""
-        start = np.stack([seed.q for seed in seeds])[:, None]
         centre = best = np.stack([seed.promising for seed in seeds])
-        costs = path_length(start[:, 0], best)
+        costs = path_length(self.q, best)
         for number, sd in enumerate(_FIRST_SD * np.geomspace(1.0, _LAST_SD, self.rounds)):
             noise = sd * np.stack([seed.noise[number] for seed in seeds])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
-            accurate = self.correct_generated(start, postures, seeds, goals)
-            lengths = np.where(accurate, path_length(start, postures), np.inf)
+            accurate = self.correct_generated(postures, seeds, goals)
+            lengths = np.where(accurate, path_length(self.q, postures), np.inf)
             order = np.argsort(lengths, axis=1, kind="stable")
             centre, best = centre.copy(), best.copy()
             for k, count in enumerate(accurate.sum(axis=1)):
@@ -341,15 +257,12 @@ class PosturePlanner:
                     best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
         return list(zip(costs.tolist(), (seed.hands for seed in seeds), best, strict=True))
 
-    def correct_generated(
-        self, start: Array, postures: Array, seeds: list[Neighbourhood], goals: range
-    ) -> Mask:
+    def correct_generated(self, postures: Array, seeds: list[Neighbourhood], goals: range) -> Mask:
         """Correct generated postures ``(seeds, PER_ROUND, goals, dof)`` in place.
 
-        True, shape ``(seeds, PER_ROUND)``, where all hands are there. ``start`` has shape
-        ``(seeds, 1, dof)``."""
+        True, shape ``(seeds, PER_ROUND)``, where all hands are there."""
         accurate = np.ones(postures.shape[:2], bool)
-        before = np.broadcast_to(start, (*postures.shape[:2], postures.shape[-1])).copy()
+        before = np.broadcast_to(self.q, (*postures.shape[:2], postures.shape[-1])).copy()
         for k, goal in enumerate(goals):
             for hand in self.session.hands:
                 chosen = [i for i, seed in enumerate(seeds) if seed.hands[k] == hand]
@@ -434,8 +347,8 @@ def linearise_far(
 
 
 def path_length(q: Array, postures: Array) -> Array:
-    """Joint-space distance from ``q`` (..., dof) through postures ``(..., k, dof)``."""
-    start = np.broadcast_to(q[..., None, :], (*postures.shape[:-2], 1, postures.shape[-1]))
+    """Joint-space distance from ``q`` (dof,) through postures ``(..., k, dof)``."""
+    start = np.broadcast_to(q, (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)
     length: Array = np.linalg.norm(legs, axis=-1).sum(axis=-1)
     return length

@@ -9,14 +9,12 @@ arm, four of each of two-armed, aligned and redundancy), two runs each. Mean gai
 corrective process with the best hands, per cent: 0.06 2.53, 0.08 2.67, 0.10 2.80, 0.12 2.83,
 0.15 2.80, 0.20 2.75, 0.25 2.68.
 
-``random-search`` adds Gaussian noise and draws hands as well. Every hand sequence has a centre, at
-first the configurations of the corrective process **A** alone, which take the first trial of the
-sequence. A trial perturbs all explored joints of the centre at once. ``pure`` leaves the centres
-where they are and draws every sequence equally often; ``climbing`` moves a sequence's centre to any
-better trial (a (1+1) hill climber per sequence) and explores hands as the learner does, with ε for
-each goal around the best sequence known. The SD and ε are the learner's, untuned. A better trial
-leaves the configurations in which the goals were hit, as in the learner; leaving its targets was
-tried and is no better.
+``random-search/climbing`` adds Gaussian noise and draws hands as well: a (1+1) hill climber for
+each hand sequence. A sequence has a centre, at first the configurations of the corrective process
+**A** alone, which take the first trial of the sequence. A trial perturbs all explored joints of the
+centre at once; any better one moves the centre to the configurations in which it hit the goals, as
+in the learner (leaving its targets was tried and is no better). Hands are explored as the learner
+does, with ε for each goal around the best sequence known. The SD and ε are the learner's, untuned.
 """
 
 from __future__ import annotations
@@ -33,6 +31,7 @@ from coartic.optimisers import TOLD, Objective, Optimiser, OptimiserParameters
 from coartic.robot import Array
 
 _GUESSES_AT_ONCE = 500
+_EPSILON = 0.2  # probability of a random hand, for each goal
 _MOST_DRAWN = 128  # trials that are drawn before they are made, at most
 
 
@@ -65,27 +64,6 @@ class Guesses(Optimiser):
             objective.many(rng.uniform(low, high, (_GUESSES_AT_ONCE, objective.dim)))
 
 
-class ClimbingParameters(UninformedParameters):
-    """Parameters of the hill climber."""
-
-    epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """ε: probability of a random hand, for each goal."""
-
-
-class Pure(Method):
-    """Random samples around the corrective process alone."""
-
-    name = "random-search/pure"
-    title = "Random search around the corrective process"
-    citation = Guesses.citation
-    told = TOLD
-    Parameters = UninformedParameters
-
-    def solve(self, session: Session) -> Result:
-        """Every hand sequence is drawn with the same probability."""
-        return RandomSearch(session, self.parameters, 1.0, climbs=False).result()
-
-
 class Climbing(Method):
     """A (1+1) hill climber per hand sequence."""
 
@@ -96,15 +74,14 @@ class Climbing(Method):
         "introduction. Natural Computing."
     )
     told = TOLD
-    Parameters = ClimbingParameters
+    Parameters = UninformedParameters
 
     def solve(self, session: Session) -> Result:
         """Hands are drawn around the best sequence known."""
-        parameters: ClimbingParameters = self.parameters
-        return RandomSearch(session, parameters, parameters.epsilon, climbs=True).result()
+        return HillClimbers(session, self.parameters).result()
 
 
-METHODS: tuple[type[Method], ...] = (Guesses, Pure, Climbing)
+METHODS: tuple[type[Method], ...] = (Guesses, Climbing)
 
 
 class Centre(NamedTuple):
@@ -116,17 +93,15 @@ class Centre(NamedTuple):
     reward: float  # a trial with more moves the centre
 
 
-class RandomSearch:
+class HillClimbers:
     """The centres, and the next trials around them."""
 
-    def __init__(
-        self, session: Session, parameters: UninformedParameters, epsilon: float, *, climbs: bool
-    ) -> None:
+    def __init__(self, session: Session, parameters: UninformedParameters) -> None:
         self._session, self._rng = session, session.rng
         self._first_hands = session.find_initial_hands()
         self._attempts = Attempts(session, parameters)
         self._letters = [hand[0].upper() for hand in session.hands]
-        self._sigma, self._epsilon, self._climbs = parameters.sigma, epsilon, climbs
+        self._sigma = parameters.sigma
         self.centres: dict[str, Centre] = {}
         self._hopeless: set[str] = set()  # A alone does not complete them, ever
 
@@ -161,8 +136,7 @@ class RandomSearch:
         mask = self._attempts.explored(hands)
         attempt = self._attempts.by_correction(hands)
         if attempt.rewards[0] > -np.inf:
-            reward = attempt.rewards[0] if self._climbs else np.inf
-            self.centres[hands] = centre_at(attempt.reached[0], mask, reward)
+            self.centres[hands] = centre_at(attempt.reached[0], mask, attempt.rewards[0])
         else:
             self._hopeless.add(hands)
 
@@ -196,11 +170,11 @@ class RandomSearch:
     def _draw(self, best: str) -> str:
         """A hand sequence around the best; uniformly random where none has succeeded."""
         random, integers, letters = self._rng.random, self._rng.integers, self._letters
-        epsilon, count = self._epsilon, len(letters)
+        count = len(letters)
         while True:
             chosen = list(best or letters[:1] * self._session.goals_count)
             for goal in range(len(chosen)):
-                if not best or random() < epsilon:
+                if not best or random() < _EPSILON:
                     chosen[goal] = letters[integers(count)]
             hands = "".join(chosen)
             if hands not in self._hopeless:

@@ -43,7 +43,6 @@ class TrajectoryParameters(Parameters):
     most_sequences: Annotated[int, Field(ge=1)] = BEAM_WIDTH
     """Hand sequences that are planned for: all where there are no more, with two hands up to six
     goals; else those that a beam of this width over the goals ends with in some graph."""
-    other_arm: Literal["free", "still"] = "free"
     nodes: Annotated[int, Field(ge=10, le=1000)] = 150
     """Postures per goal and hand in a graph."""
     graphs: Annotated[int, Field(ge=1)] = 3
@@ -53,16 +52,7 @@ class TrajectoryParameters(Parameters):
     """Chains of all hand sequences, from as many further graphs as that takes."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first. With
-    equal times jerk has many local minima, and on the two-armed tasks with the other arm
-    still cheaper plans than these starts lead to were seen, on paths as long."""
-
-
-class PathLengthParameters(TrajectoryParameters):
-    """The plans and starts, and how exactly the reward is known."""
-
-    whole_ticks: bool = True
-    """Whether the plan is rounded to whole control ticks and aims through the rims; else
-    it aims inside the discs by θ^a, which guarantees a hit and costs more."""
+    equal times jerk has many local minima."""
 
 
 class SmoothParameters(TrajectoryParameters):
@@ -144,10 +134,7 @@ class TrajectoryOptimisation(Method):
         plans, failed = [], {}
         for hands, starts in self.starts(session, task).items():
             instance = Instance.of(
-                task,
-                hands,
-                still=self.parameters.other_arm == "still",
-                radius=self.target_radius(session, task),
+                task, hands, still=False, radius=self.target_radius(session, task)
             )
             plan = self.cheapest(session, self.problem(task), instance, starts)
             if plan.converged:
@@ -165,8 +152,8 @@ class TrajectoryOptimisation(Method):
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Starts for every hand sequence.
 
-        The cheapest chain of each graph; with the other arm free also the chain with that arm
-        in steady motion; noise on the first. Raises MethodError if a goal has no posture.
+        The cheapest chain of each graph, and that with the other arm in steady motion; noise on
+        the first. Raises MethodError if a goal has no posture.
         """
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
@@ -178,7 +165,7 @@ class TrajectoryOptimisation(Method):
             graphs=parameters.graphs,
             chains=parameters.chains,
             most=parameters.most_sequences,
-            spread=parameters.other_arm == "free",
+            spread=True,
         )
         starts: dict[HandSequence, list[Array]] = {}
         for hands, configurations in chains:
@@ -212,20 +199,15 @@ class PathLength(TrajectoryOptimisation):
     )
     told = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
-    Parameters = PathLengthParameters
 
     def target_radius(self, session: Session, task: Task) -> float:
-        """Within this of a goal's centre a target is sure to hit."""
-        if self.parameters.whole_ticks:
-            return task.radius
-        return super().target_radius(session, task)
+        """The goal's: rounded to whole control ticks, the plan goes through the rims."""
+        return task.radius
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan
     ) -> tuple[Movement, ...]:
         """The movements of a plan; the session counts the effort."""
-        if not self.parameters.whole_ticks:
-            return super().movements_of(session, task, instance, plan)
         problem = self.problem(task)
         rounded = Rounding(session, problem, instance).nearest(plan)
         if rounded is None:  # aimed inside the discs it is a plan all the same

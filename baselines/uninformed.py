@@ -8,7 +8,7 @@ goals were hit are known afterwards.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ class UninformedParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
     """SD of the (first) perturbations, length unit (base) or rad (joints)."""
-    other_arm: Literal["free", "still"] = "free"
-    """Whether the arm that does not hit the goal is explored, too (exploration conditions
-    4 and 3 of the learner)."""
 
 
 class Attempts:
@@ -37,7 +34,6 @@ class Attempts:
 
     def __init__(self, session: Session, parameters: UninformedParameters) -> None:
         self._session = session
-        self._other_arm = parameters.other_arm
         left = session.trials_left
         self.left = parameters.trials if left is None else min(parameters.trials, left)
         """Trials left."""
@@ -51,7 +47,7 @@ class Attempts:
 
     def explored(self, hands: str) -> NDArray[np.bool_]:
         """Joints that a hand sequence explores, shape ``(G, dof)``."""
-        return explored_joints(self._session, hands, self._other_arm)
+        return explored_joints(self._session, hands)
 
     def by_correction(self, hands: str) -> Trials:
         """One trial by **A** alone."""

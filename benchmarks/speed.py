@@ -24,7 +24,7 @@ import numpy as np
 
 import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
-from coartic.baselines.cma_es import Bandit, Every
+from coartic.baselines.cma_es import CMAES
 from coartic.baselines.random_search import Climbing, Guesses
 from coartic.benchmarks.planning import plan_suite
 from coartic.learner.conditions import METHOD_PREFIX
@@ -65,8 +65,8 @@ def trials_a_second() -> dict[str, float]:
     They are around what CMA-ES finds, so that few goals are missed.
     """
     task = load_task("two-armed-1")
-    session = Session(task, 0, Every.told)
-    solution = Every(Every.Parameters(trials=3000)).solve(session).solution
+    session = Session(task, 0, CMAES.told)
+    solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
     hands = "".join(movement.hand[0].upper() for movement in solution)
     best = np.array([movement.target for movement in solution])
     cost = Objective(session, hands)
@@ -171,7 +171,7 @@ def show_methods() -> None:
     included."""
     tasks = ("ascending", "two-armed-1")
     print(f"{'method':32}{tasks[0]:>12}{tasks[1]:>12}   microseconds of a core a trial")
-    for method in (Bandit, Climbing, Guesses):
+    for method in (CMAES, Climbing, Guesses):
         costs = [_us_of(method, load_task(name)) for name in tasks]
         print(f"{method.name:32}" + "".join(f"{us:12.1f}" for us in costs), flush=True)
 

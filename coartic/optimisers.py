@@ -55,21 +55,18 @@ CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 
 
-def explored_joints(
-    session: Session, hands: str, other_arm: Literal["free", "still"] = "free"
-) -> NDArray[np.bool_]:
+def explored_joints(session: Session, hands: str) -> NDArray[np.bool_]:
     """Joints that are worth exploring with a hand sequence, shape ``(G, dof)``.
 
     Never a locked base coordinate, nor an arm that hits neither this goal nor a later one: moving
-    it can only cost. With ``"still"``, only the arm that hits the goal.
+    it can only cost.
     """
     names = hands_of(hands)
     mask = np.zeros((len(names), session.dof), dtype=np.bool_)
     mask[:, :2] = [coordinate not in session.locked_base for coordinate in "xy"]
-    for goal, chosen in enumerate(names):
-        useful = names[goal:] if other_arm == "free" else (chosen,)
+    for goal in range(len(names)):
         for hand in HANDS:
-            mask[goal, session.joints(hand)] = hand in useful
+            mask[goal, session.joints(hand)] = hand in names[goal:]
     return mask
 
 

@@ -100,7 +100,7 @@ METHODS = [
     (method("title = ", ""), "title must be a text"),
     (method('"a"', '"a b"'), "the name 'a b' must begin"),
     (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
-    (method('"a"', '"cma-es/every"'), "'cma-es/every' is already taken"),
+    (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
     (method("frozenset()", '"goals"'), "told must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
 ]
@@ -205,7 +205,6 @@ def test_a_folder_that_cannot_be(name):
         ("learner EC4", "dual-process/EC4"),
         ("the learner EC1", "dual-process/EC1"),
         ("CMA-ES", "cma-es/bandit"),
-        ("CMA-ES, every hand sequence", "cma-es/every"),
         ("nullspace", "nullspace-qp/none"),
         ("Posture based: two goals", "posture-based/two-goals"),
         ("Two-armed 1", "two-armed-1"),

@@ -8,7 +8,7 @@ import pytest
 
 from coartic import CONDITIONS, Movement, execute, learn_many, load_task
 from coartic.baselines.believed_reward import METHODS, BelievedReward, cheapest, with_belief
-from coartic.baselines.cma_es import Bandit
+from coartic.baselines.cma_es import CMAES
 from coartic.baselines.posture_graph import PostureGraph
 from coartic.errors import SolutionError
 from coartic.method import Information, Session
@@ -45,7 +45,7 @@ def test_who_is_told_the_truth_plans_best(terms):
     assert rewards[1] <= rewards[2] + 2  # ticks of rounding
     task = with_penalty(SMALL, **TERMS[terms])
     for seed in range(2):  # long trial and error finds nothing that is much better
-        searched = Bandit(Bandit.Parameters(trials=2000)).solve(Session(task, seed, Bandit.told))
+        searched = CMAES(CMAES.Parameters(trials=2000)).solve(Session(task, seed, CMAES.told))
         assert execute(task, searched.solution).reward <= rewards[2] + 3
 
 

@@ -138,16 +138,16 @@ def test_a_cell_of_the_ranking_opens_its_film(opened):
     page = opened()
     cells = page.locator("#table-ranking .film-of")
     assert cells.count() > 5
-    row = page.locator("#table-ranking tr", has=page.get_by_title("row random-search/pure"))
+    row = page.locator("#table-ranking tr", has=page.get_by_title("row random-search/climbing"))
     row.locator(".film-of").click()
-    assert part(page, "stored").input_value() == "random-search/pure"
+    assert part(page, "stored").input_value() == "random-search/climbing"
     assert part(page, "preset").locator("option:checked").inner_text() == "Two-armed 1†"
     page.get_by_role("button", name="Pause").wait_for()
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
     page.wait_for_url("**play-link=**")
     part(page, "play").click()
     again = opened(link=page.url, reduced_motion="reduce")
-    assert part(again, "stored").input_value() == "random-search/pure"
+    assert part(again, "stored").input_value() == "random-search/climbing"
 
 
 STATE = (

@@ -115,7 +115,7 @@ def test_models_picked_from_trials_agree_only_beyond_random_guesses(
     of_model = {id(MODELS[name]): by_task(numbers) for name, numbers in planted.items()}
     measure = "slope norm at distance 2", (lambda _, m: of_model.get(id(m), {}), mean_of_rows)
     monkeypatch.setitem(MEASURES, *measure)
-    runs = pd.DataFrame([row("random-search/pure", -300, task="ascending")])
+    runs = pd.DataFrame([row("random-search/climbing", -300, task="ascending")])
     study = study_of(runs, [load_task("ascending")], suite="human")
     rows = findings.verdicts(study).set_index(["finding", "model"]).loc["two-ahead"]
     assert tuple(rows.loc["learner", ["verdict", "because"]]) == expected

@@ -103,7 +103,7 @@ def test_regret_is_to_the_best_single_run():
             (plain, "cma-es/bandit", [-320, -320, None]),
             (dear, "dual-process/EC1", [-400, -420, -440]),
             (dear, "cma-es/bandit", [-410, -410, -410]),
-            (dear, "random-search/pure", [-390]),  # not compared, so that nothing is of it
+            (dear, "random-search/climbing", [-390]),  # not compared, so that nothing is of it
         )
         for k, reward in enumerate(rewards)
         for status in ("infeasible" if reward is None else "ok",)

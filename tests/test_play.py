@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
-from coartic.baselines.cma_es import Bandit
+from coartic.baselines.cma_es import CMAES
 from coartic.motion.initial import hand_sequences, initial_hands
 from coartic.motion.trials import make_trials
 from coartic.play.page import MODEL
@@ -234,7 +234,7 @@ def test_search_and_plan_end_where_the_packages_do_and_say_their_true_reward(nam
         ]
         assert execute(task, movements).reward == found["reward"]
     assert {found["trials"] for found in searches} == {trials}
-    ours = [solve(Bandit, task, seed, trials=trials)[2].rewards for seed in seeds]
+    ours = [solve(CMAES, task, seed, trials=trials)[2].rewards for seed in seeds]
     best = [max(reward for reward in rewards if reward is not None) for rewards in ours]
     mine = statistics.mean(found["reward"] for found in searches)
     assert abs(mine - statistics.mean(best)) < 0.025 * abs(mine)

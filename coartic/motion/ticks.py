@@ -232,7 +232,7 @@ class Trajectory:
                 if known is None or known.reward is None:
                     raise CoarticError(
                         f"no optimum of task {self.task.name!r} is known; search for it: "
-                        "coartic run comparison --tasks FILE --methods optimum/dynamic-programming"
+                        "coartic run comparison --tasks FILE --methods optimum/branch-and-bound"
                     )
                 rows["optimum" if known.bound == known.reward else "best known"] = (
                     known.reward,

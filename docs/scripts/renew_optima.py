@@ -15,15 +15,18 @@ from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import DATA, ShippedOptimum, entries, essence
 from coartic.text import one_line
 
+OTHER_SEARCH = "trajectory-optimisation/path-length"
+
 
 def collect(study: Study) -> list[ShippedOptimum]:
     """Entries of ``optima.json`` from a results folder of suite ``optimum``.
 
     Raises CoarticError where the folder has no searches for the optimum.
     """
-    runs = study.runs[study.runs.method.str.startswith(SEARCH)]
-    if not len(runs):
+    proofs = study.runs.method.str.startswith(SEARCH)
+    if not proofs.any():
         raise CoarticError(f"{study.folder}: has no runs of methods {SEARCH}*")
+    runs = study.runs[proofs | (study.runs.method == OTHER_SEARCH)]
     runs = runs.join(restrictions(runs))
     keys = ("coartic", "commit", "model_code", "python", "date")
     made_by = {key: study.made_with[key] for key in keys}
@@ -56,8 +59,13 @@ def collect(study: Study) -> list[ShippedOptimum]:
 
 
 def content_with(new: Iterable[ShippedOptimum], old: Iterable[ShippedOptimum]) -> bytes:
-    """Content of ``optima.json``: new entries replace old ones about the same search."""
-    by_key = {entry.key: entry for entry in (*old, *new)}
+    """Content of ``optima.json``: new entries replace old ones about the same problem that are no
+    better."""
+    by_key = {entry.key: entry for entry in old}
+    for entry in new:
+        before = by_key.get(entry.key, entry).reward
+        if before is None or (entry.reward is not None and entry.reward >= before):
+            by_key[entry.key] = entry
     content = [by_key[key].model_dump(exclude_unset=True) for key in sorted(by_key)]
     return f"{json.dumps({'optima': content}, indent=1, ensure_ascii=False)}\n".encode()
 
