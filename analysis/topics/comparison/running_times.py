@@ -81,7 +81,7 @@ def best_so_far(study: Study) -> dict[str, BestSoFar]:
     Trials are counted from 1. Kinematics evaluations and time are known as totals of the run and
     spread evenly over its trials, which is not exact: over the first 10, 100 and 1000 of 10 000
     trials, evaluations were 0.6 to 1.5 times their even share, 3.4 times for the first 10 trials
-    of CMA-ES on two-armed 1 (the learner, random search and CMA-ES, six cells, one seed each);
+    of CMA-ES on two-armed 1 (the learner, hill climbing and CMA-ES, six cells, one seed each);
     a learner without its corrective process spends most of them on its first trial. Times
     are those of :func:`.scores.solve_times`: without building.
     """
