@@ -33,7 +33,7 @@ KEPT = {
     ),
     "ablations": ("methods signatures claims", ""),
     "locus": ("signatures", ""),
-    "families": ("family-gaps exploration family-signs hardness claims", "gaps-by-family hardness"),
+    "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
     "agents": ("variants contexts signatures", ""),
     "foreign": ("variants", ""),
     "tuning": ("variants", ""),

@@ -1,22 +1,15 @@
-"""Fourteen goals: what a goal ahead gains, and the claims on it, where it was planted.
-
-With what makes a task hard, and for whom.
-"""
+"""Fourteen goals: what a goal ahead gains, and the claims on it, where it was planted."""
 
 import json
-import math
 from functools import cache
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from coartic import load_task
 from coartic.analysis.claims.judge import judgements
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.statistics.correlations import rank_correlation_estimate
 from coartic.analysis.topics import fourteen
-from coartic.analysis.topics.families.hardness import FEATURES, features_of
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.random_search import Guesses
 from tests.support.made_up import row, study_of
@@ -118,27 +111,3 @@ def test_too_many_hand_sequences_leave_the_hands_of_the_task(method):
     _, done, _ = solve(method, task, trials=40)
     assert done.completed
     assert done.hands == task.initial_hands == "L" * 14
-
-
-def test_features_of_goals_that_turn_once():
-    """Straight on to the first two goals from where the hand starts, then a right angle."""
-    task = load_task("ascending")
-    x, y = task.robot.forward_kinematics(task.q0, "right")
-    goals = tuple((x + dx, y + dy) for dx, dy in ((1, 0), (2, 0), (2, 1)))
-    turning = task.model_copy(update={"goals": goals, "locked_base": ()})
-    expected = dict(zip(FEATURES, (3, 0.25, math.pi / 4, 4), strict=True))
-    assert features_of(turning) == pytest.approx(expected)
-    on_a_rail = turning.model_copy(update={"locked_base": ("y",)})
-    assert features_of(on_a_rail)["spare joints"] == 3
-
-
-def test_intervals_of_rank_correlations_cover_as_they_say():
-    """Of pairs from a normal distribution the rank correlation is 6 / pi times arcsin(r / 2)."""
-    rng, r = np.random.default_rng(1), 0.7
-    truth = 6 / math.pi * math.asin(r / 2)
-    covered = 0
-    for _ in range(1000):
-        first, second = rng.standard_normal((2, 40))
-        seen = rank_correlation_estimate(first, r * first + math.sqrt(1 - r**2) * second)
-        covered += seen.low < truth < seen.high
-    assert 0.92 < covered / 1000 < 0.975

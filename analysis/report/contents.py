@@ -25,7 +25,6 @@ from coartic.analysis.topics import (
 )
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
-from coartic.analysis.topics.families import hardness
 from coartic.analysis.topics.families import sentences as families
 from coartic.analysis.topics.human import findings as human
 from coartic.analysis.topics.paper import sentences as paper
@@ -48,7 +47,6 @@ SECTIONS: tuple[Section, ...] = (
     coarticulation.SIGNATURES,
     coarticulation.SLOPES,
     families.FAMILIES,
-    hardness.HARDNESS,
     families.EXPLORATION,
     horizon.HORIZON,
     fourteen.FOURTEEN,
