@@ -89,7 +89,7 @@ def gap_share(rewards: ArrayLike, optimum: float) -> Array:
 
 
 def initial_reward(task: Task, model: MotionModel) -> float:
-    """Reward of the initial solution, less its penalty; NaN where there is none."""
+    """Reward of the initial solution; NaN where there is none."""
     solution = initial_solution(task, model)
     return math.nan if solution is None or solution.reward is None else float(solution.reward)
 

@@ -261,14 +261,10 @@ def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]
 def one_by_one(study: Study) -> set[str]:
     """Names of the tasks that a report has one by one.
 
-    All, but neither instances of families nor tasks with a penalty, if these are many. A variant
-    has the name of its task before the first dot.
+    All, but no instances of families, if these are many. A variant has the name of its task before
+    the first dot.
     """
-    drawn = {
-        name
-        for name, task in study.tasks.items()
-        if task.penalty is not None or address_of(name.partition(".")[0]) is not None
-    }
+    drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
 
 

@@ -14,10 +14,9 @@ movement goes from q straight to a target q^t in steps of length m; its last ste
 ends at q^t. Before each step the robot looks. It stops if its hand is within the radius of the
 goal (a hit); in a learned or planned movement, also if its hand is within θ^a of where q^t would
 put it (arrival). k steps cost k ticks, and stopping costs one. The reward is minus all ticks. Each
-goal has one hand. In some tasks each goal also has a penalty (:func:`penalty`). The first movement
-for a goal, unless corrective, is always made, the others only while the goal is not hit. A path
-leads through waypoints and stops on a hit or at its end. The targets of corrective movements are
-stored; the corrective process is not run again.
+goal has one hand. The first movement for a goal, unless corrective, is always made, the others only
+while the goal is not hit. A path leads through waypoints and stops on a hit or at its end. The
+targets of corrective movements are stored; the corrective process is not run again.
 """
 
 from __future__ import annotations
@@ -105,6 +104,7 @@ def stored_task(definition: str, model: str) -> Any:
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
+    need(not hasattr(task, "penalty"), "its task has a penalty, which version 1.1.0 reads")
     need(getattr(task.model, "arrival_tick", 1) == 1, "arrival took no tick, as in version 1.0.0")
     need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
@@ -204,32 +204,9 @@ def recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float
             reward, corrections = reward - ticks, corrections + is_corrective
         need(hit, f"goal {goal} is not hit")
         hands += to_goal[0].hand[0].upper()
-        reward -= penalty(task, goal, to_goal[0].hand, before, q)
         other = task.arms["right" if to_goal[0].hand == "left" else "left"][0]
         travel += math.dist(q[other], before[other])
     return reward, hands, corrections, travel
-
-
-def penalty(task: Any, goal: int, hand: str, before: Floats, q: Floats) -> int:
-    """What is lost by hitting a goal in q beside the ticks, in whole ticks; the goal before was hit
-    (or the task began) in another configuration. It adds up what the way of costly joints costs,
-    the elbow of this arm that is deepest in a disc, and that its joints are as they were before."""
-    if (rule := getattr(task, "penalty", None)) is None:
-        return 0
-    joints, links, shoulder = task.arms[hand]
-    left, right = (task.arms[side][0] for side in ("left", "right"))
-    costly = {"base": slice(2), "arms": slice(2, None), "left-arm": left, "right-arm": right}
-    lost: float = rule.joints * float(np.linalg.norm((q - before)[costly[rule.costly]]))
-    centre = rule.centre or [math.fsum(c) / len(c) for c in zip(*task.goals, strict=True)]
-    depths = [0.0]
-    for k in range(1, len(links)):
-        elbow = hand_at(q[:, None], (slice(joints.start, joints.start + k), links[:k], shoulder))
-        depths.append(1 - math.dist([float(c[0]) for c in elbow], centre) / rule.radius)
-    lost += rule.region * max(depths)
-    if goal > 1:
-        alike = 1 - float(np.linalg.norm((q - before)[joints])) / rule.apart
-        lost += rule.distinct * max(0.0, alike)
-    return math.floor(lost + 0.5)
 
 
 def check_rules(task: Any, movements: list[MoveRow]) -> None:

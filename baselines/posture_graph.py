@@ -18,10 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import MethodError, Session
-from coartic.model import PAPER
-from coartic.motion.penalty import disc_centre
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
-from coartic.tasks.task import Penalty, Task
+from coartic.tasks.task import Task
 
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
@@ -96,8 +94,6 @@ class PostureGraph:
     """Kinematics evaluated while sampling."""
     costs: Array | float = 1.0
     """Cost of the movement of each joint, shape ``(dof,)``, or of all joints."""
-    penalty: Penalty | None = None
-    """A penalty beside the length of the path."""
 
     @classmethod
     def sample(
@@ -106,7 +102,6 @@ class PostureGraph:
         count: int,
         rng: np.random.Generator,
         costs: Array | float = 1.0,
-        penalty: Penalty | None = None,
     ) -> PostureGraph:
         """A graph with at most ``count`` nodes per goal and hand.
 
@@ -125,7 +120,7 @@ class PostureGraph:
                     starts[half] = before[rng.integers(len(before), size=count // 2)]
                 layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
-        return cls(task, layers, spent, costs, penalty)
+        return cls(task, layers, spent, costs)
 
     def chains(self, only: HandSequence | None = None, most: int | None = None) -> list[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
@@ -173,10 +168,9 @@ class PostureGraph:
             base = squared_distances(nodes[last] * self.costs, weighted, slice(0, BASE_DOF))
             joints = self.task.robot.joints(hand)
             arm = squared_distances(nodes[hand] * self.costs, weighted, joints)
-            by_base, by_arm = self.penalties(goal, hand, nodes[last], nodes[hand])
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
-                step = np.sqrt(base + arm) + (by_base + by_arm)
+                step = np.sqrt(base + arm)
                 came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
                 reached = np.empty(came.shape)
                 for j in range(cost.shape[1]):
@@ -187,32 +181,8 @@ class PostureGraph:
                 reached = np.empty(came.shape)
                 for i in range(cost.shape[0]):
                     total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
-                    total += by_base[i] + by_arm
                     came[:, i], reached[:, i] = least_of_columns(total)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
-
-    def penalties(self, goal: int, hand: Hand, bases: Array, arms: Array) -> tuple[Array, Array]:
-        """The penalty of hitting a goal (0-based) in each of its nodes, as a length.
-
-        In two parts, by the node that the base comes from and by the one that the arm comes from,
-        with the penalty of the posture itself: shape ``(before, after)`` each.
-        """
-        layer, robot, penalty = self.layers[goal, hand], self.task.robot, self.penalty
-        by_base, by_arm = np.zeros((len(bases), len(layer))), np.zeros((len(arms), len(layer)))
-        if penalty is None:
-            return by_base, by_arm
-        way = np.sqrt(squared_distances(arms, layer, robot.joints(hand)))
-        if penalty.costly == "base":
-            by_base += penalty.joints * np.sqrt(squared_distances(bases, layer, slice(0, BASE_DOF)))
-        elif penalty.costly in ("arms", f"{hand}-arm"):
-            by_arm += penalty.joints * way
-        elbows = robot.joint_positions(layer, hand)[:, 1:-1]
-        centre = disc_centre(self.task.goals, penalty)
-        far = np.linalg.norm(elbows - centre, axis=-1).min(axis=1, initial=np.inf)
-        by_arm += penalty.region * np.maximum(1.0 - far / penalty.radius, 0.0)
-        if goal > 0:
-            by_arm += penalty.distinct * np.maximum(1.0 - way / penalty.apart, 0.0)
-        return by_base * PAPER.step, by_arm * PAPER.step
 
     def chain_of(self, complete: Beginning) -> Chain:
         """The cheapest chain of a whole sequence."""
@@ -245,19 +215,18 @@ def cheapest_chains(
     spread: bool = False,
     only: HandSequence | None = None,
     costs: Array | float = 1.0,
-    penalty: Penalty | None = None,
 ) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
     graphs until there are as many ``chains``; ``only`` and ``most`` as in
-    :meth:`PostureGraph.chains`, ``costs`` of joints and ``penalty`` as in
-    :class:`PostureGraph`. The session counts the effort.
+    :meth:`PostureGraph.chains`, ``costs`` of joints as in :class:`PostureGraph`. The session counts
+    the effort.
 
     With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
     MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sample(task, nodes, rng, costs, penalty)
+        graph = PostureGraph.sample(task, nodes, rng, costs)
         session.spend(**graph.spent)
         missing = graph.why_none(only)
         if missing:

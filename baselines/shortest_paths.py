@@ -16,7 +16,6 @@ from coartic.baselines.posture_graph import Chain, HandSequence
 from coartic.baselines.trajectory_problem import MODEL_BASED, Instance, PathPlan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
-from coartic.tasks.task import Penalty
 
 KNOWS_REWARD = MODEL_BASED | {Information.REWARD_FORMULA}
 """Information of a method that starts from posture graphs and rounds to whole ticks."""
@@ -62,18 +61,17 @@ def shortest_plans(
     *,
     still: bool,
     radius: float,
-    penalty: Penalty | None = None,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Hands end within ``radius`` of their goals' centres, length unit; ``penalty`` is that of a
-    penalised problem. Raises MethodError where no solve finds a path.
+    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
+    solve finds a path.
     """
     best: dict[HandSequence, tuple[Instance, PathPlan]] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=radius)
-        plan = problem.solve(instance, start, penalty=penalty)
+        plan = problem.solve(instance, start)
         session.spend(**plan.spent)
         solves += 1
         failed += not plan.converged

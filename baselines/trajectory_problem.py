@@ -15,7 +15,7 @@ where f is one of the costs
     jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
 
 The integrals are written out in the rates at the goals (:func:`segment_cost`), which are variables
-beside Δ. A penalty adds terms to the path length (:class:`PenaltyTerms`).
+beside Δ.
 
 One programme per robot, number of goals and cost is compiled once. The start, the goals and the
 hand sequence are its parameters. A locked base or an arm that is held is a variable bound, so that
@@ -37,12 +37,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import Information
-from coartic.model import PAPER
-from coartic.motion.costs import joint_costs as costs_of
 from coartic.motion.costs import segment_lengths
-from coartic.motion.penalty import disc_centre
 from coartic.robot import HANDS, Array, Hand, Robot
-from coartic.tasks.task import Penalty, Task
+from coartic.tasks.task import Task
 
 MODEL_BASED = frozenset(
     {
@@ -56,7 +53,6 @@ MODEL_BASED = frozenset(
 
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
 
-_LONGEST_WAY = 1e3  # length unit and rad: beyond any way of costly joints
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
 # goals at once. Acceleration on two-armed-2 gets -322, -317, -315, -314 with 0.1, 0.05, 0.02,
@@ -134,8 +130,7 @@ class PathPlan:
 class TrajectoryProblem:
     """The compiled programme of one cost, for every task of a robot with so many goals.
 
-    ``joint_costs`` weigh the joints in path lengths (:mod:`coartic.motion.costs`). ``penalised``
-    ones minimise the length of the path and a penalty, which :meth:`solve` is given.
+    ``joint_costs`` weigh the joints in path lengths (:mod:`coartic.motion.costs`).
     """
 
     def __init__(
@@ -145,11 +140,8 @@ class TrajectoryProblem:
         goals: int,
         cost: Cost,
         joint_costs: tuple[float, ...] | None = None,
-        *,
-        penalised: bool = False,
     ) -> None:
         self.robot, self.goals, self.cost = robot, goals, cost
-        self._penalised = penalised
         self._joint_costs = 1.0 if joint_costs is None else np.array(joint_costs)
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
@@ -165,13 +157,9 @@ class TrajectoryProblem:
         right = casadi.SX.sym("right", goals)  # 1 where the right hand is chosen
         weights = casadi.SX.sym("weights", 2)  # of path length and of depth
 
-        terms = PenaltyTerms.symbolic(robot.dof, goals if penalised else 0)
-
         limits, q = [], q0
         for g in range(goals):
             q = q + steps[:, g]
-            if penalised:
-                limits += terms.limits(g, q, steps[:, g], right[g], robot, hands)
             hand = chosen_hand({hand: robot.symbolic_hand(q, hand) for hand in hands}, right[g])
             limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
@@ -179,8 +167,6 @@ class TrajectoryProblem:
             weighted = steps if joint_costs is None else casadi.diag(joint_costs) @ steps
             limits += [casadi.sumsqr(weighted[:, g]) - lengths[g] ** 2 for g in range(goals)]
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
-            if penalised:
-                objective += terms.cost()
         else:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
             costs = [segment_cost(cost, steps[:, g], durations[g], ends[g]) for g in range(goals)]
@@ -197,11 +183,8 @@ class TrajectoryProblem:
             "trajectory",
             "ipopt",
             {
-                "x": casadi.veccat(steps, lengths, durations, depth, *rates, terms.shares),
-                "p": casadi.veccat(
-                    *(q0, centres, right, rim, deep, weights),
-                    *([terms.weights, terms.disc, terms.apart, terms.costly] if penalised else []),
-                ),
+                "x": casadi.veccat(steps, lengths, durations, depth, *rates),
+                "p": casadi.veccat(q0, centres, right, rim, deep, weights),
                 "f": objective,
                 "g": casadi.vertcat(*limits),
             },
@@ -217,7 +200,6 @@ class TrajectoryProblem:
         free_times: bool = False,
         most_rates: Array | None = None,
         deep: Sequence[int] | None = None,
-        penalty: Penalty | None = None,
     ) -> PathPlan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
 
@@ -225,12 +207,11 @@ class TrajectoryProblem:
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
         segments' durations vary at a constant total (smoothness costs only). No rate exceeds
-        ``most_rates``, shape as :attr:`PathPlan.rates`, in size. ``penalty`` is that of a penalised
-        problem. A solve that fails is a plan that has not converged.
+        ``most_rates``, shape as :attr:`PathPlan.rates`, in size. A solve that fails is a plan that
+        has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
-        at, of_penalty = self.penalty_bounds(instance, steps, penalty)
         free = np.where(instance.held, 0.0, np.inf).ravel()
         rates = self.rate_bound(instance, most_rates)
         rim = instance.radius - _RIM
@@ -242,7 +223,6 @@ class TrajectoryProblem:
             self.time_bounds(steps, free_times),
             (np.zeros(1), np.zeros(1), np.full(1, deepest)),
             (np.zeros(rates.size), -rates, rates),
-            at,
         ]
         first, least, most = (np.concatenate(column) for column in zip(*blocks, strict=True))
         chosen = np.zeros(self.goals)
@@ -255,9 +235,7 @@ class TrajectoryProblem:
             ubx=most,
             lbg=self._lower,
             ubg=self._upper,
-            p=np.concatenate(
-                [instance.q0, instance.goals.ravel(), right, [rim], chosen, weights, of_penalty]
-            ),
+            p=np.concatenate([instance.q0, instance.goals.ravel(), right, [rim], chosen, weights]),
         )
         return self.plan_from(instance, solution)
 
@@ -290,28 +268,6 @@ class TrajectoryProblem:
         times *= goals / times.sum()
         return times, np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
 
-    def penalty_bounds(
-        self, instance: Instance, steps: Array, penalty: Penalty | None
-    ) -> tuple[Bounds, Array]:
-        """The part of each term of a penalty that is paid, and the penalty's parameters.
-
-        A term without weight is held where it limits nothing.
-        """
-        if not self._penalised:
-            return (np.zeros(0),) * 3, np.zeros(0)
-        assert penalty is not None
-        weights = np.array([penalty.joints, penalty.region, penalty.distinct])
-        costly = costs_of(self.robot, penalty.costly, 2.0) > 1.0
-        most = np.tile([_LONGEST_WAY, 1.0, 1.0], (self.goals, 1))
-        least = np.where(weights > 0.0, 0.0, most)
-        paid = most.copy()
-        if weights[0] > 0.0:
-            paid[:, 0] = np.sqrt(((steps * costly) ** 2).sum(axis=1))
-        centre = disc_centre([(x, y) for x, y in instance.goals.tolist()], penalty)
-        parameters = [*(weights * PAPER.step), *centre, penalty.radius, penalty.apart, *costly]
-        bounds = paid.ravel(), least.ravel(), most.ravel()
-        return bounds, np.array(parameters, dtype=np.float64)
-
     def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
         """The plan of a solution; it has converged only if every constraint holds as well."""
         goals, dof = self.goals, self.robot.dof
@@ -338,54 +294,6 @@ class TrajectoryProblem:
                 "solver_iterations": statistics["iter_count"],
             },
         )
-
-
-@dataclass(frozen=True)
-class PenaltyTerms:
-    """The terms of a penalty in the programme: smooth constraints of the part that is paid of each.
-
-    A way u of costly joints is at least their distance; a share r of the costly disc is so large
-    that no elbow is farther inside than R (1 - r) from its centre lets it; a share a of likeness so
-    large that postures are at least ``apart`` (1 - a) from each other.
-    """
-
-    shares: Any
-    """u, r and a of each goal."""
-    weights: Any
-    """Weights of the three terms, as lengths of path."""
-    disc: Any
-    """Centre and radius."""
-    apart: Any
-    costly: Any
-    """1 for each joint that is costly, else 0."""
-
-    @classmethod
-    def symbolic(cls, dof: int, goals: int) -> PenaltyTerms:
-        """The terms of a problem with so many goals."""
-        shapes = {"shares": (3, goals), "weights": (3, 1), "disc": (3, 1), "apart": (1, 1)}
-        shapes["costly"] = (dof, 1)
-        return cls(**{name: casadi.SX.sym(name, *shape) for name, shape in shapes.items()})
-
-    def cost(self) -> Any:
-        """The sum that is paid."""
-        return casadi.sum1(casadi.sum2(self.shares) * self.weights)
-
-    def limits(
-        self, g: int, q: Any, step: Any, right: Any, robot: Robot, hands: tuple[Hand, ...]
-    ) -> list[Any]:
-        """Expressions that are at most 0 at goal ``g``, which is hit in ``q`` after ``step``."""
-        way, share, alike = (self.shares[k, g] for k in range(3))
-        limits = [casadi.sumsqr(self.costly * step) - way**2]
-        for hand in hands:
-            chosen = (right if hand == "right" else 1 - right) if len(hands) > 1 else 1
-            for x, y in robot.symbolic_joints(q, hand)[1:-1]:
-                square = (x - self.disc[0]) ** 2 + (y - self.disc[1]) ** 2
-                limits.append(chosen * ((self.disc[2] * (1 - share)) ** 2 - square))
-            if g > 0:
-                joints = robot.joints(hand)
-                moved = casadi.sumsqr(step[joints.start : joints.stop])
-                limits.append(chosen * ((self.apart * (1 - alike)) ** 2 - moved))
-        return limits
 
 
 def chosen_hand(positions: dict[Hand, Any], right: Any) -> Any:
@@ -424,11 +332,9 @@ def trajectory_problem(
     goals: int,
     cost: Cost,
     joint_costs: tuple[float, ...] | None = None,
-    *,
-    penalised: bool = False,
 ) -> TrajectoryProblem:
     """The compiled problem, built once per process."""
-    return TrajectoryProblem(robot, hands, goals, cost, joint_costs, penalised=penalised)
+    return TrajectoryProblem(robot, hands, goals, cost, joint_costs)
 
 
 def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:

@@ -40,7 +40,6 @@ MODULES = (
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
-    "coartic.baselines.believed_reward",
     "coartic.baselines.practice",
     "coartic.baselines.optimum",
 )

@@ -33,7 +33,7 @@ from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.catalogue import members, task_of
 from coartic.tasks.families import named_by
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, Penalty, address_of
+from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
 from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
@@ -74,8 +74,6 @@ class Block(FileData):
     """Whether the base moves in both directions, whatever the task locks."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
     """Only the tasks with so many goals; all where it is not given."""
-    penalties: tuple[Penalty, ...] = ()
-    """Penalties of variants of the tasks, one each; without any, the tasks as they are."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs per cell, where it is not the suite's number."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
@@ -160,10 +158,7 @@ def read_suite(path: Path) -> Suite:
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
-        keys = [
-            *(*Suite.model_fields, *Block.model_fields),
-            *(*Move.model_fields, *Penalty.model_fields),
-        ]
+        keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
         raise CoarticError(explain_file(str(path), error, keys)) from None
 
 
@@ -331,8 +326,6 @@ def cells_of_block(
         if block.free_base:
             task = with_free_base(suite, task)
         variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
-        if block.penalties:
-            variants = [with_penalty(suite, v, p) for v in variants for p in block.penalties]
         for variant, method in itertools.product(variants, methods):
             reason = registered[method].why_not(variant, block.parameters)
             if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
@@ -381,15 +374,6 @@ def variant_task(suite: Suite, task: Task, name: str, difference: str, **changes
     return parse_task(content, f"suite {suite.name!r}")
 
 
-def with_penalty(suite: Suite, task: Task, penalty: Penalty) -> Task:
-    """The task with a penalty, by a name of its own, which says what is not the default."""
-    given = penalty.model_dump(mode="json", exclude_defaults=True)
-    words = "-".join(f"{key}-{in_name(value)}" for key, value in given.items()) or "no-penalty"
-    return variant_task(
-        suite, task, words, f"a penalty: {words}", penalty=penalty.model_dump(mode="json")
-    )
-
-
 def with_free_base(suite: Suite, task: Task) -> Task:
     """The task without its lock, by a name of its own."""
     if not task.locked_base:
@@ -406,13 +390,6 @@ def with_free_base(suite: Suite, task: Task) -> Task:
         locked_base=[],
         provenance=task.provenance | {"locked_base": why},
     )
-
-
-def in_name(value: Any) -> str:
-    """A value of a penalty as a part of a name."""
-    if isinstance(value, list):
-        return "_".join(map(exact, value))
-    return value if isinstance(value, str) else exact(value)
 
 
 def exact(value: float) -> str:

@@ -22,7 +22,6 @@ from coartic.motion.corrective import correct_lanes
 from coartic.motion.initial import corrective_trial, initial_hands
 from coartic.motion.lanes import LANES, board
 from coartic.motion.movement import Goal
-from coartic.motion.penalty import penalties_of_movements
 from coartic.motion.problem import arm_of
 from coartic.motion.reach import Requests, Setup, blank, new_batch, reach_goals, setup_for
 from coartic.motion.trials import Trials, hand_codes
@@ -41,7 +40,7 @@ UNIT = 4.0
 MANY_GOALS = 10.0
 """Unit of the number of goals left in them."""
 _LETTERS = tuple(map(ord, "LR"))
-_COUNTS = ("ticks", "corrections", "iterations", "evaluations", "penalties")
+_COUNTS = ("ticks", "corrections", "iterations", "evaluations")
 _FIELDS = dict.fromkeys(("task", "goal", *_COUNTS), np.int64) | {"reward": np.float64}
 ROW = record_type(_FIELDS | dict.fromkeys(("acting", "completed", "ended"), np.bool_))
 """A robot: its task, which goal is next, its trial so far, and what its last step gave."""
@@ -664,8 +663,6 @@ class Arms:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
         self._actions[:] = chosen
         options = self._options if clips else self._options._replace(clips=False)
-        penalty = self.tasks[0].penalty is not None
-        before, goal = (self.q.copy(), self.goal.copy()) if penalty else (self.q, self.goal)
         for kind in self._kinds_of(which):
             wrong = step_robots(
                 kind, self._actions, which, options, self._table, self._robots,
@@ -676,20 +673,8 @@ class Arms:
                     "an action is not finite; NaN is for all joints, not for some, and not for the "
                     "hand"
                 )
-        if penalty:
-            self._lose(before, goal, which)
         self._look(which)
         return self.rows["reward"].copy(), self.rows["ended"].copy()
-
-    def _lose(self, before: Array, goal: NDArray[np.int64], which: NDArray[np.bool_]) -> None:
-        """Subtract the penalties of the last step."""
-        rows = np.flatnonzero(which)
-        right = self._robots.letters[rows, goal[rows]] == _LETTERS[1]
-        lost = penalties_of_movements(
-            self.tasks[0], before[rows], self.q[rows], right.astype(np.int64), goal[rows] == 0
-        )
-        self.rows["penalties"][rows] += lost
-        self.rows["reward"][rows] -= np.where(self.goal[rows] > goal[rows], lost, 0)
 
     def observations(self) -> NDArray[np.float32]:
         """Observations ``(N, O)``."""

@@ -1,5 +1,5 @@
 """Tasks and families as environments of Gymnasium: a step is a subtask, its reward minus the ticks
-it took (and minus its penalty, where the task has one).
+it took.
 
 Importing this module registers ``coartic/Ascending-v1``, ``Descending``, ``TwoArmed1`` and
 ``TwoArmed2``, ``coartic/Task-v1`` for any other task, and ``coartic/Family-v0`` for the instances

@@ -453,7 +453,7 @@ class Session:
 
     def _count_batch(self, trials: Trials) -> None:
         """Count the trials of a batch and keep their rewards."""
-        rewards = np.where(trials.completed, -(trials.ticks + trials.penalties), _NO_REWARD)
+        rewards = np.where(trials.completed, -trials.ticks, _NO_REWARD)
         spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
         self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
 
@@ -471,8 +471,7 @@ class Session:
                 reached.evaluations,
             )
         )
-        penalty = self._bench.penalty(codes, reached)
-        reward = -(ticks + penalty) if completed else None
+        reward = -ticks if completed else None
         self._count(pack_rewards([reward]), ticks, corrections, iterations, evaluations)
         return reward
 

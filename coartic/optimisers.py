@@ -83,7 +83,7 @@ def sequences_of(session: Session) -> list[str]:
 
 
 class Objective:
-    """The cost of a trial, ticks and penalty, a function of its target configurations.
+    """The cost of a trial, its ticks, a function of its target configurations.
 
     A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
     by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or

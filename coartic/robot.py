@@ -335,15 +335,6 @@ class Robot:
         """
         import casadi
 
-        return casadi.vertcat(*self.symbolic_joints(q, hand)[-1])
-
-    def symbolic_joints(self, q: Any, hand: Hand) -> list[tuple[Any, Any]]:
-        """Positions of shoulder, joints and hand as CasADi expressions: x and y of each.
-
-        Raises ValueError where ``q`` has another size, or there is no such hand.
-        """
-        import casadi
-
         arm = self.arm(hand)
         if q.numel() != self.dof:
             raise ValueError(f"symbolic q has {q.numel()} entries; this robot needs {self.dof}")
@@ -352,7 +343,7 @@ class Robot:
         # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
         plain = arm._replace(links=[float(length) for length in arm.links])
         chain(q, plain, xs, ys, casadi.cos, casadi.sin)
-        return list(zip(xs, ys, strict=True))
+        return casadi.vertcat(xs[-1], ys[-1])
 
     def _configuration(self, q: ArrayLike) -> Array:
         array = np.asarray(q, dtype=np.float64)

@@ -43,7 +43,6 @@ KEPT = {
     "stops": ("stops claims", "stops"),
     "dose": ("dose claims", "dose"),
     "resist": ("resist claims", "resist"),
-    "objectives": ("objectives crossings claims", "objectives"),
     "human": ("human human-effects", "human"),
 }
 """Tables and figures that are kept of each suite's report. Suites that need other libraries are

@@ -1,5 +1,6 @@
 """The learner against the paper's loop, the published results, and its own laws."""
 
+import doctest
 import functools
 import itertools
 import math
@@ -14,7 +15,9 @@ from coartic import (
     CoarticError,
     ExplorationCondition,
     MotionModel,
+    Movement,
     NotApplicableError,
+    SolutionError,
     corrective_trial,
     execute,
     learn,
@@ -22,11 +25,13 @@ from coartic import (
     load_task,
     parse_task,
 )
+from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
 from coartic.motion.lanes import LANES
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
+from coartic.tasks.optima import best_shipped
 from tests.support import reference
 from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
 
@@ -137,6 +142,61 @@ def test_conditions_are_data(chosen, other, hands):
         free = replace(condition, corrects=False, noise_sd=0.02)
         slow = assert_equals_reference(task, free, trials=6)
         assert set(slow.completed) == {True, False}
+
+
+def planned(hands, configurations):
+    """A planner's solution: one movement to each goal."""
+    rows = enumerate(zip(hands, configurations, strict=True), 1)
+    return [Movement(goal, hand, "planned", q) for goal, (hand, q) in rows]
+
+
+@pytest.mark.parametrize("away", [0.0, 0.5])
+def test_from_a_first_solution_it_equals_the_slow_learner(away):
+    """From one that hits its goals, and from one that misses them and is corrected."""
+    hits = learn("two-armed-2", "EC4", seed=1, trials=50).execute().configurations
+    start = planned(["right", "left", "right", "right"], hits + away)
+    task = load_task("two-armed-2")
+    slow = assert_equals_reference(task, CONDITIONS["EC4"], trials=5, seed=3, start=start)
+    assert slow.corrections_by_trial[0] == (4 if away else 1)
+    run = learn(task, "EC4", seed=3, trials=1, start=start)
+    assert run.first_hands == "RLRR"
+    due = execute(task, start)
+    assert (run.initial_reward, len(run.initial)) == (due.reward, len(due.movements))
+    for made, wanted in zip(run.initial, due.movements, strict=True):
+        np.testing.assert_array_equal(made.target, wanted.target)
+        assert (made.goal, made.hand, made.ticks) == (wanted.goal, wanted.hand, wanted.ticks)
+
+
+def test_from_the_optimum_nothing_gets_worse():
+    """The learner cannot better it and does not lose it; elsewhere it betters what it is given."""
+    task = load_task("ascending")
+    best = best_shipped(task)
+    assert best.reward == best.bound
+    columns = task.robot.joint_names
+    targets = [[row[name] for name in columns] for row in best.solution]
+    start = planned([row["hand"] for row in best.solution], np.array(targets))
+    for run in learn_many(task, "EC1", seeds=range(3), trials=200, start=start):
+        assert (run.best_trial, run.reward) == (0, best.reward)
+        assert run.rewards.max() == run.execute().reward == best.reward
+    first = learn(task, "EC1", seed=0, trials=200)
+    more = learn(task, "EC1", seed=1, trials=2000, start=first.solution)
+    assert more.initial_reward == first.reward < more.reward
+
+
+def test_a_first_solution_that_breaks_the_rules_is_refused():
+    q = np.zeros(Robot().dof)
+    with pytest.raises(SolutionError, match="movements for goals"):
+        learn("ascending", "EC1", seed=0, trials=5, start=planned(["right"], [q]))
+    left = planned(["left"] * 3, [q] * 3)
+    with pytest.raises(SolutionError, match="no left hand"):
+        learn("ascending", "EC1", seed=0, trials=5, start=left)
+    both = load_task("ascending").model_copy(update={"hands": HANDS})
+    with pytest.raises(NotApplicableError, match="EC1 uses only the right hand, the first .* left"):
+        learn(both, "EC1", seed=0, trials=5, start=left)
+
+
+def test_the_example_of_the_learner():
+    assert doctest.testmod(learning).failed == 0
 
 
 def test_arms_of_another_number_of_links():

@@ -146,14 +146,13 @@ def large():
         name="x" * 64, title=title, description=title, goals=[[5 / 3, 1.0]] * MOST_GOALS,
         initial_hands="R" * MOST_GOALS, start=start, provenance={"goals": source},
         robot={"left_links": links, "right_links": links, "left_shoulder": [1 / 3, 1 / 7]},
-        penalty={"joints": 1 / 3, "region": 1 / 3, "centre": [1 / 3, 1 / 3], "distinct": 1 / 3},
     )  # fmt: skip
 
 
 def examples():
     big, q = large(), np.full(2 * MOST_LINKS + 2, 1 / 3)
     for task in (TASK, load_task("ascending"), big):
-        yield from (task, task.start, task.robot, task.robot.arm("left"), task.penalty)
+        yield from (task, task.start, task.robot, task.robot.arm("left"))
         yield from task.provenance.values()
     yield from (coartic.CONDITIONS, coartic.VARIANTS, coartic.PAPER)
     yield from (coartic.CONDITIONS | coartic.VARIANTS).values()

@@ -9,12 +9,10 @@ import pytest
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis.optima import KnownOptimum, initial_reward
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
 from coartic.analysis.topics.comparison import running_times, scores, sentences
 from coartic.analysis.topics.comparison.scores import BY_TRIAL, leaders
-from coartic.tasks.task import Penalty
 from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
 
 
@@ -185,18 +183,6 @@ def test_a_locked_base_is_another_problem():
     again = MadeUp(study_of(locked, list(seen.tasks.values())), optima=seen.optima)
     assert scores.gaps(again).method.tolist() == ["dual-process/EC1"]
     assert list(running_times.cells_compared(again)) == ["dual-process/EC1"]
-
-
-def test_the_initial_reward_loses_the_penalty():
-    """It is the scale of targets, of gaps and of the table of learning."""
-    plain = load_task("ascending")
-    dear = plain.model_copy(update={"penalty": Penalty(joints=20.0, costly="base")})
-    rows = row("dual-process/EC1", -350, task="ascending")
-    best = {"ascending": KnownOptimum(-340, None)}
-    seen = MadeUp(study_of(pd.DataFrame([rows]), [dear]), optima=best)
-    without, initial = (initial_reward(task, seen.model) for task in (plain, dear))
-    assert initial < -340 < without
-    assert scores.initial_and_optimum(seen) == {"ascending": (initial, -340)}
 
 
 SPREAD = np.array([0, 1, -1, 0, 1, -2, 0, 2, -1, 0])

@@ -1,9 +1,12 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
+import json
+
 import numpy as np
 import pytest
 
 from coartic import (
+    PAPER,
     NotApplicableError,
     Robot,
     Start,
@@ -14,6 +17,7 @@ from coartic import (
     initial_hands,
     load_task,
 )
+from coartic.analysis.verify import stored_task
 from coartic.tasks.task import check_task, parse_task
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import TIED, tiny_task
@@ -40,6 +44,17 @@ def test_several_mistakes_each_get_a_line(tmp_path):
     with pytest.raises(TaskError) as caught:
         load_task(path)
     assert len(str(caught.value).splitlines()) == 3
+
+
+def test_a_penalty_is_what_version_1_reads(tmp_path):
+    path = write(tmp_path, f"{GOOD}[penalty]\njoints = 1.0\n")
+    with pytest.raises(TaskError) as caught:
+        load_task(path)
+    reads = "version 1.1.0 of coartic reads tasks with a penalty; here a reward is minus the ticks"
+    assert str(caught.value) == f"{path}: {reads}"
+    stored = json.dumps(load_task("ascending").model_dump(mode="json") | {"penalty": {}})
+    with pytest.raises(ValueError, match="its task has a penalty, which version 1.1.0 reads"):
+        stored_task(stored, json.dumps(PAPER._asdict()))
 
 
 def test_files_that_are_not_there_or_not_text(tmp_path):

@@ -139,7 +139,7 @@ def test_a_trial_of_a_session_is_an_execution():
                 np.testing.assert_array_equal(one.target, other.target)
                 assert (one.hand, one.kind, one.ticks) == (other.hand, other.kind, other.ticks)
             np.testing.assert_array_equal(made.configurations, due.configurations)
-            for name in ("ticks", "corrections", "iterations", "evaluations", "penalty"):
+            for name in ("ticks", "corrections", "iterations", "evaluations"):
                 assert getattr(made, name) == getattr(due, name)
             assert made.reward == session.rewards[-1]
 

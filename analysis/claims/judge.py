@@ -31,7 +31,6 @@ import coartic.analysis.topics.dose
 import coartic.analysis.topics.families.claims
 import coartic.analysis.topics.fourteen
 import coartic.analysis.topics.horizon
-import coartic.analysis.topics.objectives
 import coartic.analysis.topics.paper.claims
 import coartic.analysis.topics.paper.coarticulation
 import coartic.analysis.topics.practice

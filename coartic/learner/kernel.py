@@ -35,7 +35,6 @@ from coartic.motion.compiled import (
 from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
 from coartic.motion.movement import move_lanes
-from coartic.motion.penalty import penalty_at
 from coartic.motion.problem import arm_of, goal_of
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
@@ -74,7 +73,7 @@ class Log(NamedTuple):
 
     count: Any  # (N,)
     movements: Any  # (N, 2 G) records of goal, hand, kind, ticks and target
-    hits: Any  # (N, G) records of hand, penalty, reward and credit of the subtask, and q
+    hits: Any  # (N, G) records of hand, reward and credit of the subtask, and q
 
 
 class Kept(NamedTuple):
@@ -112,7 +111,6 @@ class Work(NamedTuple):
 
     runs: Any  # (N,) records: see runs_for
     trials: Any  # (N,) records: see _TRIAL
-    before: Any  # (N, width) where each hit the goal before, or started; with a penalty alone
     lanes: Lanes
     xs: Any  # (n + 1,) for the longer arm: positions of its joints
     ys: Any
@@ -165,7 +163,7 @@ def empty_log(runs: int, task: Task) -> Log:
     numbers = dict.fromkeys(("goal", "hand", "kind", "ticks"), np.int64)
     movement = record_type({**numbers, "target": q})
     credit = dict.fromkeys(("reward", "credit"), np.float64)
-    hit = record_type({"hand": np.int64, "penalty": np.int64, **credit, "q": q})
+    hit = record_type({"hand": np.int64, **credit, "q": q})
     count = np.zeros(runs, dtype=np.int64)
     return Log(count, np.zeros((runs, 2 * goals), movement), np.zeros((runs, goals), hit))
 
@@ -177,7 +175,7 @@ _TRIAL = record_type(
         "stored": np.bool_,  # whether the hand has a stored target
         "aimed": np.bool_,  # whether it moves to a target of its own before A acts
         "going": np.bool_,  # whether the trial has not failed
-        "total": np.int64,  # ticks and penalties
+        "ticks": np.int64,
         "counts": (np.int64, len(COUNT)),  # of all trials of the run
     }
 )
@@ -190,7 +188,6 @@ def work_for(runs: int, task: Task) -> Work:
     return Work(
         runs=runs_for(runs, task.robot),
         trials=np.zeros(runs, _TRIAL),
-        before=np.zeros((runs, width_of(task.robot))),
         lanes=lanes_for(task.robot),
         xs=np.empty(task.robot.most_links + 1),
         ys=np.empty(task.robot.most_links + 1),
@@ -367,7 +364,7 @@ def move_runs(number: int, kind: int, problem: Any, log: Any, work: Any) -> None
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         if run.acting:
-            trial.total += run.ticks
+            trial.ticks += run.ticks
             trial.counts[COUNT.ticks] += run.ticks
             record_movement(log, n, number, trial.hand, kind, run.ticks, run.target)
             if kind == CORRECTIVE and not run.hit:
@@ -405,15 +402,6 @@ def correct_runs(number: int, problem: Any, rules: Any, log: Any, work: Any) -> 
             run.acting = trial.going = run.converged
 
 
-@inlined
-def pay_penalty(n: int, number: int, hit: Any, problem: Any, work: Any) -> None:
-    """What run ``n`` loses beside ticks at the goal that it has just hit."""
-    before, arm = work.before[n], arm_of(problem, hit.hand)
-    hit.penalty = penalty_at(before, hit.q, arm, number == 0, problem.penalty, work.xs, work.ys)
-    work.trials[n].total += hit.penalty
-    fill_row(before, hit.q)
-
-
 @inner
 def make_trial(
     first: bool,
@@ -431,12 +419,10 @@ def make_trial(
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         fill_row(run.q, problem.start)
-        if problem.penalty.exist:
-            fill_row(work.before[n], problem.start)
         run.evaluations = 0
         trial.previous = NO_HAND
         trial.going = True
-        trial.total = 0
+        trial.ticks = 0
         log.count[n] = 0
     for number in range(len(problem.goals)):
         if first:
@@ -455,8 +441,6 @@ def make_trial(
                 hit = log.hits[n, number]
                 hit.hand = trial.previous = trial.hand
                 fill_row(hit.q, work.runs[n].q)
-                if problem.penalty.exist:
-                    pay_penalty(n, number, hit, problem, work)
     for n in range(len(work.runs)):
         work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
 
@@ -471,7 +455,7 @@ def find_returns(n: int, rules: Any, log: Any) -> None:
         while row < log.count[n] and log.movements[n, row].goal == number:
             ticks += log.movements[n, row].ticks
             row += 1
-        hit.reward = -(ticks + hit.penalty)
+        hit.reward = -ticks
         hit.credit = earlier
         if rules.counts_earlier:
             earlier = rules.discount * (earlier + hit.reward)
@@ -513,7 +497,7 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
     for n in range(len(work.trials)):
         trial = work.trials[n]
         kept.corrections[n, part] = trial.counts[COUNT.corrections]
-        reward = -trial.total
+        reward = -trial.ticks
         kept.rewards[n, earlier] = reward
         kept.completed[n, earlier] = trial.going
         if not trial.going:
@@ -559,5 +543,5 @@ def learn_kernel(
             learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
         kept.replayed[n] = work.trials[n].going
-        kept.replay_rewards[n] = -work.trials[n].total
+        kept.replay_rewards[n] = -work.trials[n].ticks
         copy_movements(n, log, kept.replay)

@@ -52,6 +52,7 @@ def learn(
     seed: int,
     trials: int = TRIALS,
     model: MotionModel = PAPER,
+    start: Sequence[Movement] = (),
 ) -> LearningRun:
     """Run the learner on a task under an exploration condition.
 
@@ -69,6 +70,11 @@ def learn(
         Number of trials, the initial one included.
     model : MotionModel
         The constants of movement and of the corrective process.
+    start : sequence of Movement
+        A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
+        straight to the first target that it has for each goal, length unit (base) and rad
+        (joints); the corrective process acts where that misses the goal, or there is no target.
+        Without a first solution it acts alone.
 
     Returns
     -------
@@ -80,11 +86,14 @@ def learn(
     TaskError
         The task cannot be used.
     NotApplicableError
-        The condition does not fit the task, or no first trial is found for it.
+        The condition does not fit the task or the first solution, or no first trial is found for
+        it.
     CoarticError
         The condition is unknown.
     TypeError
         The task is neither a Task nor a text nor a path, or the condition or the model is none.
+    SolutionError
+        The first solution breaks the task's rules.
     ValueError
         The seed is no whole number from 0, there is no trial, no movement can be made with the
         model, or the task was changed so that it contradicts itself.
@@ -92,8 +101,21 @@ def learn(
     Notes
     -----
     Source: paper, Figure 3.
+
+    Examples
+    --------
+    >>> from coartic import learn
+    >>> first = learn("ascending", "EC1", seed=0, trials=500)
+    >>> more = learn("ascending", "EC1", seed=1, trials=500, start=first.solution)
+    >>> more.initial_reward == first.reward
+    True
+    >>> more.reward >= first.reward
+    True
     """
-    return learn_many(task, condition, seeds=[seed], trials=trials, model=model, jobs=1)[0]
+    (run,) = learn_many(
+        task, condition, seeds=[seed], trials=trials, model=model, jobs=1, start=start
+    )
+    return run
 
 
 def learn_many(
@@ -125,8 +147,7 @@ def learn_many(
     jobs : int
         Number of threads; -1 for one a core.
     start : sequence of Movement
-        Movements that trial 0 makes in place of the corrective process, one to a target for each
-        goal, such as those of a plan. What they miss is corrected.
+        A first solution, as of :func:`learn`, with which every run begins.
 
     Returns
     -------
@@ -138,13 +159,14 @@ def learn_many(
     TaskError
         The task cannot be used.
     NotApplicableError
-        The condition does not fit the task, or no first trial is found for it.
+        The condition does not fit the task or the first solution, or no first trial is found for
+        it.
     CoarticError
         The condition is unknown.
     TypeError
         The task is neither a Task nor a text nor a path, or the condition or the model is none.
     SolutionError
-        The movements of ``start`` break the task's rules.
+        The first solution breaks the task's rules.
     ValueError
         A seed is no whole number from 0, there is no trial, ``jobs`` is neither -1 nor at least 1,
         no movement can be made with the model, or the task was changed so that it contradicts
@@ -164,6 +186,12 @@ def learn_many(
     check_model(model, radius=task.radius)
     if start:
         movements_by_goal(task, start)  # or it says what is wrong with them
+        for movement in start:
+            if movement.hand not in condition.hands:
+                raise NotApplicableError(
+                    f"{condition.id} uses only the {condition.hands[0]} hand, the first solution "
+                    f"uses the {movement.hand} hand"
+                )
     note_trials(trials * len(ordered))
     first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     threads = threads_for(jobs)

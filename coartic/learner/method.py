@@ -40,8 +40,6 @@ from coartic.method import (
     Session,
 )
 from coartic.motion.lanes import LANES
-from coartic.motion.solution import Movement
-from coartic.tasks.task import Task
 
 _MOST_TRIALS = 4_000_000  # of runs that are performed together
 
@@ -108,10 +106,6 @@ class DualProcess(Method):
         trials: int = self.parameters.trials
         return max(1, min(LANES, _MOST_TRIALS // trials))
 
-    def first_trial(self, sessions: Sequence[Session], task: Task) -> tuple[Movement, ...]:
-        """The movements of trial 0, one for each goal; none where the corrective process acts."""
-        return ()
-
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Learn in each session; a solution is the best trial's."""
         parameters: DualProcessParameters = self.parameters
@@ -119,8 +113,7 @@ class DualProcess(Method):
         condition = replace(self.condition, **of_condition)
         tasks = [session.hand_over(*self.told) for session in sessions]
         task, model = tasks[0], sessions[0].model
-        start = self.first_trial(sessions, task)
-        for session in sessions if not start else ():
+        for session in sessions:
             session.find_initial_hands(condition.hands)
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -134,7 +127,6 @@ class DualProcess(Method):
             trials=trials,
             model=model,
             jobs=1,
-            start=start,
         )
         return [_result(*pair) for pair in zip(sessions, runs, strict=True)]
 

@@ -36,8 +36,8 @@ class LearningRun:
     first_hands: str
     """Hands of trial 0, such as ``"RRRR"``."""
     rewards: np.ma.MaskedArray[Any, np.dtype[np.int64]]
-    """Total reward of each trial, shape ``(trials,)``: minus its control ticks, and minus its
-    penalty where the task has one; masked where the trial failed."""
+    """Total reward of each trial, shape ``(trials,)``: minus its control ticks; masked where the
+    trial failed."""
     best_trial: int | None
     """First trial with the highest total reward; None where none was completed."""
     initial: tuple[Movement, ...]

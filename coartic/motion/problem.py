@@ -10,7 +10,6 @@ from coartic.model import MotionModel
 from coartic.motion.compiled import inlined
 from coartic.motion.corrective import Corrector
 from coartic.motion.movement import Goal, check_goal, configuration
-from coartic.motion.penalty import Terms, terms_of
 from coartic.robot import Arm
 from coartic.tasks.task import Task
 
@@ -25,7 +24,6 @@ class Problem(NamedTuple):
     right: Arm
     corrector: Corrector
     model: MotionModel
-    penalty: Terms
 
 
 def problem_of(task: Task, model: MotionModel) -> Problem:
@@ -44,7 +42,6 @@ def problem_of(task: Task, model: MotionModel) -> Problem:
         right=task.robot.arm("right"),
         corrector=Corrector("x" not in locked, "y" not in locked),
         model=model,
-        penalty=terms_of(task),
     )
 
 

@@ -20,7 +20,6 @@ from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import check_goal, configuration, follow
 from coartic.motion.outside import note_trials
-from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, Requests, reach_with, setup_for
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
@@ -82,13 +81,10 @@ class Execution:
     """Forward-kinematics evaluations made."""
     reason: str = ""
     """Why the task was not completed; empty where it was."""
-    penalty: int = 0
-    """What the goals hit cost beside the ticks, in ticks; 0 where the task has no penalty."""
 
     def __repr__(self) -> str:
-        facts = {"hands": self.hands, "reward": self.reward, "ticks": self.ticks}
-        facts |= {"penalty": self.penalty} if self.penalty else {}
-        facts |= {"corrections": self.corrections}
+        names = ("hands", "reward", "ticks", "corrections")
+        facts = {name: getattr(self, name) for name in names}
         facts |= {"reason": self.reason} if self.reason else {}
         return short_repr(self, **facts)
 
@@ -99,8 +95,8 @@ class Execution:
 
     @property
     def reward(self) -> int | None:
-        """Total reward, -1 a tick less the penalty; None where the task was not completed."""
-        return -(self.ticks + self.penalty) if self.completed else None
+        """Total reward, -1 a tick; None where the task was not completed."""
+        return -self.ticks if self.completed else None
 
     @property
     def hands(self) -> str:
@@ -261,17 +257,14 @@ class SolutionRun:
 
     def outcome(self) -> Execution:
         """What has happened so far."""
-        hits = np.array(self.configurations).reshape(1, -1, len(self.q))
-        hands = [[movements[0].hand for movements in self.due[: hits.shape[1]]]]
         return Execution(
             movements=tuple(self.movements),
-            configurations=hits[0],
+            configurations=np.array(self.configurations).reshape(-1, len(self.q)),
             ticks=sum(movement.ticks or 0 for movement in self.movements),
             corrections=self.corrections,
             iterations=self.iterations,
             evaluations=self.evaluations,
             reason=self.reason,
-            penalty=int(penalties(self.task, hands, hits).sum()),
         )
 
 

@@ -57,13 +57,13 @@ class Trajectory:
 
     @property
     def ticks(self) -> int:
-        """Number of control ticks; the reward also loses the penalty, where there is one."""
+        """Number of control ticks."""
         return self.execution.ticks
 
     @property
     def reward(self) -> int:
-        """Total reward: -1 a tick, less the penalty."""
-        return -(self.execution.ticks + self.execution.penalty)
+        """Total reward: -1 a tick."""
+        return -self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
         """The path of a hand.

@@ -17,7 +17,6 @@ from coartic.inputs import brief_value, real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
 from coartic.motion.outside import note_trials
-from coartic.motion.penalty import penalties
 from coartic.motion.reach import Reached, Requests, reach_with, setup_for
 from coartic.motion.solution import Execution, Movement
 from coartic.robot import HANDS, Array
@@ -46,13 +45,11 @@ class Trials(NamedTuple):
     and in the goals after a failure what was given."""
     reached: Array
     """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN after a failure."""
-    penalties: NDArray[np.int64]
-    """What each loses beside its ticks, shape ``(N,)``; 0 where the task has no penalty."""
 
     @property
     def rewards(self) -> Array:
         """Total rewards, shape ``(N,)``; -inf where a trial failed."""
-        return np.where(self.completed, -(self.ticks + self.penalties), -np.inf)
+        return np.where(self.completed, -self.ticks, -np.inf)
 
 
 class Bench:
@@ -104,9 +101,6 @@ class Bench:
         reached = self.reach(hands, targets)
         if not reached.hit.all():
             reached.q[~reached.hit] = np.nan
-        lost = np.zeros(len(hands), dtype=np.int64)
-        if self.task.penalty is not None:
-            lost = penalties(self.task, hands, reached.q).sum(axis=1)
         return Trials(
             ticks=np.einsum("ng->n", reached.ticks),  # a sum in a third of the time
             completed=reached.hit[:, -1].copy(),
@@ -115,7 +109,6 @@ class Bench:
             evaluations=np.einsum("ng->n", reached.evaluations),
             targets=targets,
             reached=reached.q,
-            penalties=lost,
         )
 
     def execute(self, solution: Sequence[Movement]) -> Execution | None:
@@ -168,14 +161,7 @@ class Bench:
             corrections=sum(corrections),
             iterations=sum(reached.iterations[0].tolist()),
             evaluations=sum(evaluations) + len(ticks),
-            penalty=self.penalty(hands, reached),
         )
-
-    def penalty(self, hands: NDArray[np.int64], reached: Reached) -> int:
-        """What the only trial loses beside its ticks, if it completes the task."""
-        if self.task.penalty is None or not reached.hit[0, -1]:
-            return 0
-        return int(penalties(self.task, hands, reached.q).sum())
 
 
 def make_trials(

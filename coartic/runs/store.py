@@ -168,6 +168,10 @@ class _Environment(_Stored):
     cores: int
 
 
+GONE = frozenset(
+    {"objectives", "believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"}
+)
+"""Suites and methods of version 1 that are no longer here."""
 _ROWS = 2_000  # that are read at once
 _WAIT_S = 1.0  # for another program, before more is done about it
 _LOCK_TRIES = 20
@@ -614,6 +618,7 @@ def open_store(folder: Path) -> Store:
         connection.execute("PRAGMA query_only = ON")
         if not has_tables(connection, folder):
             raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
+        check_known(connection, folder)
         with lock(folder, shared=True) as is_ours:
             if not is_ours:
                 done = connection.execute(f"SELECT count(*) {_ASKED_FOR}").fetchone()[0]
@@ -623,6 +628,23 @@ def open_store(folder: Path) -> Store:
                     f"{counted(asked, 'run')} are done; wait for it"
                 )
     return Store(folder, connection)
+
+
+def check_known(connection: sqlite3.Connection, folder: Path) -> None:
+    """Raises CoarticError for results of what version 1 had and this version does not have."""
+    asked = connection.execute(
+        "SELECT name, content FROM suite JOIN environments ON id = environment"
+    ).fetchone()
+    if asked is None or not json.loads(asked["content"])["coartic"].startswith("1."):
+        return
+    methods = {name for (name,) in connection.execute("SELECT name FROM methods")}
+    gone = sorted(GONE & {asked["name"], *methods})
+    if connection.execute("SELECT * FROM tasks WHERE definition LIKE '%\"penalty\":%'").fetchone():
+        gone.append("tasks with a penalty")
+    if gone:
+        raise CoarticError(
+            f"{folder} has results of {gone[0]}: version 1.1.0 of coartic reads them"
+        )
 
 
 @contextmanager

@@ -470,7 +470,7 @@ def instance_names(
 def task_text(task: Task) -> str:
     """The task as the text of its file, from which :func:`coartic.load_task` gives it again."""
     content = task.model_dump(mode="json")
-    tables = {key: content.pop(key, {}) for key in ("start", "robot", "penalty", "provenance")}
+    tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
         del tables["robot"]
     lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]

@@ -57,8 +57,7 @@ class ShippedOptimum(FileData):
 def essence(task: Task) -> str:
     """Hash of what makes a task: start, goals, radius, hands, locks, robot."""
     content = task.model_dump(mode="json")
-    keys = ("goals", *KEPT, *(["penalty"] if "penalty" in content else []))
-    text = json.dumps({key: content[key] for key in keys}, sort_keys=True)
+    text = json.dumps({key: content[key] for key in ("goals", *KEPT)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -18,10 +18,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import (
     Field,
-    SerializerFunctionWrapHandler,
     ValidationError,
     ValidationInfo,
-    model_serializer,
     model_validator,
 )
 
@@ -44,8 +42,6 @@ LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
 MOST_GOALS = 100
-MOST_PENALTY = 10_000.0
-"""Ticks of each term of a penalty: many times what a task takes."""
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of names of tasks and suites, which become names of files and parts of commands."""
@@ -126,35 +122,6 @@ class Start(FileData):
     """Angles of the right arm."""
 
 
-Ticks = Annotated[float, Field(ge=0, le=MOST_PENALTY, allow_inf_nan=False)]
-
-
-class Penalty(FileData):
-    """What the reward loses at each goal beside 1 a tick: the sum of three terms, in ticks.
-
-    They tell apart postures in which a goal is hit (:mod:`coartic.motion.penalty`); the movements
-    are the same with and without it. The sum is rounded to whole ticks at each goal.
-    """
-
-    joints: Ticks = 0.0
-    """Costly joints: ticks for each length unit and rad of their way, straight from the posture at
-    the goal before."""
-    costly: Literal["base", "arms", "left-arm", "right-arm"] = "arms"
-    """Which joints these are."""
-    region: Ticks = 0.0
-    """A costly disc: ticks if an elbow of the arm that hits is at its centre, in proportion less
-    towards its rim. The elbow that is deepest in it counts."""
-    centre: Point | None = None
-    """Centre of the disc, length unit; the mean of the goals where left out."""
-    radius: Length = 1.0
-    """Radius of the disc, length unit."""
-    distinct: Ticks = 0.0
-    """Postures alike: ticks if the joints of the arm that hits are as they were at the goal before,
-    in proportion less the more they differ. The first goal has none before it."""
-    apart: Length = 1.0
-    """From here on postures do not count as alike, rad."""
-
-
 class Task(FileData):
     """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
 
@@ -188,8 +155,6 @@ class Task(FileData):
     (0, 0) and the arms are straight along +x."""
     robot: Robot = Robot()
     """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
-    penalty: Penalty | None = None
-    """What the reward loses beside 1 a tick; nothing in the paper's tasks."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
     """Source and status of the figures, by key."""
 
@@ -213,14 +178,6 @@ class Task(FileData):
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
         return copied
-
-    @model_serializer(mode="wrap")
-    def _serialise(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Omit a missing penalty, so that old hashes do not change.
-        content: dict[str, Any] = write(self)
-        if self.penalty is None:
-            content.pop("penalty", None)
-        return content
 
     @property
     def initial_is_policy(self) -> bool:
@@ -253,6 +210,9 @@ class Task(FileData):
     @classmethod
     def _with_start(cls, content: Any) -> Any:
         """Read ``q0`` as the start, or let both arms point along +x where there is none."""
+        if isinstance(content, dict) and "penalty" in content:
+            reads = "version 1.1.0 of coartic reads tasks with a penalty"
+            raise error_saying(f"{reads}; here a reward is minus the ticks")
         if not isinstance(content, dict) or "start" in content:
             return content
         robot = content.get("robot", Robot())
@@ -452,5 +412,5 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 def all_keys() -> list[str]:
     """All keys of a task file, whatever table they belong to."""
     robot = [field.name for field in fields(Robot)]
-    others = (*Start.model_fields, *robot, *Penalty.model_fields, *Provenance.model_fields)
+    others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]

@@ -123,9 +123,7 @@ def execute(task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
             made.append(Movement(number, hand, "corrective", q, 0))
         hits.append(q)
     ticks = sum(movement.ticks for movement in made)
-    hands = list({movement.goal: movement.hand for movement in made}.values())
-    lost = sum(penalty(task, hits, hands))
-    reward = -(ticks + lost) if len(hits) == len(task.goals) else None
+    reward = -ticks if len(hits) == len(task.goals) else None
     return Outcome(reward, ticks, corrections, iterations, hits, made, np.concatenate(rows))
 
 
@@ -224,8 +222,6 @@ def learn(
                 if not result.hit:
                     break
             visited.append((state, hand, q))
-            hits, hands = [q for *_, q in visited], [hand for _, hand, _ in visited]
-            total -= penalty(task, hits, hands)[-1]
             subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
@@ -248,35 +244,6 @@ def learn(
     return ReferenceRun(
         rewards, completed, values, targets, ticks, corrections, by_trial, iterations
     )
-
-
-def penalty(task: Task, hits: list[Array], hands: list[Hand]) -> list[int]:
-    """What each goal loses beside its ticks (coartic.motion.penalty), from where they were hit."""
-    lost = []
-    before = np.array(task.q0)
-    for number, (q, hand) in enumerate(zip(hits, hands, strict=False)):
-        rule = task.penalty
-        if rule is None:
-            lost.append(0)
-            continue
-        arm = range(task.robot.dof)[task.robot.joints(hand)]
-        costly = {
-            "base": [0, 1],
-            "arms": range(2, task.robot.dof),
-            "left-arm": range(task.robot.dof)[task.robot.joints("left")],
-            "right-arm": range(task.robot.dof)[task.robot.joints("right")],
-        }[rule.costly]
-        ticks = rule.joints * math.sqrt(sum((q[j] - before[j]) ** 2 for j in costly))
-        elbows = task.robot.joint_positions(q, hand)[1:-1]
-        centre = np.mean(task.goals, axis=0) if rule.centre is None else rule.centre
-        distances = [math.dist(elbow, centre) for elbow in elbows]
-        ticks += rule.region * max([0.0, *(1 - d / rule.radius for d in distances)])
-        if number > 0:
-            change = math.sqrt(sum((q[j] - before[j]) ** 2 for j in arm))
-            ticks += rule.distinct * max(0.0, 1 - change / rule.apart)
-        lost.append(math.floor(ticks + 0.5))
-        before = q
-    return lost
 
 
 def _choose(
