@@ -31,14 +31,12 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
-from coartic.tasks.catalogue import members, task_of
 from coartic.tasks.families import named_by
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
 from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
-_MEMBERS = "-*"
 Scalar = bool | int | float | str
 
 
@@ -96,19 +94,12 @@ class Block(FileData):
     def task_names(self, user_tasks: Iterable[str]) -> list[str]:
         """Names (or files) of the tasks; a block for all tasks is for the user's as well.
 
-        ``TASK-*`` are the members of a task (:mod:`coartic.tasks.catalogue`),
-        ``FAMILY/v1/i000..i039`` instances of a family (:mod:`coartic.tasks.families`).
+        ``FAMILY/v1/i000..i039`` are instances of a family (:mod:`coartic.tasks.families`).
         """
         every = [*builtin_tasks(), *user_tasks]
         names: dict[str, None] = {}
         for name in dict.fromkeys(self.tasks):
-            if name == WILDCARD:
-                stands_for = every
-            elif name.endswith(_MEMBERS):
-                stands_for = list(members(name.removesuffix(_MEMBERS)))
-            else:
-                stands_for = named_by(name)
-            names |= dict.fromkeys(stands_for)
+            names |= dict.fromkeys(every if name == WILDCARD else named_by(name))
         return list(names)
 
 
@@ -178,10 +169,10 @@ def select_cells(
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named; so does an instance of a
-    family that ``tasks`` names, alone or in a range, or a member of an ensemble, and the suite
-    does not. Raises CoarticError for unknown names, for a task file whose name is taken, for
-    parameters that a method does not take, for more than :data:`MOST_CELLS` cells, for different
-    cells that would go by one name, and where nothing is left to run.
+    family that ``tasks`` names, alone or in a range, and the suite does not. Raises CoarticError
+    for unknown names, for a task file whose name is taken, for parameters that a method does not
+    take, for more than :data:`MOST_CELLS` cells, for different cells that would go by one name,
+    and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
     user_tasks, wanted = resolve_tasks(suite, tasks, task_files)
@@ -213,8 +204,8 @@ def resolve_tasks(
 ) -> tuple[dict[str, Task], list[str]]:
     """The user's tasks by name, and the names of all tasks that were asked for.
 
-    The user's tasks are those of files, and the instances and members that ``names`` has and the
-    suite has not.
+    The user's tasks are those of files, and the instances that ``names`` has and the suite has
+    not.
     """
     files = [Path(name) for name in names if name.endswith(".toml")]
     user_tasks = read_tasks([*task_files, *files])
@@ -222,7 +213,7 @@ def resolve_tasks(
     wanted += list(user_tasks)[len(task_files) :]
     in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
     for name in wanted:
-        if name not in in_suite and (address_of(name) or task_of(name)):
+        if name not in in_suite and address_of(name):
             user_tasks.setdefault(name, load_task(name))
     return user_tasks, wanted
 

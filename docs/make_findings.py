@@ -152,8 +152,8 @@ def filled_pages() -> dict[str, str]:
         "seen": seen, "expect": expect, "name_of": name_of, "p_of_shares": p_of_shares,
         "p_above": p_above,
         "printed": tomllib.loads(published.read_text("utf-8"))["general"],
-        "readings": pd.read_csv(ANALYSIS / "reconstruction" / "readings.csv", index_col=0),
-        "ensemble": pd.read_csv(ANALYSIS / "claims" / "ensemble.csv"),
+        "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
+        "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
     }  # fmt: skip
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}

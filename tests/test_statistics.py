@@ -4,6 +4,7 @@ import itertools
 import math
 from collections import Counter
 
+import calibrate
 import numpy as np
 import pandas as pd
 import pytest
@@ -237,3 +238,14 @@ def test_fishers_test_of_two_rows():
     assert drawn.p == pytest.approx(expected, abs=0.02)
     with pytest.raises(ValueError, match="no counts"):
         hypotheses.independence_test([0, 0], [1, 2])
+
+
+def test_procedures_are_calibrated_on_samples_with_a_known_truth():
+    """One sample of each kind; of an interval around 5 instead of -300 nothing holds."""
+    rng, draw = np.random.default_rng(0), calibrate.POPULATIONS["ticks"]
+    seen = calibrate.of_rewards(rng, draw, 20, -300.0)
+    assert seen["interval of a mean (Student)"]
+    assert not calibrate.of_rewards(rng, draw, 20, 5.0)["interval of a mean (Student)"]
+    seen |= calibrate.of_counts(rng, 20) | calibrate.of_postures(rng, 20)
+    seen |= calibrate.of_instances(rng, 20)
+    assert len(seen) == 13

@@ -145,16 +145,10 @@ class Data:
     """
 
     study: Study
-    only: str = ""
-    """The one task on which means are compared, of claims that compare some on it."""
     run_ids: list[str] = field(default_factory=list)
     """Runs read so far, some of them more than once."""
     failed: list[CellKey] = field(default_factory=list)
     """Cells that were asked for so far and not read, as some of their runs failed."""
-
-    def among(self, *tasks: str) -> Sequence[str]:
-        """Tasks on which means are compared: these, or the ``only`` one if it is one of them."""
-        return (self.only,) if self.only in tasks else tasks
 
     def task(self, name: str) -> Task:
         """A task of the folder."""

@@ -37,7 +37,6 @@ import coartic.analysis.topics.practice
 import coartic.analysis.topics.resist
 import coartic.analysis.topics.stops  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
-from coartic.analysis.claims.ensemble import held_by, rarely_supported
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import CellKey, Study, cached
@@ -61,8 +60,8 @@ class Judgement:
     def verdict(self) -> Verdict:
         """The verdict by corrected p-values and by the admissible goals."""
         verdict = self.finding.verdict(self.adjusted_p, self.adjusted_opposite_p)
-        depends = self.claim.fitted and rarely_supported(held_by(self.claim.id))
-        return "depends on the goals" if verdict == "supported" and depends else verdict
+        depends = verdict == "supported" and self.claim.depends
+        return "depends on the goals" if depends else verdict
 
 
 def words_of_test(claim: Claim) -> str:
@@ -79,12 +78,9 @@ def judgements(study: Study) -> list[Judgement]:
     return judge_claims(study, of_suite or of_tasks)
 
 
-def judge_claims(study: Study, claims: Iterable[Claim], only: str = "") -> list[Judgement]:
-    """The claims judged; those with a test are corrected over their groups among ``claims``.
-
-    ``only``: the one task on which means are compared, of claims that compare some on it.
-    """
-    seen = [judge_alone(claim, Data(study, only)) for claim in claims]
+def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judgement]:
+    """The claims judged; those with a test are corrected over their groups among ``claims``."""
+    seen = [judge_alone(claim, Data(study)) for claim in claims]
     corrected: dict[str, Judgement] = {}
     for group in get_args(Group):
         members = [entry for entry in seen if entry.claim.group == group]

@@ -75,6 +75,8 @@ class Claim(FileData):
     statement: str
     exact: bool = False
     fitted: bool = False
+    sets: str = ""
+    depends: bool = False
     beside: bool = False
     families: bool = False
     short: str = ""

@@ -213,7 +213,7 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
             },
             "tone": TONES[row["verdict"]],
             "place": ", ".join(filter(None, (row["place"], CLAIMS[row["id"]].figure))),
-            "ensemble": row["ensemble"] or NONE,
+            "sets": row["sets"] or NONE,
             "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }
         for row in sorted(

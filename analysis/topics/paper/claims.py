@@ -50,15 +50,8 @@ Cells = Sequence[tuple[str, str]]
 def learning_improves(data: Data, cells: Cells, hands: str = "") -> Finding:
     """Whether replays are better than the initial solution, of all runs or those with hands."""
     return all_of(
-        higher(data.replay(task, label, hands), data.initial(task))
-        for task, label in cells_among(data, cells)
+        higher(data.replay(task, label, hands), data.initial(task)) for task, label in cells
     )
-
-
-def cells_among(data: Data, cells: Cells) -> Cells:
-    """Cells on tasks that means are compared on."""
-    tasks = data.among(*dict(cells))
-    return [cell for cell in cells if cell[0] in tasks]
 
 
 ENSURES = (
@@ -120,7 +113,7 @@ def corrected_less_later(data: Data, cells: Cells) -> Finding:
     """Whether the runs of each cell make fewer corrective movements in the end."""
     tests, parts = [], []
     last: list[partial[Measurement]] = []
-    for task, label in cells_among(data, cells):
+    for task, label in cells:
         early, late = (data.corrections(task, label, tenth) for tenth in ("early", "late"))
         tests.append(bootstrap_test(early.numbers - late.numbers, 0.0))
         parts.append((early.quantity, f"{early.name}: {early}, late {late}"))
@@ -136,10 +129,7 @@ def corrected_less_later(data: Data, cells: Cells) -> Finding:
 )
 def resembles_squared_changes(data: Data) -> Finding:
     """Learned postures are nearer to the plan than halfway from the initial ones."""
-    return all_of(
-        higher(data.resemblance(task, EC1), by=MARGINS["halfway"])
-        for task in data.among(*ONE_ARMED)
-    )
+    return all_of(higher(data.resemblance(task, EC1), by=MARGINS["halfway"]) for task in ONE_ARMED)
 
 
 INACCURATE = (
@@ -153,7 +143,7 @@ INACCURATE = (
 def beats_smooth_plans(data: Data, tasks: Iterable[str], label: str) -> Finding:
     """Whether a plan for smoothness is worse than what is learned, on some task."""
     comparisons = []
-    for task in data.among(*tasks):
+    for task in tasks:
         learned = data.reward(task, label)
         comparisons += [higher(learned, data.reward(task, plan)) for plan in SMOOTH_PLANS]
     return rules.some_of(comparisons)
@@ -221,9 +211,7 @@ def earn_more(
     data: Data, first: Sequence[str], second: Sequence[str], tasks: Sequence[str] = (TASK_1,)
 ) -> Finding:
     """Whether runs of a condition earn more than others; with hands, those that learned them."""
-    return all_of(
-        higher(data.reward(task, *first), data.reward(task, *second)) for task in data.among(*tasks)
-    )
+    return all_of(higher(data.reward(task, *first), data.reward(task, *second)) for task in tasks)
 
 
 @judges(
@@ -296,7 +284,7 @@ def ec4_mixed(data: Data) -> Finding:
 def proficiency_rises(data: Data) -> Finding:
     """Each condition is better than the one before, the first than the initial solution."""
     comparisons: list[rules.Comparison] = []
-    for task, label in cells_among(data, CELLS_OF_TWO_ARMS):
+    for task, label in CELLS_OF_TWO_ARMS:
         learned = data.reward(task, label)
         first = not comparisons or comparisons[-1].first.task != task
         before = data.initial(task) if first else comparisons[-1].first

@@ -44,7 +44,7 @@ CONTROLS = ("posture-based/one-goal", methods.INITIAL)
 def first_movement_sacrificed(data: Data) -> Finding:
     """The first movement is slower, the whole faster."""
     comparisons = []
-    for task in data.among(*ONE_ARMED):
+    for task in ONE_ARMED:
         first = data.sign("first", task, EC1)
         comparisons += [
             higher(first, by=MARGINS["ticks"]),
@@ -52,7 +52,7 @@ def first_movement_sacrificed(data: Data) -> Finding:
             higher(first, data.sign("first", task, EC1_BY_SUBTASK)),
             higher(data.sign("whole", task, EC1)),
         ]
-    replayed = [partial(data.replayed_sign, "first", t, EC1) for t in data.among(*ONE_ARMED)]
+    replayed = [partial(data.replayed_sign, "first", t, EC1) for t in ONE_ARMED]
     return all_of(comparisons, rules.there(replayed))
 
 
@@ -113,7 +113,7 @@ def contexts_of(data: Data, label: str, *, replayed: bool = False) -> TwoContext
 def overall_reward(data: Data) -> Finding:
     """Without a reward for the whole, the first movement is not sacrificed and less is earned."""
     comparisons = []
-    for task in data.among(*ONE_ARMED):
+    for task in ONE_ARMED:
         comparisons += [
             higher(data.replay(task, EC1), data.replay(task, EC1_BY_SUBTASK)),
             higher(
@@ -136,7 +136,7 @@ def overall_reward(data: Data) -> Finding:
 def arm_coarticulation(data: Data) -> Finding:
     """Postures of base and chosen arm leave the next goal nearer."""
     comparisons, replayed = [], []
-    for task in data.among(*TWO_ARMED):
+    for task in TWO_ARMED:
         for label in (EC3, EC4):
             arm = data.sign("arm", task, label)
             comparisons += [
@@ -175,8 +175,7 @@ def other_arm_coarticulation(data: Data) -> Finding:
 def overall_reward_two_armed(data: Data) -> Finding:
     """Without a reward for the whole less is earned."""
     return all_of(
-        higher(data.replay(task, EC4), data.replay(task, EC4_BY_SUBTASK))
-        for task in data.among(*TWO_ARMED)
+        higher(data.replay(task, EC4), data.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
     )
 
 

@@ -171,11 +171,6 @@ ENTRIES: Mapping[str, PrintedNumber | PrintedOrder | PrintedFact] = parse_entrie
 """Every entry by id, in the paper's order of tasks."""
 
 
-def entries_of(task: str, role: Role) -> list[PrintedNumber | PrintedOrder | PrintedFact]:
-    """What is printed of a task and has a role; none for a task that the paper lacks."""
-    return [e for e in ENTRIES.values() if e.task == task and e.role == role]
-
-
 def constant(name: str) -> float:
     """A general constant that the paper prints; KeyError for another."""
     entry = ENTRIES[f"general.{name}"]

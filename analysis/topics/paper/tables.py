@@ -8,7 +8,6 @@ from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.claims.ensemble import held_by, held_in_words
 from coartic.analysis.claims.judge import judgements, words_of_test
 from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
@@ -112,8 +111,8 @@ def named(study: Study, cell: CellRuns) -> Row:
 
 
 @table(
-    "statement, verdict, uncounted, evidence, test, p_holm, opposite_p_holm, ensemble, place, "
-    "quote, section",
+    "statement, verdict, uncounted, evidence, test, p_holm, opposite_p_holm, sets, place, quote, "
+    "section",
 )
 def claims(study: Study) -> Rows:
     """Claims with their verdicts: the paper's, and others, which say so."""
@@ -127,7 +126,7 @@ def claims(study: Study) -> Rows:
             "test": words_of_test(claim),
             "p_holm": entry.adjusted_p,
             "opposite_p_holm": entry.adjusted_opposite_p,
-            "ensemble": held_in_words(held_by(claim.id)) if claim.fitted else "",
+            "sets": claim.sets or "not counted" * claim.fitted,
             "place": claim.place or "not the paper's",
             "quote": claim.quote,
             "section": claim.section,
