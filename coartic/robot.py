@@ -127,17 +127,6 @@ class Robot:
         return BASE_DOF + len(self.left_links) + len(self.right_links)
 
     @property
-    def shoulder_height(self) -> float:
-        """Height of both shoulders above the centre of the base, length unit.
-
-        Raises ValueError where the shoulders differ in it.
-        """
-        (_, left), (_, right) = self.left_shoulder, self.right_shoulder
-        if left != right:
-            raise ValueError(f"the left shoulder is at {left}, the right one at {right}")
-        return left
-
-    @property
     def most_links(self) -> int:
         """Number of links of the longer arm."""
         return max(len(self.left_links), len(self.right_links))

@@ -68,10 +68,6 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
-def test_the_still_picture_is_what_the_learner_finds():
-    assert pages.text_of("still.svg") == pages.draw_still()
-
-
 def distance_in_spreads(trials, seeds=5):
     """Between the postures at the goal that ascending and descending share."""
     return context_dependence(

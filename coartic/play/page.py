@@ -11,13 +11,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import coartic
-from coartic.learner.learning import learn
-from coartic.robot import Array
 from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
-MODEL = FOLDER / "model.js"
-"""The model in JavaScript."""
 UP_OR_DOWN = ("ascending", "descending")
 """Tasks that share the start and the first goal: with them the page begins."""
 
@@ -85,42 +81,6 @@ def as_json(data: Any) -> str:
     """Data within a page."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
-
-
-def draw_still() -> str:
-    """``still.svg``, shown where scripts are switched off: both robots of the first view as they
-    hit goal 1 after learning."""
-    tasks = [shipped_tasks()[name] for name in UP_OR_DOWN]
-    shapes = []
-    for name, task in zip(("first", "second"), tasks, strict=True):
-        q = learn(task, "EC1", seed=0).execute().configurations[0]
-        arm = task.robot.joint_positions(q, "right")
-        outline, line = points(task.robot.base_outline(q)), points(arm)
-        joints = "".join(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r=".06"/>' for x, y in arm)
-        shapes.append(
-            f'<g style="--own: var(--{name})"><polygon points="{outline}"/>'
-            f'<polyline points="{line}"/>{joints}</g>'
-        )
-        for number, (x, y) in enumerate(task.goals, 1):
-            shapes.append(
-                f'<circle class="goal" cx="{x}" cy="{-y}" r="{task.radius}"/>'
-                f'<text x="{x + 0.2}" y="{-y - 0.2}">{number}</text>'
-            )
-    style = (
-        "svg g{fill:none;stroke:var(--own);stroke-width:.05;stroke-linejoin:round}"
-        "svg g circle{fill:var(--own)}svg .goal{fill:none;stroke:var(--ink);stroke-width:.03}"
-        "svg text{fill:var(--ink);font-size:.35px}"
-    )
-    title = "Two robots hit goal 1; they stand differently, since their next goals differ."
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 -4.5 7.5 9" role="img" '
-        f'aria-label="{title}"><style>{style}</style>{"".join(shapes)}</svg>\n'
-    )
-
-
-def points(of: Array) -> str:
-    """Points as SVG has them, with y downwards."""
-    return " ".join(f"{x:.3f},{-y:.3f}" for x, y in of)
 
 
 @cache
