@@ -64,7 +64,6 @@ class Options(NamedTuple):
     """How an action says a target, and what is observed."""
 
     scale: float
-    clips: bool
     chooses: bool
     middle: int
     sight: int
@@ -116,14 +115,13 @@ def sort_rows(kind: int, which: Any, table: Any, robots: Any, arms: Any) -> int:
 
 
 @inlined
-def is_wrong(action: Any, first: int, clips: bool) -> bool:
-    """Whether an action is NaN in part, or for the hand, or infinite where it is not clipped."""
-    missing, infinite = 0, False
+def is_wrong(action: Any, first: int) -> bool:
+    """Whether an action is NaN in part, or for the hand."""
+    missing = 0
     for j in range(first, len(action)):
         missing += 1 if np.isnan(action[j]) else 0
-        infinite |= np.isinf(action[j])
     no_hand = first == 1 and np.isnan(action[0])
-    return no_hand or 0 < missing < len(action) - first or (infinite and not clips)
+    return no_hand or 0 < missing < len(action) - first
 
 
 @inlined
@@ -162,9 +160,7 @@ def write_request(
         if len(action) > first and np.isnan(action[first]):
             target[j] = np.nan
         elif table.moves[row.task, row.goal, j]:
-            away = action[first + table.entries[row.task, j]]
-            if options.clips:
-                away = min(max(away, -1.0), 1.0)
+            away = min(max(action[first + table.entries[row.task, j]], -1.0), 1.0)
             middle = q[j]
             if options.middle == _FIXED:
                 middle = table.around[row.task, row.goal, j]
@@ -226,7 +222,7 @@ def step_robots(
     for i in range(len(which)):
         if not which[i]:
             robots.rows[i].reward, robots.rows[i].ended = 0.0, False
-        elif is_wrong(actions[i], 1 if options.chooses else 0, options.clips):
+        elif is_wrong(actions[i], 1 if options.chooses else 0):
             return i
     groups = sort_rows(kind, which, table, robots, arms)
     count = arms.bounds[groups]
@@ -443,7 +439,7 @@ class Arms:
         high[bounded:] = LARGEST_FIGURE
         low = np.where(np.arange(size) < bounded, 0.0, -high).astype(np.float32)
         self.observation_space = Box(low, high, dtype=np.float32)
-        self._options = Options(self.scale, True, self.chooses_hands, middle, self._sight)
+        self._options = Options(self.scale, self.chooses_hands, middle, self._sight)
         self.rows = np.zeros(count, ROW)
         """Task, next goal and trial of each robot, records of :data:`ROW`."""
         self.q = np.zeros((count, dof))
@@ -648,24 +644,20 @@ class Arms:
         action[:first] = side
         return action
 
-    def step(
-        self, actions: ArrayLike, which: NDArray[np.bool_], *, clips: bool = True
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def step(self, actions: ArrayLike, which: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Make the next subtask of these robots: rewards ``(N,)``, and whose trials have ended.
 
-        ``actions`` has shape ``(N, A)``. Entries are clipped to the box, or with ``clips`` False
-        taken as they are. Raises ValueError for another shape, and for entries that are NaN, unless
-        those of all joints are.
+        ``actions`` has shape ``(N, A)``. Entries are clipped to the box. Raises ValueError for
+        another shape, and for entries that are NaN, unless those of all joints are.
         """
         chosen = real_array("actions", actions)
         if chosen.shape != self._actions.shape:
             shape = self._actions.shape
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
         self._actions[:] = chosen
-        options = self._options if clips else self._options._replace(clips=False)
         for kind in self._kinds_of(which):
             wrong = step_robots(
-                kind, self._actions, which, options, self._table, self._robots,
+                kind, self._actions, which, self._options, self._table, self._robots,
                 self._asked, self._setups[kind], self._reached, self._batch,
             )  # fmt: skip
             if wrong >= 0:

@@ -40,7 +40,7 @@ from coartic.text import unknown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from coartic.agents import RobotEnvs
+    from coartic.sb3 import RobotEnvs
 
 OPTIONS = ("scale", "around", "observe", "ahead", "hands", "model")
 OF_FAMILY = ("family", "split", "count", "year")
@@ -350,7 +350,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
 
     Returns
     -------
-    coartic.agents.RobotEnvs
+    coartic.sb3.RobotEnvs
         A ``VecEnv``: trials begin anew by themselves, actions are clipped, and rewards are shares
         of what the corrective process takes.
 
@@ -359,7 +359,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     ValueError, TypeError
         The id is none of coartic's, or an option is wrong.
     """
-    from coartic.agents import RobotEnvs
+    from coartic.sb3 import RobotEnvs
 
     given = known_env(env) | options
     return RobotEnvs(TaskVectorEnv(num_envs, **given, autoreset_mode=AutoresetMode.SAME_STEP))

@@ -448,14 +448,10 @@ class Session:
             better = trials.rewards > np.asarray(until)[: len(targets)]
             if better.any():
                 trials = Trials._make(each[: int(better.argmax()) + 1] for each in trials)
-        self._count_batch(trials)
-        return trials
-
-    def _count_batch(self, trials: Trials) -> None:
-        """Count the trials of a batch and keep their rewards."""
         rewards = np.where(trials.completed, -trials.ticks, _NO_REWARD)
         spent = trials.ticks, trials.corrections, trials.iterations, trials.evaluations
         self._count(array("q", rewards.tobytes()), *(int(each.sum()) for each in spent))
+        return trials
 
     def unchecked_trial(self, codes: NDArray[np.int64], targets: Array) -> int | None:
         """The reward of one trial, None where it fails; as :meth:`unchecked_trials` for N = 1."""

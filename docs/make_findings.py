@@ -34,9 +34,6 @@ KEPT = {
     "ablations": ("methods signatures claims", ""),
     "locus": ("signatures", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
-    "agents": ("variants contexts signatures", ""),
-    "foreign": ("variants", ""),
-    "tuning": ("variants", ""),
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "fourteen": ("fourteen claims", "fourteen"),
     "practice": ("practice claims", "practice"),
@@ -45,8 +42,7 @@ KEPT = {
     "resist": ("resist claims", "resist"),
     "human": ("human human-effects", "human"),
 }
-"""Tables and figures that are kept of each suite's report. Suites that need other libraries are
-not run by ``make findings``."""
+"""Tables and figures that are kept of each suite's report."""
 
 
 class Row:

@@ -169,7 +169,7 @@ def test_no_module_is_imported_but_undeclared():
 def everything():
     package = importlib.import_module("coartic")
     left_out = {"coartic.__main__"}
-    for module, library in (("gym", "gymnasium"), ("agents", "stable_baselines3")):
+    for module, library in (("gym", "gymnasium"), ("sb3", "stable_baselines3")):
         if importlib.util.find_spec(library) is None:  # which comes with an extra
             left_out.add(f"coartic.{module}")
     for module in pkgutil.walk_packages(package.__path__, "coartic."):

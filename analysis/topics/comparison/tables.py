@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from coartic.analysis import methods as known
-from coartic.analysis.optima import gap_share, initial_reward
+from coartic.analysis.optima import initial_reward
 from coartic.analysis.statistics.estimates import LEVEL, interval
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Runs, other_tasks
@@ -99,16 +99,12 @@ def ranking(study: Study) -> Rows:
     yield from sorted(named, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
-@table(
-    "method, runs, gap[], best_trial, on *, instances, gap_in_general[], trials, movement_ticks, "
-    "solve_s"
-)
+@table("method, runs, gap[], on *, instances, gap_in_general[], trials, movement_ticks, solve_s")
 def variants(study: Study) -> Rows:
     """Every method with each of its settings: gap over single tasks and over random ones, and cost.
 
     The learner is one row: EC1 where a task has one arm, EC4 where it has two. What a run costs
-    is the mean over tasks. ``best_trial`` is the gap over single tasks of each run's best trial,
-    which need not be its solution; for a method that makes no trials, that of its solution.
+    is the mean over tasks.
     """
     labels_by_row: dict[str, dict[str, str]] = {}
     for task, label in study.cells:
@@ -125,8 +121,6 @@ def variants(study: Study) -> Rows:
         gap = scores.mean_gap(study, of_single)
         if len(of_single) == len(single) and gap is not None:
             row |= interval("gap", gap)
-            best = [best_trial_gaps(study, task, labels[task]) for task in single]
-            row["best_trial"] = np.mean([of_task.mean() for of_task in best])
         for task, label in of_single.items():
             row[f"on {task}"] = scores.run_gaps(study, task, label).mean()
         by_family: dict[str, list[Runs]] = {}
@@ -141,12 +135,6 @@ def variants(study: Study) -> Rows:
         costs = scores.scores(study).loc[list(labels.items())]
         row |= {cost: costs[cost].mean() for cost in ("trials", "movement_ticks", "solve_s")}
         yield name, row | {"runs": sum(len(cell.runs) for cell in cells)} | runs_of(*cells)
-
-
-def best_trial_gaps(study: Study, task: str, label: str) -> Array:
-    """Gap of the best trial of each run of a cell whose runs have a solution, shape ``(n,)``."""
-    best = [run.rewards[-1] for run in steps_of(study, study.cells[task, label])]
-    return gap_share(best, scores.initial_and_optimum(study)[task][1])
 
 
 @table(

@@ -1,0 +1,89 @@
+"""Environments of :mod:`coartic.gym` for Stable-Baselines3, which has to be installed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from coartic.motion.initial import corrective_trial, initial_hands
+from coartic.optimisers import FAILED
+from coartic.robot import Array
+
+
+class RobotEnvs(VecEnv):
+    """A vector environment of :mod:`coartic.gym` for Stable-Baselines3.
+
+    Actions are clipped to the box. A trial that has ended begins anew in the same step;
+    ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
+    ticks. Rewards are ticks as a share of what the corrective process takes for the whole trial
+    with the task's initial hands: all rewards of a trial that is like it add up to -1. No step
+    loses more than 2, such as one in which the corrective process fails.
+
+    Parameters
+    ----------
+    envs : coartic.gym.TaskVectorEnv
+        The environment, of the mode ``"SameStep"``.
+    """
+
+    def __init__(self, envs: Any) -> None:
+        self.render_mode = envs.render_mode
+        self._envs, self._lost = envs, np.zeros(envs.num_envs)
+        self._steps = np.zeros(envs.num_envs, dtype=np.int64)
+        self._costs: dict[int, float] = {}
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin all trials."""
+        seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
+        self._reset_seeds()
+        self._lost[:], self._steps[:] = 0, 0
+        observations: NDArray[np.float32] = self._envs.reset(seed=seeds)[0]
+        return observations
+
+    def step_async(self, actions: Array) -> None:
+        """Take the actions of the next subtask."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
+        """Make the next subtask of all trials."""
+        costs = np.array([self._cost(task) for task in self._envs.arms.rows["task"].tolist()])
+        observations, rewards, ended, _, seen = self._envs.step(self._actions)
+        self._lost += rewards
+        self._steps += 1
+        infos: list[dict[str, Any]] = [{} for _ in costs]
+        for row in np.flatnonzero(ended):
+            episode = {"r": float(self._lost[row]), "l": int(self._steps[row]), "t": 0}
+            infos[row] = {"terminal_observation": seen["final_obs"][row], "episode": episode}
+        self._lost[ended], self._steps[ended] = 0, 0
+        return observations, np.maximum(rewards / costs, -2.0).astype(np.float32), ended, infos
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute, once for each environment."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: all environments are one object, so that none can have its own value."""
+        raise NotImplementedError("the environments have no attributes of their own")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
+        """Refused: all environments are one object, so that none can be asked alone."""
+        raise NotImplementedError("the environments have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Whether each is wrapped: none is."""
+        return [False] * self.num_envs
+
+    def _cost(self, place: int) -> float:
+        """Ticks of the corrective process alone on a task, or of a failure."""
+        if place not in self._costs:
+            arms = self._envs.arms
+            hands = initial_hands(arms.tasks[place], model=arms.model)
+            reward = corrective_trial(arms.tasks[place], hands, model=arms.model).reward
+            self._costs[place] = float(FAILED if reward is None else -reward)
+        return self._costs[place]
