@@ -16,10 +16,11 @@ from typing import Any, get_args
 
 import jinja2
 import pandas as pd
+from scipy import stats
 
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
-from coartic.analysis.statistics.hypotheses import bootstrap_test, independence_test
+from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES
 from coartic.analysis.words import in_brackets, listed, number, p_value
 
@@ -87,10 +88,9 @@ def claim(name: str, suite: str = "") -> Row:
 
 
 def verdicts(suite: str = "", *, others: bool = False) -> dict[str, int]:
-    """How many of the claims that count have each verdict; ``others``: without the three that carry
-    the paper's point."""
+    """How many claims have each verdict; ``others``: without the three that carry the paper's
+    point."""
     judged = claims(suite)
-    judged = judged[judged.uncounted.isna()]
     if others:
         judged = judged[[not CLAIMS[name].short for name in judged.index]]
     counts = judged.verdict.value_counts()
@@ -115,7 +115,7 @@ def interval(values: Row, column: str, digits: int = 1, scale: float = 1.0) -> s
 def p_of_shares(values: Row, printed_runs: int) -> float:
     """p of Fisher's exact test that runs learn a hand sequence as often as printed ones."""
     counts = (values.published_runs, printed_runs), (values.runs, values.of_runs)
-    return independence_test(*([int(n), int(of - n)] for n, of in counts)).p
+    return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
 def p_above(values: pd.Series, bound: float) -> float:

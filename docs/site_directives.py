@@ -214,14 +214,7 @@ def claims() -> Iterator[str]:
 
     def rule(claim: Any) -> str:
         text = words_of_test(claim)
-        before = f"Power, stated before suite `{claim.suite}` was run: "
-        before = "" if claim.power.startswith("Written after") else before
-        power = f" {before}{claim.power}."
-        return (
-            f"{text[0].upper()}{text[1:]}."
-            + (f" **Not counted:** {claim.uncounted}." if claim.uncounted else "")
-            + (power if claim.power else "")
-        )
+        return f"{text[0].upper()}{text[1:]}."
 
     rows = (
         (f"[{c.statement}]{{#{c.id}}} <br>`{c.id}`", goals(c), source(c), rule(c))

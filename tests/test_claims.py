@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from coartic import corrective_trial, load_task, trajectory
 from coartic.analysis.claims import judge
@@ -26,7 +25,7 @@ from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
-from tests.support.strategies import AS_RELEASED, changed
+from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, run_and_write
 
 NAN = float("nan")
@@ -95,7 +94,7 @@ def judged(monkeypatch):
     ],
 )
 def test_verdicts(finding, verdict, judged):
-    (entry,) = judged((finding, {"uncounted": "a verdict as well, where it does not count"}))
+    (entry,) = judged((finding, {}))
     assert entry.verdict == verdict
 
 
@@ -123,10 +122,9 @@ def test_what_our_runs_show_may_depend_on_the_goals(finding, verdict, judged):
     assert entry.verdict != "depends on the goals"
 
 
-def test_claims_that_say_nothing_of_the_model_are_not_counted(judged):
+def test_claims_are_counted_by_verdict(judged):
     entries = judged(
         (found(True, 0.001), {"short": "it is so"}),
-        (found(True, 0.001), {"short": "flawed", "uncounted": "flawed"}),
         (found(False, 0.999), {}),
         (found(True, 0.2), {"short": "it may be so"}),
         (None, {}),
@@ -137,7 +135,7 @@ def test_claims_that_say_nothing_of_the_model_are_not_counted(judged):
     assert sentences.central_claims(entries) == central
     others = sentences.counts_of_others(entries)
     assert sentences.in_numbers(others) == "0 are supported, 1 is not, 1 is undecided"
-    assert sentences.mostly_undecided(entries)  # two of four that count
+    assert sentences.mostly_undecided(entries)  # two of four
     assert not sentences.mostly_undecided(entries[:-1])
 
 
@@ -171,13 +169,12 @@ def test_groups_are_corrected_apart(judged):
         "beside": {"beside": True},
         "families": {"families": True, "beside": True},
         "ours": {"place": ""},
-        "flawed": {"place": "", "uncounted": "flawed", "beside": True},
     }
     others = [(found(True, 0.0001), fields) for fields in groups.values() for _ in range(4)]
     entries = judged(*papers, *others)
     adjusted = [entry.adjusted_p for entry in entries]
     assert adjusted[:2] == pytest.approx([0.04, 0.003])
-    assert adjusted[3:] == pytest.approx([0.0004] * 16)
+    assert adjusted[3:] == pytest.approx([0.0004] * 12)
     assert [entry.claim.group for entry in entries[3::4]] == list(groups)
 
 
@@ -242,23 +239,14 @@ def on_1(condition, rewards, hands="LRLR"):
     return learner(T1, condition, rewards, hands)
 
 
-def on_2(condition, rewards, hands):
-    return learner(T2, condition, rewards, hands, -357)
+def on_2(condition, rewards, hands, **more):
+    return learner(T2, condition, rewards, hands, -357, **more)
 
 
 @pytest.mark.parametrize(
     ("claim", "rows", "verdict"),
     [
-        # Means, against a number.
-        ("ec3-beats-exhaustive", on_1("EC3", MIDDLE), "supported"),
-        ("ec3-beats-exhaustive", on_1("EC3", LOW), "not supported"),
-        ("ec3-beats-exhaustive", on_1("EC3", [-533, -600, -470]), "undecided"),
-        ("ec2-improves", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-improves", on_1("EC2", MIDDLE + BELOW, RRLR), "not supported"),
-        # Against other runs, all of several comparisons, runs with certain hands.
-        ("ec4-beats-ec3", on_1("EC3", MIDDLE) + on_1("EC4", HIGH), "supported"),
-        ("ec4-beats-ec3", on_1("EC3", HIGH) + on_1("EC4", MIDDLE), "not supported"),
-        ("ec4-beats-ec3", on_1("EC3", MIDDLE) + on_1("EC4", MIDDLE[::-1]), "undecided"),
+        # Means, all of several comparisons.
         ("proficiency-rises", on_1("EC2", LOW) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
         ("proficiency-rises", on_1("EC2", HIGH) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
@@ -267,22 +255,6 @@ def on_2(condition, rewards, hands):
          + on_2("EC1", WORSE, "RRRR") + on_2("EC3", BETTER, "RRRR"), "supported"),
         ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
          + on_2("EC1", BETTER, "RRRR") + on_2("EC3", WORSE, "RRRR"), "not supported"),
-        ("rlrr-better", on_2("EC3", BETTER + WORSE, MIXED), "supported"),
-        ("rlrr-better", on_2("EC3", WORSE + BETTER, MIXED), "not supported"),
-        ("ec2-rrlr-better", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-rrlr-better", on_1("EC2", LOW, "RRRR"), "undecided"),
-        # Better than all runs of EC2 together, but not than those with RRLR.
-        ("ec3-better-than-ec2", on_1("EC2", HIGH + LOW, RRLR) + on_1("EC3", MIDDLE),
-         "not supported"),
-        # More than three quarters: 19 of 20 has p = 0.024, 18 has 0.09; fewer: 11 has 0.041.
-        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(19)), "supported"),
-        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(18)), "undecided"),
-        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(12)), "undecided"),
-        ("ec3-alternates", on_1("EC3", TWENTY, lrlr(11)), "not supported"),
-        ("ec4-keeps-lrlr", on_1("EC4", TWENTY, lrlr(19)), "supported"),
-        ("ec2-unreliable", on_1("EC2", MIDDLE + LOW, RRLR), "supported"),
-        ("ec2-unreliable", on_1("EC2", MIDDLE * 3, "RRLR"), "not supported"),
-        ("ec2-unreliable", on_1("EC2", MIDDLE, "RRLR"), "undecided"),
         # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
         ("ec2-sequences", on_1("EC2", MIDDLE * 5, ["RRLR", "LRLR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
@@ -290,21 +262,9 @@ def on_2(condition, rewards, hands):
         ("half-choose-rlrr", on_2("EC3", WORSE, ["RLRR"] + ["RRRR"] * 7), "undecided"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 12 + ["RRRR"] * 28), "undecided"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36), "not supported"),
-        # Exact: a majority, one run.
-        ("ec3-as-exhaustive", on_1("EC3", TWENTY, lrlr(11)), "supported"),
-        ("ec3-as-exhaustive", on_1("EC3", TWENTY, lrlr(10)), "not supported"),
-        ("ec3-departs", on_2("EC3", BETTER, "RLRR"), "not supported"),  # a tie
-        ("ec3-departs", on_2("EC3", BETTER, ["RLLR"] + ["RRRR"] * 7), "supported"),
+        # Exact: one run.
         ("ec4-mixed", on_2("EC4", WORSE + BETTER, MIXED), "supported"),
         ("ec4-mixed", on_2("EC4", WORSE, "RLRR"), "not supported"),
-        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
-         + on_2("EC3", WORSE, ["RRRR"] * 7 + ["RLRR"]), "supported"),
-        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
-         + on_2("EC3", WORSE, "RRRR"), "undecided"),
-        ("sequences-change", on_1("EC2", LOW, "RRRR") + on_1("EC3", MIDDLE)
-         + on_2("EC3", WORSE * 4, "RRRR"), "not supported"),
-        ("sequences-change", on_1("EC2", LOW * 4, "RRRR") + on_1("EC3", MIDDLE * 4, "RRRR")
-         + on_2("EC3", BETTER, "RLRR"), "not supported"),
     ],
 )  # fmt: skip
 def test_judges_on_planted_runs(claim, rows, verdict):
@@ -402,68 +362,23 @@ def seven(replays):
 
 
 @pytest.mark.parametrize(
-    ("replays", "verdict"),
-    [
-        ([9, 10, 11, 12], "supported"),
-        ([-9, -10, -11, -12], "not supported"),
-        ([-9, 10, -11, 12], "undecided"),
-    ],
-)
-def test_learning_that_does_not_last_is_not_supported(replays, verdict):
-    """The best of all trials is never below the first; what is kept may be."""
-    study = planted_study(seven(replays))
-    for which in ("one", "two"):
-        assert verdict_of(f"learning-improves-{which}-armed", study).verdict == verdict
-
-
-@pytest.mark.parametrize(
     ("rows", "words"),
     [
         (
-            learner(T1, "EC3", MIDDLE, trials=3000),
+            on_2("EC3", WORSE, "RLRR", trials=3000),
             "Not judged: the paper's runs have 10000 trials",
         ),
-        (learner(T1, "EC3", MIDDLE[:2]), "fewer than 3 runs"),
+        (on_2("EC3", WORSE[:2], "RLRR"), "fewer than 3 runs"),
         (
-            learner(T1, "EC3", MIDDLE)[:-1] + learner(T1, "EC3", MIDDLE, status="crashed")[-1:],
-            "Not judged: 1 of 8 runs of dual-process/EC3 on two-armed-1 failed",
+            on_2("EC3", WORSE, "RLRR")[:-1] + on_2("EC3", WORSE, "RLRR", status="crashed")[-1:],
+            "Not judged: 1 of 8 runs of dual-process/EC3 on two-armed-2 failed",
         ),
     ],
 )
 def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words):
-    judged = verdict_of("ec3-alternates", planted_study(rows))
+    judged = verdict_of("half-choose-rlrr", planted_study(rows))
     assert judged.verdict == "undecided"
     assert words in judged.evidence
-
-
-@pytest.mark.parametrize(
-    ("claim", "task", "rewards", "verdict"),
-    [
-        ("right-hand-better", T1, {"RRRR": -671, "LLLL": -727}, "supported"),
-        ("right-hand-better", T1, {"RRRR": -727, "LLLL": -671}, "not supported"),
-        ("right-hand-better", T1, {"RRRR": -727}, "undecided"),
-        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -360}, "supported"),
-        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -357}, "undecided"),
-        ("best-is-rrrr", T2, {"RRRR": -357, "RLRR": -350}, "not supported"),
-        ("ec3-departs", T2, {"RRRR": -350, "LLLL": -360}, "not supported"),
-    ],
-)
-def test_judges_on_planted_sequences(claim, task, rewards, verdict):
-    rows = learner(task, "EC3", MIDDLE, "RRRR")
-    study = planted_study(rows, {task: rewards})
-    assert verdict_of(claim, study).verdict == verdict
-
-
-def test_the_base_reverses_where_goals_lie_back_and_forth():
-    rows = learner(T1, "EC3", MIDDLE)
-    judged = verdict_of("initial-base-reverses", planted_study(rows))
-    assert judged.verdict == "supported"
-    assert judged.entry.verdict == "supported"
-    assert judged.entry.claim.uncounted  # our goals were chosen so
-    assert judged.run_ids == ()
-    forth = changed(T1, goals=[[4.0, 2.0], [6.0, 2.0], [8.0, 2.0], [10.0, 2.0]])
-    study = planted_study(rows, tasks=[forth])
-    assert verdict_of("initial-base-reverses", study).verdict == "not supported"
 
 
 def test_corrections_early_and_late():
@@ -827,7 +742,7 @@ def test_the_register_on_runs(study):
     # Claims on printed tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
     read = {name: {task_of[run] for run in each.run_ids} for name, each in entries.items()}
-    assert sum(map(bool, read.values())) > 20
+    assert sum(map(bool, read.values())) > 10
     for name, tasks in read.items():
         assert not tasks or bool(tasks & {T1, T2}) == CLAIMS[name].fitted, name
 
@@ -851,17 +766,6 @@ def test_the_rail_makes_the_sequence(free, verdict):
     )
     judged = verdict_of("rail", planted_study(rows, tasks=[free_base]))
     assert judged.verdict == verdict, judged.evidence
-
-
-def test_the_papers_own_p_values():
-    """RLRR above RRRR is printed with p < .01; Welch's test on what is printed gives 0.053."""
-    judged = verdict_of("printed-p-values", nothing())
-    assert judged.verdict == "not supported"
-    a, b = (-350, 4.2, 9), (-352.7, 2.1, 11)
-    p = stats.ttest_ind_from_stats(*a, *b, equal_var=False, alternative="greater").pvalue
-    assert f"EC3-RLRR-above-RRRR p = {p:.2g} (" in judged.evidence
-    assert f"{p:.2g}" == "0.053"
-    assert not judged.entry.claim.fitted
 
 
 def test_every_sentence_is_accounted_for():
@@ -897,4 +801,3 @@ def test_sets_of_goals_are_as_counted():
         assert claim.sets == "; ".join(words)
         assert claim.depends == any(2 * rows.supported <= rows.members)
         assert claim.fitted >= bool(claim.sets)
-    assert not {"right-hand-better", "initial-base-reverses", "best-is-rrrr"} & set(counted.claim)

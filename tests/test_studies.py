@@ -35,14 +35,6 @@ CLAIMS = {
 }
 
 
-FLAWED = {
-    "first-goal-ahead-gains-most": CLAIMS["first"],
-    "further-goals-gain-little": CLAIMS["further"],
-    "dear-joints-keep-the-horizon": CLAIMS["dear"],
-}
-"""Claims that take goals that do not exist for goals that gain nothing, with what corrects them."""
-
-
 @cache
 def tasks_of(stream, family="long"):
     return [load_task(f"{family}/v1/{stream}{k:03d}") for k in range(8)]
@@ -84,7 +76,7 @@ def planted(*, stream="i", plain=FALLING, given=FALLING, dear=FALLING, learner=2
 def verdicts(study):
     entries = judgements(study)
     assert {entry.claim.suite for entry in entries} == {study.suite}
-    return {entry.claim.id: entry.verdict for entry in entries if not entry.claim.uncounted}
+    return {entry.claim.id: entry.verdict for entry in entries}
 
 
 def evidence(study):
@@ -97,8 +89,6 @@ def test_claims_hold_where_they_were_planted():
     seen = evidence(study)
     sentence = r"The first goal ahead gains [\d.]+ \[.*\] points more than all others together \("
     assert re.match(sentence, seen[CLAIMS["first"]])
-    for flawed, corrected in FLAWED.items():  # all tasks have all goals
-        assert seen[flawed] == seen[corrected]
 
 
 @pytest.mark.parametrize(
@@ -153,8 +143,6 @@ def test_a_goal_ahead_is_judged_on_tasks_that_have_it():
     assert "goals 2 h=2" not in table.index
     seen = evidence(study)
     assert f"the fourth gains {fourth:.2f}" in seen[CLAIMS["further"]]
-    diluted = (8 * 3 + four * 8) / everyone
-    assert f"the fourth gains {diluted:.2f}" in seen["further-goals-gain-little"]
     first = (8 * (6 - 24) + (three + four) * (6 - 24)) / (more + three)
     assert f"gains −{-first:.2f}" in seen[CLAIMS["first"]]
     beyond = seen[CLAIMS["dear"]].split("; ")[1]

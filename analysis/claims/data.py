@@ -64,7 +64,7 @@ class Measurement:
 
     task: str
     who: str
-    """Whose they are: ``EC2 RRLR``, ``replay of EC1``, ``initial``, ``random guesses``."""
+    """Whose they are: ``EC2``, ``replay of EC1``, ``initial``, ``random guesses``."""
     numbers: Array
     """Shape ``(runs,)``; ``()`` of one number, which is exact."""
     quantity: str = ""
@@ -132,10 +132,6 @@ class LearnedHands:
         """How many runs learned one of some sequences, which the evidence calls ``name``."""
         return self.count(name, [hands in sequences for hands in self.sequences])
 
-    def are_not(self, *sequences: str, name: str) -> RunCount:
-        """How many runs learned none of them."""
-        return self.count(f"not {name}", [hands not in sequences for hands in self.sequences])
-
 
 @dataclass
 class Data:
@@ -156,8 +152,8 @@ class Data:
             raise MissingError(f"this folder has no task {name}")
         return self.study.tasks[name]
 
-    def runs(self, task: str, label: str, hands: str = "") -> pd.DataFrame:
-        """Solved runs of a method, of ``hands`` only those that learned that sequence."""
+    def runs(self, task: str, label: str) -> pd.DataFrame:
+        """Solved runs of a method."""
         cell = self.study.cells.get((task, label))
         if cell is None or not len(cell.runs):
             raise MissingError(f"this folder has no runs of {label} on {task}")
@@ -168,7 +164,7 @@ class Data:
                 f"{failed} of {len(cell.runs)} runs of {label} on {task} failed, so "
                 "the mean of the others would mislead"
             )
-        runs = cell.good[cell.good.hands == hands] if hands else cell.good
+        runs = cell.good
         if label.startswith((LEARNER, PLACEBO)):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
@@ -177,8 +173,7 @@ class Data:
                     f"{', '.join(map(str, trials))}"
                 )
             if len(runs) < FEWEST:
-                learned = f" learned {hands}" if hands else ""
-                raise MissingError(f"fewer than {FEWEST} runs of {label} on {task}{learned}")
+                raise MissingError(f"fewer than {FEWEST} runs of {label} on {task}")
         self.run_ids.extend(runs.run_id)
         return runs
 
@@ -192,22 +187,22 @@ class Data:
         learned = tuple(map(str, self.runs(task, label).hands))
         return LearnedHands(task, who_is(label), learned)
 
-    def reward(self, task: str, label: str, hands: str = "") -> Measurement:
+    def reward(self, task: str, label: str) -> Measurement:
         """Rewards of the best trials; of a method that draws nothing its one reward."""
-        rewards = self.runs(task, label, hands).reward.to_numpy(dtype=np.float64)
+        rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         method = self.study.cells[task, label].method
         if not self.study.plan.methods[method].stochastic:
             rewards = np.array(rewards.mean())
-        return self._of(task, label, rewards, "reward", hands=hands)
+        return self._of(task, label, rewards, "reward")
 
-    def replay(self, task: str, label: str, hands: str = "") -> Measurement:
+    def replay(self, task: str, label: str) -> Measurement:
         """Rewards of noiseless replays after learning.
 
         The learned reward is that of the best trial, which is never below trial 0's.
         """
-        runs = self.runs(task, label, hands)
+        runs = self.runs(task, label)
         rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
-        return self._of(task, label, rewards, "replay", hands=hands)
+        return self._of(task, label, rewards, "replay")
 
     def initial(self, task: str) -> Measurement:
         """Reward of a task's initial solution."""
@@ -276,14 +271,14 @@ class Data:
         )  # fmt: skip
 
     def _of(
-        self, task: str, label: str, values: Array, name: str, quantity: str = "", hands: str = ""
+        self, task: str, label: str, values: Array, name: str, quantity: str = ""
     ) -> Measurement:
         """What is measured of runs of a method."""
         if values.ndim and (not len(values) or not np.isfinite(values).all()):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         replay = "replay of" * (name == "replay")
-        who = " ".join(filter(None, (replay, who_is(label), hands)))
-        printed = "" if quantity else printed_reward(task, label, hands)
+        who = " ".join(filter(None, (replay, who_is(label))))
+        printed = "" if quantity else printed_reward(task, label)
         return Measurement(task, who, values, quantity, printed)
 
     def initial_execution(self, task: str) -> Execution:
@@ -319,8 +314,8 @@ def who_is(label: str) -> str:
     return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
 
 
-def printed_reward(task: str, label: str, hands: str) -> str:
+def printed_reward(task: str, label: str) -> str:
     """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
     cell = published_cell(task, label.removeprefix(LEARNER))
-    summary = cell and (cell.sequences.get(hands) if hands else cell.summary)
+    summary = cell and cell.summary
     return summary.in_words if summary else ""

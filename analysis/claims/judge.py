@@ -8,14 +8,10 @@
   that the paper's text admits support it.
 - *Undecided*: none of these, or the folder lacks the runs.
 
-A claim that is not about the model, that follows from what chose our goals or constants, or whose
-rule is flawed has a verdict as well, but does not count (``uncounted``).
-
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
 groups of claims: those on the paper's own seven cells, those that take other runs beside them,
-those on families of random tasks, our own on one suite, and flawed ones of our own on one. A claim
-that a folder cannot test counts in its group all the same, so that what is decided stays decided
-whatever else is run.
+those on families of random tasks, and our own on one suite. A claim that a folder cannot test
+counts in its group all the same, so that what is decided stays decided whatever else is run.
 """
 
 from __future__ import annotations
@@ -104,6 +100,6 @@ def judge_alone(claim: Claim, data: Data) -> Judgement:
 
 
 def counts(entries: Iterable[Judgement]) -> Mapping[Verdict, int]:
-    """How many of the claims that count have each verdict; 0 for those that none has."""
-    found = Counter(entry.verdict for entry in entries if not entry.claim.uncounted)
+    """How many claims have each verdict; 0 for those that none has."""
+    found = Counter(entry.verdict for entry in entries)
     return {verdict: found[verdict] for verdict in get_args(Verdict)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -17,9 +17,9 @@ HISTORY: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
-Group = Literal["paper", "beside", "families", "ours", "flawed"]
+Group = Literal["paper", "beside", "families", "ours"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; claims of our own, those on one suite, and those that are flawed apart."""
+families of random tasks; claims of our own, those on one suite."""
 
 
 @dataclass(frozen=True)
@@ -81,17 +81,10 @@ class Claim(FileData):
     families: bool = False
     short: str = ""
     """In a few words, for the three claims that carry the paper's point."""
-    uncounted: str = ""
-    """Why its verdict does not count for or against the model; empty where it does."""
     suite: str = ""
-    power: str = ""
     place: str = ""
     quote: str = ""
     figure: str = ""
-    rule: str = ""
-    """Name of its rule, of a claim that no function is registered for."""
-    test: str = ""
-    cells: Mapping[str, Sequence[str]] = {}
 
     @property
     def on_random_tasks(self) -> bool:
@@ -104,7 +97,7 @@ class Claim(FileData):
         if self.exact:
             return None
         if not self.place:
-            return "flawed" if self.uncounted else "ours"
+            return "ours"
         if self.families:
             return "families"
         return "beside" if self.beside else "paper"

@@ -33,8 +33,6 @@ TEST_OF_FAMILIES = (
     "one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
     "known reward, in each family"
 )
-TEST_OF_MOST = "exact binomial test that more than {most:.0%} of the runs do"
-TEST_OF_NOT_MOST = "exact binomial test that fewer than {most:.0%} of the runs do"
 TEST_OF_HALF = (
     "exact binomial tests that more than {few:.0%} and fewer than {most:.0%} of all runs do; for "
     "the opposite: the share lies outside, and Fisher's exact test tells the counts from the "
@@ -189,16 +187,6 @@ def not_most(count: RunCount) -> Finding:
     return beyond(count, MARGINS["most"], "less")
 
 
-def majority(count: RunCount) -> Finding:
-    """Whether more than half of the runs do something, counted exactly."""
-    return replace(beyond(count, MARGINS["majority"], "greater"), tests=(), against=None)
-
-
-def some(count: RunCount) -> Finding:
-    """Whether a run does something, counted exactly."""
-    return Finding(count.number > 0, count.words)
-
-
 def beyond(count: RunCount, bound: float, side: Literal["greater", "less"]) -> Finding:
     """Whether the share of runs lies on one side of a bound, by an exact binomial test."""
     runs = count.number, count.total
@@ -210,16 +198,6 @@ def beyond(count: RunCount, bound: float, side: Literal["greater", "less"]) -> F
     words = count.words + limit * bool(limits.low > 0 or limits.high < 1)
     test, against = (share_test(*runs, bound, tail) for tail in (side, OPPOSITE[side]))
     return Finding(holds, words, (test,), (against,))
-
-
-def both_of(*findings: Finding) -> Finding:
-    """Whether several things hold, each by exact tests."""
-    return Finding(
-        all(each.holds for each in findings),
-        "; ".join(each.evidence for each in findings),
-        tuple(test for each in findings for test in each.tests),
-        tuple(test for each in findings for test in each.against or ()),
-    )
 
 
 def about_half(learned: LearnedHands, hands: str) -> Finding:

@@ -199,7 +199,7 @@ def title(study: Study) -> str:
 
 
 def claims_for_page(study: Study) -> list[dict[str, str]]:
-    """Claims as the template wants them: by verdict, and first those that count."""
+    """Claims as the template wants them, by verdict."""
     order = get_args(Verdict)
     rows = TABLES["claims"](study).reset_index(names="id")
     entries = claims_shown(study)
@@ -209,15 +209,12 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
         {
             **{
                 key: str(row[key])
-                for key in ("id", "statement", "verdict", "uncounted", "evidence", "test", "quote")
+                for key in ("id", "statement", "verdict", "evidence", "test", "quote")
             },
             "tone": TONES[row["verdict"]],
             "place": ", ".join(filter(None, (row["place"], CLAIMS[row["id"]].figure))),
             "sets": row["sets"] or NONE,
             "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }
-        for row in sorted(
-            rows.to_dict("records"),
-            key=lambda row: (bool(row["uncounted"]), order.index(row["verdict"])),
-        )
+        for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["verdict"]))
     ]

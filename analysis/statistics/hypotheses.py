@@ -122,48 +122,6 @@ def share_test(count: int, total: int, share: float, alternative: Alternative) -
     return Estimate(count / total - share, p=p, n=(total,))
 
 
-def independence_test(
-    first: Sequence[int], second: Sequence[int], *, most_tables: int = 1_000_000
-) -> Estimate:
-    """Fisher's exact test that two rows of counts share one distribution over categories.
-
-    Freeman & Halton (1951), Biometrika 38, 141: p is the probability, given the margins, of all
-    tables that are no likelier than the one seen, by enumeration in integers where there are no
-    more than ``most_tables``, else of those that are drawn. (Of more than two columns scipy
-    draws them always.) The estimate is the total variation distance of the two shares, 0 to 1.
-    Raises ValueError for rows of different length, or one without counts.
-    """
-    rows = np.array([first, second])
-    n, m = rows.sum(axis=1).tolist()
-    if min(n, m) < 1:
-        raise ValueError("a row has no counts")
-    apart = float(np.abs(rows[0] / n - rows[1] / m).sum() / 2)
-    pairs = zip(rows.sum(axis=0).tolist(), rows[0].tolist(), strict=True)
-    *columns, (last, of_first) = sorted(pairs)
-    if math.prod(count + 1 for count, _ in columns) > most_tables:
-        from scipy import stats  # as in estimates
-
-        method = stats.MonteCarloMethod(rng=np.random.default_rng(SEED))
-        p = float(stats.fisher_exact(rows, method=method).pvalue)
-        return Estimate(apart, p=p, n=(n, m))
-    # Ways to choose the first row's runs, by how many it has of the columns so far.
-    ways, seen = {0: [1]}, math.comb(last, of_first)
-    for count, in_first in columns:
-        seen *= math.comb(count, in_first)
-        so_far, ways = ways, {}
-        for used, products in so_far.items():
-            for k in range(min(count, n - used) + 1):
-                factor = math.comb(count, k)
-                ways.setdefault(used + k, []).extend(factor * product for product in products)
-    extreme = sum(
-        product * math.comb(last, n - used)
-        for used, products in ways.items()
-        for product in products
-        if product * math.comb(last, n - used) <= seen
-    )
-    return Estimate(apart, p=extreme / math.comb(n + m, n), n=(n, m))
-
-
 def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     """Adjusted p-values of a family of tests (Holm 1979), in the order given.
 

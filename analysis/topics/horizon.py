@@ -22,7 +22,6 @@ from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.words import interval_in_words, plural
 from coartic.motion.costs import joint_costs, segment_lengths
-from coartic.tasks.task import MOST_GOALS
 
 ALL_GOALS = "all"
 HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
@@ -255,23 +254,15 @@ def finding_of_horizon(study: Study) -> str:
     return sentence
 
 
-def gaps_of(
-    data: Data, hands: str = "planned", costs: str = "none", *, flawed: bool = False
-) -> pd.DataFrame:
-    """Gaps by horizon on the tasks that methods were not tuned on, indexed by task.
-
-    ``flawed``: as claims take them that do not count, goals that a task does not have gain nothing.
-    """
+def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataFrame:
+    """Gaps by horizon on the tasks that methods were not tuned on, indexed by task."""
     gaps = gaps_by_horizon(data.study).query("hands == @hands and costs == @costs")
     gaps = gaps.droplevel(["hands", "costs"])
     gaps = gaps.loc[[name for name in gaps.index if data.task(name).split != "development"]]
     runs = data.study.runs
     planned = runs[(runs.method == random_tasks.RECEDING_HORIZON) & runs.task.isin(gaps.index)]
     data.run_ids.extend(planned.run_id)
-    if not flawed:
-        return gaps
-    there = {h: gaps[h].where(gaps.ahead >= h, gaps[ALL_GOALS]) for h in HORIZONS[:-1]}
-    return pd.DataFrame({**gaps, **there, "ahead": MOST_GOALS})
+    return gaps
 
 
 @judges(
@@ -279,15 +270,9 @@ def gaps_of(
     test="one-tailed bootstrap test over random tasks with three goals or more: the gap of the "
     "planner falls by more from no goal ahead to one than from one to all",
 )
-@judges(
-    "first-goal-ahead-gains-most",
-    test="one-tailed bootstrap test over random tasks: the gap of the planner falls by more from "
-    "no goal ahead to one than from one to all",
-    flawed=True,
-)
-def first_goal_gains_most(data: Data, *, flawed: bool = False) -> Finding:
+def first_goal_gains_most(data: Data) -> Finding:
     """Gain of the first goal ahead less that of all further ones."""
-    gaps = gaps_of(data, flawed=flawed)
+    gaps = gaps_of(data)
     more = (gaps[0] - gaps[1]) - (gaps[1] - gaps[ALL_GOALS])
     sentence = "The first goal ahead gains {} points more than all others together"
     return random_tasks.means_over_tasks({sentence: (more.where(gaps.ahead > 1), 0.0, 1)})
@@ -299,15 +284,9 @@ def first_goal_gains_most(data: Data, *, flawed: bool = False) -> Finding:
     "planner falls by more than {gain:g} % on tasks with three goals or more, and from three to "
     "four by less on those with five or more",
 )
-@judges(
-    "further-goals-gain-little",
-    test="one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of the "
-    "planner falls by more than {gain:g} %, and from three to four by less",
-    flawed=True,
-)
-def further_goals_gain_little(data: Data, *, flawed: bool = False) -> Finding:
+def further_goals_gain_little(data: Data) -> Finding:
     """Gains of the second and of the fourth goal ahead."""
-    gaps, least = gaps_of(data, flawed=flawed), MARGINS["gain"]
+    gaps, least = gaps_of(data), MARGINS["gain"]
     return random_tasks.means_over_tasks(
         {
             "The second goal ahead gains {} points": (gaps[1] - gaps[2], least, 1),
@@ -338,18 +317,11 @@ def most_of_the_loss_is_posture(data: Data) -> Finding:
     "executed: from one goal ahead to two the gap falls by more than {gain:g} % on tasks with "
     "four goals or six, and from four to all by less on those with six, with either dear",
 )
-@judges(
-    "dear-joints-keep-the-horizon",
-    test="one-tailed bootstrap tests over random tasks with four goals or six, of the weighted "
-    "path length that was executed: from one goal ahead to two the gap falls by more than "
-    "{gain:g} %, and from four to all by less, with either dear",
-    flawed=True,
-)
-def dear_joints_keep_the_horizon(data: Data, *, flawed: bool = False) -> Finding:
+def dear_joints_keep_the_horizon(data: Data) -> Finding:
     """Gains of the second goal ahead, and of those beyond the fourth, with dear joints."""
     parts, least = {}, MARGINS["gain"]
     for costs in ("base", "right-arm"):
-        gaps = gaps_of(data, costs=costs, flawed=flawed)
+        gaps = gaps_of(data, costs=costs)
         dear = f"with a dear {costs.replace('-', ' ')}"
         parts[f"{dear} the second goal ahead gains {{}} points"] = gaps[1] - gaps[2], least, 1
         beyond = (gaps[4] - gaps[ALL_GOALS]).where(gaps.ahead > 4)

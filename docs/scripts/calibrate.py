@@ -25,7 +25,6 @@ from coartic.analysis.statistics.equivalence import difference_to_printed
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
-    independence_test,
     share_test,
     sign_flip_test,
 )
@@ -83,7 +82,6 @@ def of_counts(rng: np.random.Generator, n: int) -> dict[str, bool]:
     return {
         "interval of a share (Wilson)": holds(estimates.wilson(first, n), SHARE),
         "test of a share (exact binomial)": share_test(first, n, SHARE, "greater").p <= LEVEL,
-        "test of counts (Fisher)": independence_test(*counts).p <= LEVEL,
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -23,7 +22,7 @@ from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_
 from coartic.analysis.statistics.hypotheses import (
     share_test,
 )
-from coartic.analysis.topics.paper.claims import ONE_ARMED, TASK_1, TASK_2, TWO_ARMED
+from coartic.analysis.topics.paper.claims import ONE_ARMED, TASK_1, TWO_ARMED
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import estimate, number
 from coartic.robot import HANDS, Array
@@ -179,18 +178,16 @@ def overall_reward_two_armed(data: Data) -> Finding:
     )
 
 
-SLOWER_HANDS = (
-    "one-tailed Fisher's exact tests: in one of the cells more than {few:.0%} of the runs, and "
-    "more than of the placebo's, hit a goal that others follow with a hand that is slower for that "
-    "goal alone and is not the initial solution's (smallest p times their number). For the "
-    "opposite: in each cell fewer than {few:.0%} of the runs do (exact binomial tests)"
+@judges(
+    "hand-coarticulation-task-1",
+    test="one-tailed Fisher's exact tests: in one of the cells more than {few:.0%} of the runs, "
+    "and more than of the placebo's, hit a goal that others follow with a hand that is slower for "
+    "that goal alone and is not the initial solution's (smallest p times their number). For the "
+    "opposite: in each cell fewer than {few:.0%} of the runs do (exact binomial tests)",
 )
-
-
-@judges("hand-coarticulation-task-1", test=SLOWER_HANDS, task=TASK_1, labels=(EC2, EC3))
-@judges("hand-coarticulation-task-2", test=SLOWER_HANDS, task=TASK_2, labels=(EC3, EC4))
-def slower_hands_are_chosen(data: Data, task: str, labels: Sequence[str]) -> Finding:
+def slower_hands_are_chosen(data: Data) -> Finding:
     """Whether more runs than of the placebo choose a hand that is slower for its goal alone."""
+    task, labels = TASK_1, (EC2, EC3)
     initial = data.initial_execution(task).hands
     chosen = {label: chosen_slower(data.cell(task, label), initial) for label in (*labels, PLACEBO)}
     of_placebo = chosen[PLACEBO] > 0

@@ -33,7 +33,7 @@ def claims_shown(study: Study) -> list[Judgement]:
 
 
 def mostly_undecided(entries: Iterable[Judgement]) -> bool:
-    """Whether half of the claims that count are undecided: they lack runs or trials."""
+    """Whether half of the claims are undecided: they lack runs or trials."""
     by_verdict = counts(entries)
     return 2 * by_verdict["undecided"] >= sum(by_verdict.values())
 
@@ -99,9 +99,6 @@ def finding_of_claims(study: Study) -> str:
         words += f" Of {sum(others.values())} others {in_numbers(others)}."
     else:
         words = f"Of {judged} claims {in_numbers(by_verdict)}."
-    uncounted = len(entries) - judged
-    if uncounted:
-        words += f" Another {uncounted} do not count; tables/claims.csv says why."
     return words
 
 
@@ -132,10 +129,10 @@ def answer_paper(study: Study) -> str:
 
 
 def central_claims(entries: Iterable[Judgement]) -> dict[Verdict, list[str]]:
-    """The claims that carry the paper's point and count, in a few words, by verdict."""
+    """The claims that carry the paper's point, in a few words, by verdict."""
     central: dict[Verdict, list[str]] = {}
     for entry in entries:
-        if entry.claim.short and not entry.claim.uncounted:
+        if entry.claim.short:
             central.setdefault(entry.verdict, []).append(entry.claim.short)
     return central
 

@@ -111,8 +111,7 @@ def named(study: Study, cell: CellRuns) -> Row:
 
 
 @table(
-    "statement, verdict, uncounted, evidence, test, p_holm, opposite_p_holm, sets, place, quote, "
-    "section",
+    "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote, section",
 )
 def claims(study: Study) -> Rows:
     """Claims with their verdicts: the paper's, and others, which say so."""
@@ -121,7 +120,6 @@ def claims(study: Study) -> Rows:
         row: Row = {
             "statement": claim.statement + " †" * claim.fitted,
             "verdict": entry.verdict,
-            "uncounted": claim.uncounted,
             "evidence": with_names(entry.finding.evidence, study),
             "test": words_of_test(claim),
             "p_holm": entry.adjusted_p,
