@@ -91,11 +91,6 @@ def postures(runs: tuple[Trajectory, ...], goal: int) -> Array:
     return np.array([run.execution.configurations[goal - 1] for run in runs])
 
 
-def last_ticks(runs: tuple[Trajectory, ...], goal: int, count: int) -> Array:
-    """The last control ticks of each run up to a hit, shape ``(runs, count, dof)``."""
-    return np.array([run.configurations[: run.hits[goal - 1] + 1][-count:] for run in runs])
-
-
 def best_sequences(sequences: pd.DataFrame) -> list[str]:
     """The hand sequences that are best by the corrective process alone, ties included.
 

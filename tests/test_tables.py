@@ -102,16 +102,6 @@ def test_ranking(study):
     assert table.gap_low[[PLAN, EC1, EC4]].isna().all()
 
 
-def test_variants(study):
-    costs = {"instances": 0, "movement_ticks": 5000, "solve_s": 0.25}
-    same(TABLES["variants"](study), {
-        BOTH: {"method": BOTH, "runs": 6, **gap_columns(LEARNED), "trials": 1000, **costs},
-        CMA: {"method": CMA, "runs": 6, **gap_columns(FOUND), "trials": 100, **costs},
-        PLAN: {"method": PLAN, "runs": 2, **gap_columns(PLANNED), "trials": 0, **costs,
-               "movement_ticks": 50},
-    })  # fmt: skip
-
-
 def test_methods(study):
     shown = ["runs", "solved", "reward", "reward_sd", "gap", "hands", "trials",
              "forward_kinematics", "told", "corrections", "other_arm"]  # fmt: skip
@@ -173,15 +163,15 @@ def test_learning(study):
 def test_contexts(study, monkeypatch):
     """Signatures of two goals that two methods share, each in its column; Holm by method."""
     names = ["context distance", "context dependence", "motor-equivalent part",
-             "non-motor-equivalent part", "lead time"]  # fmt: skip
+             "non-motor-equivalent part"]  # fmt: skip
     rows = [
         {"task": ONE, "label": label, "goal": goal, "hand": "right", "against": TWO, "moving": None,
-         "signature": name, "value": value, "n": n - (name == names[4]),
+         "signature": name, "value": value, "n": n - (name == names[3]),
          "p": p if name == names[1] else 0.9}
         for label, goal, n, p, values in (
-            (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3, 20.0)),
-            (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08, None)),
-            (PLAN, 1, 2, 0.04, (0.2, 2.0, 0.12, 0.16, 7.0)),
+            (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3)),
+            (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08)),
+            (PLAN, 1, 2, 0.04, (0.2, 2.0, 0.12, 0.16)),
         )
         for name, value in zip(names, values, strict=True)
     ]  # fmt: skip
@@ -189,11 +179,11 @@ def test_contexts(study, monkeypatch):
     beyond = {CMA: 0.5, PLAN: NONE}
     monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
     columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
-               "other", "lead"]  # fmt: skip
+               "other"]  # fmt: skip
     cells = {
-        f"{ONE} {CMA} goal 1 right": (CMA, 6, 0.5, 3.0, 0.02, 0.5, 0.4, 0.3, 20.0),
-        f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08, NONE),
-        f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16, 7.0),
+        f"{ONE} {CMA} goal 1 right": (CMA, 6, 0.5, 3.0, 0.02, 0.5, 0.4, 0.3),
+        f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08),
+        f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16),
     }
     unsolved = {key: Trajectories(study.tasks[key[0]], key[1], "", ()) for key in study.cells}
     frame = coarticulation.contexts(MadeUp(study, trajectories=made(unsolved)))

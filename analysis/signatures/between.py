@@ -38,11 +38,9 @@ class Place(NamedTuple):
     moving: int | None = None
     """Number of the goal that moves between tasks."""
     joint: str = ""
-    longest: int | None = None
-    """Ticks that a lead can have at most."""
 
     def __str__(self) -> str:
-        """In words: ``goal 1, right hand, against descending, of at most 141``."""
+        """In words: ``goal 1, right hand, against descending``."""
         parts = [] if self.goal is None else [f"goal {self.goal}"]
         if self.moving is not None:
             anticipatory = self.goal is None or self.goal < self.moving
@@ -51,7 +49,6 @@ class Place(NamedTuple):
         parts += [f"{self.hand} hand"] if self.hand else []
         parts += [f"against {self.against}"] if self.against else []
         parts += [self.joint] if self.joint else []
-        parts += [] if self.longest is None else [f"of at most {self.longest}"]
         return ", ".join(parts)
 
 
@@ -59,14 +56,12 @@ NOWHERE = Place()
 
 
 class Value(NamedTuple):
-    """A value of a signature, or why there is none."""
+    """A value of a signature."""
 
     place: Place = NOWHERE
     estimate: Estimate = Estimate(math.nan)
     n: int = 0
     """Runs that went into it."""
-    why_not: str = ""
-    """Why there is no value, interval or test."""
     unit: str | None = None
     """Where it is not that of the signature."""
 
@@ -124,11 +119,6 @@ class TwoContexts:
         return sum(map(len, self.runs))
 
     @property
-    def single(self) -> bool:
-        """Whether a context has one run, so that there is no test."""
-        return min(map(len, self.runs)) < 2
-
-    @property
     def apart(self) -> float:
         """Distance of the mean postures, length unit and rad."""
         return distance_of_means(*self.postures)
@@ -167,7 +157,7 @@ class TwoContexts:
 
         Each ``signature`` has draws of its own.
         """
-        return float(permutation_p(*self.postures, rng_of(signature, self.place), basis=basis))
+        return permutation_p(*self.postures, rng_of(signature, self.place), basis=basis)
 
     def p_beyond(self, placebo: TwoContexts) -> float:
         """P-value of the test that these runs lie further apart than a placebo's; NaN where a
@@ -175,9 +165,9 @@ class TwoContexts:
         rng = rng_of(f"beyond {placebo.method}", self.place)
         return beyond_p(self.postures, placebo.postures, rng)
 
-    def value(self, value: float, p: float = math.nan, why_not: str = "") -> Value:
+    def value(self, value: float, p: float = math.nan) -> Value:
         """A value of these contexts with its test."""
-        return Value(self.place, Estimate(value, p=p), self.n, why_not)
+        return Value(self.place, Estimate(value, p=p), self.n)
 
 
 @dataclass(frozen=True)

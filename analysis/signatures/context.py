@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import Task
-from coartic.analysis.statistics.estimates import LEVEL, RESAMPLES, centred, slices
+from coartic.analysis.statistics.estimates import RESAMPLES, centred, slices
 from coartic.robot import Array
 from coartic.tasks.optima import KEPT
 
@@ -96,32 +96,23 @@ def permutation_p(
     *,
     basis: Array | None = None,
     resamples: int = RESAMPLES,
-) -> Array:
+) -> float:
     """Probability of so large a distance between means if the context did nothing.
 
     One-sided permutation test over runs of :func:`distance_of_means`, with an orthonormal
     ``basis`` (dof, d) within its span; exact where all divisions of the runs are no more than
     ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN where a context has one run.
-
-    ``first`` and ``second`` have shape ``(runs, dof)``, or ``(runs, k, dof)`` for k ticks with a p
-    each, ``(k,)``: the same divisions at every tick.
+    ``first`` and ``second`` have shape ``(runs, dof)``.
     """
     if min(len(first), len(second)) < 2:
-        return np.full(first.shape[1:-1], math.nan)
+        return math.nan
     pool = centred(np.concatenate([first, second]))
     if basis is not None:
         pool = pool @ basis
     weights, exact = divisions(len(first), len(second), rng, resamples)
     observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
-    flat = pool.reshape(len(pool), -1)
-
-    def distances(rows: Array) -> Array:
-        means = (rows @ flat).reshape(*rows.shape[:-1], *pool.shape[1:])
-        lengths: Array = np.linalg.norm(means, axis=-1)
-        return lengths
-
-    null = np.concatenate([distances(block) for block in weights])
-    return p_values(null, distances(observed), exact=exact)
+    null = np.concatenate([np.linalg.norm(rows @ pool, axis=1) for rows in weights])
+    return p_value(null, float(np.linalg.norm(observed @ pool)), exact=exact)
 
 
 def divisions(
@@ -152,15 +143,13 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
     return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
 
 
-def p_values(null: Array, observed: Array, *, exact: bool) -> Array:
-    """Share of permutations with so large a statistic or a larger one, 0 < p ≤ 1.
+def p_value(null: Array, observed: float, *, exact: bool) -> float:
+    """Share of permutations ``(m,)`` with so large a statistic or a larger one, 0 < p ≤ 1.
 
-    ``null`` has shape ``(m, ...)``, ``observed`` the rest of it. Where permutations are
-    drawn, the observed one counts as one more (Davison & Hinkley 1997).
+    Where permutations are drawn, the observed one counts as one more (Davison & Hinkley 1997).
     """
-    reached = (null >= observed * (1 - 1e-9)).sum(axis=0)
-    share: Array = reached / len(null) if exact else (1 + reached) / (1 + len(null))
-    return share
+    reached = float((null >= observed * (1 - 1e-9)).sum())
+    return reached / len(null) if exact else (1 + reached) / (1 + len(null))
 
 
 def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
@@ -206,23 +195,3 @@ def beyond_p(
         null[rows] = length(of_method) - length(of_placebo)
     observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, placebo))
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))
-
-
-def lead_time(
-    first: Array, second: Array, rng: np.random.Generator, *, alpha: float = LEVEL
-) -> int | None:
-    """How long before a hit two contexts become distinguishable, and stay so, in ticks.
-
-    ``first`` and ``second``, ``(runs, k, dof)``: the last k control ticks of each run up to the
-    hit, which is entry -1. Going back from the hit, ticks are told apart while the test of
-    :func:`permutation_p` gives at most ``alpha``; the first that fails ends the count, which keeps
-    the error rate of the whole at ``alpha`` (Maurer, Hothorn & Lehmacher 1995). 0: at the hit only;
-    None: not even there, or a context with one run. At most k - 1, the whole movement.
-
-    After Engel, Flanders & Soechting (1997), on hand postures before the same piano key. Caveat:
-    from a common start, straight movements diverge from their first tick on, so that a lead shorter
-    than the movement speaks of noise or of different speeds, not of a late decision.
-    """
-    failed = ~(permutation_p(first, second, rng, resamples=999)[::-1] <= alpha)
-    lead = int(failed.argmax()) if failed.any() else len(failed)
-    return lead - 1 if lead else None

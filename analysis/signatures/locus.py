@@ -22,7 +22,7 @@ from scipy import stats
 from scipy.cluster.hierarchy import DisjointSet
 
 from coartic import Task
-from coartic.analysis.signatures.context import p_values
+from coartic.analysis.signatures.context import p_value
 from coartic.analysis.statistics.estimates import RESAMPLES, Estimate, centred, student, varies
 from coartic.robot import Array
 from coartic.tasks.optima import KEPT
@@ -122,9 +122,9 @@ def slope_length(
         ways = np.array(list(permutations(range(len(x)))))
     else:
         ways = rng.permuted(np.tile(np.arange(len(x)), (resamples, 1)), axis=1)
-    observed = np.asarray(np.linalg.norm(weights @ means))
+    observed = float(np.linalg.norm(weights @ means))
     null = np.linalg.norm(weights[ways] @ means, axis=1)
-    return Estimate(float(observed), p=float(p_values(null, observed, exact=exact)))
+    return Estimate(observed, p=p_value(null, observed, exact=exact))
 
 
 def _by_position(configurations: Array, positions: Sequence[float] | Array) -> tuple[Array, Array]:

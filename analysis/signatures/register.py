@@ -15,7 +15,6 @@ the corrective process alone with the hands of run i; means are over runs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
@@ -24,10 +23,9 @@ import numpy as np
 
 from coartic.analysis.signatures import subtasks
 from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts, Value, rng_of
-from coartic.analysis.signatures.context import lead_time
 from coartic.analysis.signatures.locus import locus_slopes, slope_length
 from coartic.analysis.signatures.manifold import subspaces
-from coartic.analysis.trajectories import Trajectories, last_ticks
+from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
 Scope = Literal["runs", "contexts", "moved goals"]
@@ -50,8 +48,6 @@ class Signature:
     """Keys of references.bib."""
     two_hands: bool = False
     """Whether it applies to tasks with two hands alone."""
-    missing: str = ""
-    """Why no run may have a value."""
     sign: str = ""
     """Name in claims, if it is also a sign: one number for each run."""
     words: str = ""
@@ -166,7 +162,6 @@ def hand_as_in_isolation(runs: Trajectories) -> Array:
     unit="1",
     extent="−∞ to ∞, by goal",
     two_hands=True,
-    missing="the other hand hits no later goal",
     meaning="How much nearer the waiting hand is to its own next goal because the arm has moved "
     "since its own last hit, over its distance in the initial solution. It is 0 if the arm keeps "
     "still while it waits, whatever the base does; negative: it is farther away.",
@@ -187,49 +182,6 @@ def preshaping_of_the_other_arm(runs: Trajectories) -> Array:
 
 
 @signature(
-    "travel of the other arm",
-    unit="rad",
-    extent="rad, ≥ 0, by goal",
-    two_hands=True,
-    meaning="Distance in joint space between the postures of the waiting arm at the previous hit "
-    "(or the start) and at this one.",
-)
-def travel_of_the_other_arm(runs: Trajectories) -> Array:
-    """‖q_w(i, g) - q_w(i, g - 1)‖, w the joints of the arm that does not hit g.
-
-    Column ``other_arm_travel`` is its sum.
-    """
-    return np.array([subtasks.waiting_travel(run) for run in runs.runs])
-
-
-@signature(
-    "turning angle",
-    unit="rad",
-    extent="rad, 0 to π, by goal",
-    missing="a subtask without displacement",
-    meaning="Angle in joint space between the displacement to the goal and the displacement on to "
-    "the next one. 0: straight on; π: back.",
-)
-def turning_angle(runs: Trajectories) -> Array:
-    """∠(q(i, g) - q(i, g - 1), q(i, g + 1) - q(i, g)), g < G."""
-    start = np.array(runs.task.q0)
-    paths = [np.vstack([start, run.execution.configurations]) for run in runs.runs]
-    return np.array(list(map(subtasks.turning_angles, paths)))
-
-
-@signature(
-    "cost at this goal",
-    unit="ticks",
-    sign="cost",
-    words="ticks that the way to this goal takes longer",
-    of_run=lambda values: np.asarray(values.mean(axis=1)),
-)
-def cost_at_this_goal(runs: Trajectories) -> Array:
-    """t(i, g) - r(i, g), g < G, as :func:`~.subtasks.served` says; as a sign, the mean over g."""
-    return subtasks.served(runs.task, runs.runs)[..., 0]
-
-
-@signature(
     "gain at the next goal",
     unit="ticks",
     sign="arm",
@@ -239,14 +191,12 @@ def cost_at_this_goal(runs: Trajectories) -> Array:
     of_run=lambda values: np.asarray(values.mean(axis=1)),
 )
 def gain_at_the_next_goal(runs: Trajectories) -> Array:
-    """r'(i, g + 1) - r(i, g + 1), g < G, as :func:`~.subtasks.served` says; as a sign, the mean
-    over g."""
-    return subtasks.served(runs.task, runs.runs)[..., 1]
+    """r(i, g + 1) - r'(i, g + 1), g < G, as :func:`~.subtasks.gain_at_next` says; as a sign, the
+    mean over g."""
+    return subtasks.gain_at_next(runs.task, runs.runs)
 
 
 # One goal before two different successors
-
-NO_SPREAD = "one run a context: no spread within contexts, no test"
 
 
 @signature(
@@ -272,8 +222,7 @@ def context_distance(contexts: TwoContexts) -> Value:
 )
 def dependence_on_context(contexts: TwoContexts) -> Value:
     """‖mean q₁ - mean q₂‖ / s with s² = (Σ‖q₁ - mean q₁‖² + Σ‖q₂ - mean q₂‖²) / (n₁ + n₂ - 2)."""
-    why = "runs do not differ within contexts" if math.isnan(contexts.spreads) else ""
-    return contexts.value(contexts.spreads, contexts.p, NO_SPREAD if contexts.single else why)
+    return contexts.value(contexts.spreads, contexts.p)
 
 
 def part_of_the_difference(contexts: TwoContexts, name: str, number: int) -> Value:
@@ -282,8 +231,7 @@ def part_of_the_difference(contexts: TwoContexts, name: str, number: int) -> Val
     basis = subspaces(jacobian)[number]
     of_all_joints = np.zeros((contexts.first.task.robot.dof, basis.shape[1]))
     of_all_joints[joints] = basis
-    why = "one run a context: no test" if contexts.single else ""
-    return contexts.value(contexts.parts[number], contexts.p_within(name, of_all_joints), why)
+    return contexts.value(contexts.parts[number], contexts.p_within(name, of_all_joints))
 
 
 @signature(
@@ -310,32 +258,6 @@ def motor_equivalent_part(contexts: TwoContexts) -> Value:
 def other_part(contexts: TwoContexts) -> Value:
     """‖Mᵀ(mean q₁ - mean q₂)‖ / √d, M (k, d) an orthonormal basis of the Jacobian's row space."""
     return part_of_the_difference(contexts, "non-motor-equivalent part", 1)
-
-
-@signature(
-    "lead time",
-    "contexts",
-    unit="ticks",
-    extent="ticks, ≥ 0",
-    meaning="How long before the hit the postures of the two contexts can be told apart at every "
-    "tick (after Engel, Flanders & Soechting 1997).",
-    sources=("engel1997",),
-)
-def lead(contexts: TwoContexts) -> Value:
-    """max {k: p(j) ≤ α for all j ≤ k}, p(j) of the test of postures j ticks before the hit.
-
-    It ends where the shortest run begins.
-    """
-    hit = contexts.goal - 1
-    longest = min(int(run.hits[hit]) for group in contexts.runs for run in group)
-    if contexts.single or longest == 0:
-        why = NO_SPREAD if contexts.single else "a run hits it at the start"
-        return contexts.value(math.nan, why_not=why)
-    first, second = (last_ticks(group, contexts.goal, longest + 1) for group in contexts.runs)
-    ticks = lead_time(first, second, rng_of("lead time", contexts.place))
-    why = "not distinguishable at the hit" if ticks is None else ""
-    value = contexts.value(math.nan if ticks is None else ticks, why_not=why)
-    return value._replace(place=contexts.place._replace(longest=longest))
 
 
 # A goal beside one that differs between tasks

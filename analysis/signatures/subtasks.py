@@ -1,5 +1,5 @@
-"""Subtasks: what each costs within the whole, with which hand it would be done by itself, and what
-the arm that is not chosen does meanwhile."""
+"""Subtasks: what each saves for the next, with which hand it would be done by itself, and what the
+arm that is not chosen does meanwhile."""
 
 from __future__ import annotations
 
@@ -45,16 +45,14 @@ def isolated_reaches(
     return ticks.reshape(shape), reached.q.reshape(q.shape)
 
 
-def served(task: Task, paths: Sequence[Trajectory]) -> Array:
-    """What the way each goal is hit costs there and gains at the next, shape ``(n, G − 1, 2)``.
+def gain_at_next(task: Task, paths: Sequence[Trajectory]) -> Array:
+    """Ticks that the posture at each goal saves at the next, shape ``(n, G − 1)``.
 
-    In ticks, with the hands of each path, for each goal that another follows, against the
-    corrective process from the same posture before. First: how much longer the path's own way to
-    the goal is. Second: how much sooner the corrective process reaches the next goal from where
-    base and chosen arm of the path hit this one than from where it would have hit it itself;
-    what the other arm does meanwhile is left out. NaN where the corrective process does not hit.
+    How much sooner the corrective process reaches the next goal from where base and chosen arm of
+    the path hit this one than from where it would have hit it itself, from the same posture before
+    and with the hands of the path; what the other arm does meanwhile is left out. NaN where the
+    corrective process does not hit.
     """
-    ticks = np.array([path.execution.ticks_by_goal() for path in paths])
     hits = np.array([path.execution.configurations for path in paths])
     befores, hands = starts_of(task, paths), hand_numbers(task, paths)
     goals = 1 + np.arange(len(task.goals))
@@ -67,9 +65,7 @@ def served(task: Task, paths: Sequence[Trajectory]) -> Array:
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
     )
-    cost_and_gain = np.stack([ticks[now] - alone, after - nearer], axis=-1)
-    cost_and_gain[np.isnan(cost_and_gain.sum(axis=-1))] = np.nan
-    return cost_and_gain
+    return np.where(np.isnan(alone), np.nan, after - nearer)
 
 
 def postures_before(execution: Execution, task: Task) -> list[Array]:
@@ -164,12 +160,3 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
             if initially > 0:
                 nearer[k] = (1 - reached / initially) - (1 - kept / initially)
     return nearer
-
-
-def waiting_travel(path: Trajectory) -> Array:
-    """Joint travel of the arm that is not chosen, from hit to hit, rad, shape ``(G,)``."""
-    moved = path.execution.configurations - postures_before(path.execution, path.task)
-    waiting = [path.task.robot.joints(other(hand)) for hand in path.hands]
-    return np.array(
-        [np.linalg.norm(row[joints]) for row, joints in zip(moved, waiting, strict=True)]
-    )

@@ -206,8 +206,7 @@ COARTICULATION = Section(
     table="contexts",
     note=(
         "Postures are compared in length units and rad. Random guesses are a placebo: they learn "
-        "nothing, and the best of many is selected. Lead: how many ticks before the hit the two "
-        "movements begin to differ."
+        "nothing, and the best of many is selected."
     ),
     single=True,
 )

@@ -25,17 +25,15 @@ COLUMN_OF = {
     "total": "total against the same hands",
     "as_in_isolation": "hand as in isolation",
     "preshaping": "preshaping of the other arm",
-    "turning": "turning angle",
-    "travel": "travel of the other arm",
 }
 """Columns of :func:`signatures` and the signatures whose means over goals they have."""
 
 
-@table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other, lead")
+@table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other")
 def contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors."""
     frame = signature_values(study)
-    frame = frame[frame.against.ne("") & frame.value.notna() & frame.moving.isna()]
+    frame = frame[frame.against.ne("") & frame.moving.isna()]
     rows = []
     at: Any
     for at, group in frame.groupby(["task", "label", "goal", "hand", "against"], sort=False):
@@ -53,7 +51,6 @@ def contexts(study: Study) -> Rows:
             "p_placebo": placebo.context_beyond_p(study, shared),
             "equivalent": value.get("motor-equivalent part"),
             "other": value.get("non-motor-equivalent part"),
-            "lead": value.get("lead time"),
             **runs_of(*(study.cells[name, label] for name in (task, against))),
         }
         rows.append((shared.row, row))
@@ -74,7 +71,7 @@ def adjust_p(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
 def slopes(study: Study) -> Rows:
     """How the posture at a goal follows a neighbouring goal that moves."""
     frame = signature_values(study)
-    frame = frame[frame.moving.notna() & frame.value.notna()]
+    frame = frame[frame.moving.notna()]
     rows = []
     at: Any
     for at, group in frame.groupby(["task", "label", "goal", "moving", "hand"], sort=False):
@@ -104,17 +101,13 @@ def slopes(study: Study) -> Rows:
     yield from adjust_p(rows)
 
 
-@table(
-    "task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p, "
-    "turning, travel",
-)
+@table("task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p")
 def signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals.
 
     ``first_p`` and ``preshaping_p`` are of the tests against the placebo.
     """
     frame = signature_values(study)
-    frame = frame[frame.value.notna()]
     for task in (name for name in study.tasks if name in one_by_one(study)):
         labels = [label for name, label in study.cells if name == task]
         for label in in_order(shown_methods(study, labels)):
@@ -136,7 +129,7 @@ def signatures(study: Study) -> Rows:
                 yield f"{task} {label}", row | runs_of(cell)
 
 
-@table("task, label, signature, where, value[], p, n, unit, why_not")
+@table("task, label, signature, where, value[], p, n, unit")
 def all_signatures(study: Study) -> Rows:
     """Every value of every signature, one a row, with its place, interval and test."""
     joined = joined_tasks(moved_goals(study.tasks))

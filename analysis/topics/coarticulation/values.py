@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterator
 from itertools import chain, product
 from typing import Any
 
@@ -26,9 +27,6 @@ from coartic.analysis.trajectories import Trajectories
 from coartic.robot import HANDS, Array
 
 SignatureValues = Iterator[tuple[Signature, Value]]
-NO_CONTEXT = "the method did no other task that shares the start and the first goals"
-IN_FAMILY = "the tasks that share its first goals are variants of it: see the locus slopes"
-NO_FAMILY = f"fewer than {LEAST} tasks of the folder are the same but for one goal"
 
 
 @cached
@@ -37,16 +35,15 @@ def signature_values(study: Study) -> pd.DataFrame:
 
     Columns ``task``, ``method``, ``variant``; ``signature``, ``where`` (the place in words);
     ``value`` with ``low`` and ``high`` of its interval at 95 %, ``p`` without correction, ``n``
-    runs behind it, ``unit``, ``why_not`` there is no value, interval or test; those of
-    :class:`~coartic.analysis.signatures.between.Place`; ``label``. Signatures of runs are means
-    with Student's interval, shares of runs have Wilson's. Differences between contexts stand with
-    the first task of the pair and name the other; tasks that moved goals join are no pairs, their
-    slopes say how each depends on the others.
+    runs behind it, ``unit``; those of :class:`~coartic.analysis.signatures.between.Place`;
+    ``label``. Signatures of runs are means with Student's interval, shares of runs have Wilson's.
+    Differences between contexts stand with the first task of the pair and name the other; tasks
+    that moved goals join are no pairs, their slopes say how each depends on the others.
     """
     identity = ["task", "method", "variant"]
-    columns = ["signature", "where", "value", "low", "high", "p", "n", "unit", "why_not"]
+    columns = ["signature", "where", "value", "low", "high", "p", "n", "unit"]
     frame = pd.DataFrame(rows(study), columns=[*identity, *columns, *Place._fields, "label"])
-    return frame.astype(dict.fromkeys(("goal", "moving", "longest"), "Int64"))
+    return frame.astype(dict.fromkeys(("goal", "moving"), "Int64"))
 
 
 def rows(study: Study) -> Iterator[dict[str, Any]]:
@@ -64,75 +61,57 @@ def rows(study: Study) -> Iterator[dict[str, Any]]:
             for first, second, shared in partners
             if first == task
         ]
-        if not partners:
-            values.append(no_values(of_kind("contexts"), IN_FAMILY if here else NO_CONTEXT))
         for each in here:
             cells = {name: of_method[name] for name in each.positions if name in of_method}
             if task == next(iter(cells)):
                 values.append(of_moved_goal(each, cells))
-        if not here:
-            values.append(no_values(of_kind("moved goals"), NO_FAMILY))
         for signature, value in chain(*values):
             estimate = value.estimate
+            if math.isnan(estimate.value):
+                continue
             yield {
                 **{"task": task, "method": cell.method, "variant": cell.variant, "label": label},
                 **{"signature": signature.name, "where": str(value.place), "n": value.n},
                 **{"value": estimate.value, "low": estimate.low, "high": estimate.high},
-                **{"p": estimate.p, "why_not": value.why_not},
+                "p": estimate.p,
                 "unit": signature.unit if value.unit is None else value.unit,
                 **value.place._asdict(),
             }
 
 
-def no_values(
-    signatures: Iterable[Signature], why: str, place: Place = NOWHERE, n: int = 0
-) -> SignatureValues:
-    """Signatures none of which applies, and why."""
-    for signature in signatures:
-        yield signature, Value(place, n=n, why_not=why, unit="")
-
-
 def of_runs(cell: Trajectories) -> SignatureValues:
     """Means and shares over the runs of a cell."""
     for signature in of_kind("runs"):
-        why = "the task has one hand" * (signature.two_hands and len(cell.task.hands) < 2)
-        why = why if cell.runs else "no run has a solution"
-        values = np.empty(0) if why else np.asarray(signature.measure(cell))
-        if not len(values):
-            why = why or "the corrective process alone does not complete the task"
-            yield from no_values([signature], why)
-        elif values.ndim == 1:
-            yield signature, over_runs(signature, values, NOWHERE)
+        if not cell.runs or (signature.two_hands and len(cell.task.hands) < 2):
+            continue
+        values = np.asarray(signature.measure(cell))
+        if values.ndim == 1:
+            yield signature, over_runs(values, NOWHERE)
         else:
             for goal, of_goal in enumerate(values.T, 1):
-                yield signature, over_runs(signature, of_goal, Place(goal))
+                yield signature, over_runs(of_goal, Place(goal))
 
 
-def over_runs(signature: Signature, values: Array, place: Place) -> Value:
+def over_runs(values: Array, place: Place) -> Value:
     """The mean over the runs that have a value (n,), or the share of runs, with its interval."""
     values = values[np.isfinite(values)]
     n = len(values)
     if not n:
-        return Value(place, why_not=signature.missing)
+        return Value(place)
     if values.dtype == bool:
         count = int(values.sum())
         estimate = wilson(count, n) if n > 1 else Estimate(count / n)
     else:
         estimate = student_mean(values.astype(np.float64))
-    return Value(place, estimate, n, "one run: no interval" if n == 1 else "")
+    return Value(place, estimate, n)
 
 
 def of_contexts(first: Trajectories, second: Trajectories, shared: int) -> SignatureValues:
     """Values at every shared goal for every hand that hit it in both contexts."""
     for goal in range(1, shared + 1):
-        in_both = contexts_at(first, second, goal)
-        for contexts in in_both:
+        for contexts in contexts_at(first, second, goal):
             for signature in of_kind("contexts"):
                 yield signature, signature.measure(contexts)
-        if not in_both:
-            place = Place(goal, against=second.task.name)
-            why = "no hand hit the goal in both contexts"
-            yield from no_values(of_kind("contexts"), why, place)
 
 
 def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[TwoContexts]:
@@ -150,10 +129,7 @@ def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> Signature
     numbers = (n for n in (moved.goal - 1, moved.goal + 1) if 1 <= n <= len(task.goals))
     for goal, hand in product(numbers, HANDS):
         beside = BesideMovedGoal.of(moved, cells, goal, hand)
-        if beside is not None and len(set(beside.positions)) < LEAST:
-            why = f"runs with that hand in fewer than {LEAST} tasks of the family"
-            yield from no_values(of_kind("moved goals"), why, beside.place, len(beside.positions))
-        elif beside is not None:
+        if beside is not None and len(set(beside.positions)) >= LEAST:
             for signature in of_kind("moved goals"):
                 for value in signature.measure(beside):
                     yield signature, value

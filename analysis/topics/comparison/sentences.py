@@ -70,10 +70,11 @@ def finding_of_ranking(study: Study) -> str:
         sentences.append(
             f"The optimum is proven on {proven} of {plural(len(optima), 'task')}{elsewhere}."
         )
-    if settings := sum(map(methods.is_variant, tables.variants(study).method)):
+    labels = {label for _, label in study.cells if not methods.is_search(label)}
+    if settings := sum(map(methods.is_variant, labels)):
         are = "is" if settings == 1 else "are"
         sentences.append(
-            f"{plural(settings, 'more setting')} of methods {are} in tables/variants.csv."
+            f"{plural(settings, 'more setting')} of methods {are} in tables/methods.csv."
         )
     return " ".join(sentences)
 

@@ -10,7 +10,6 @@ from coartic.analysis import methods as known
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.statistics.estimates import LEVEL, interval
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.statistics.instances import Runs, other_tasks
 from coartic.analysis.study import Study, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Row, Rows, runs_of, table
 from coartic.analysis.topics.coarticulation.tables import adjust_p
@@ -23,7 +22,6 @@ from coartic.analysis.topics.comparison.running_times import (
     steps_of,
     trials_to_half,
 )
-from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.words import marked
 from coartic.robot import Array
 
@@ -97,44 +95,6 @@ def ranking(study: Study) -> Rows:
         row |= {"runs": sum(len(cell.runs) for cell in cells), **runs_of(*cells)}
         named.append((str(method), row))
     yield from sorted(named, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
-
-
-@table("method, runs, gap[], on *, instances, gap_in_general[], trials, movement_ticks, solve_s")
-def variants(study: Study) -> Rows:
-    """Every method with each of its settings: gap over single tasks and over random ones, and cost.
-
-    The learner is one row: EC1 where a task has one arm, EC4 where it has two. What a run costs
-    is the mean over tasks.
-    """
-    labels_by_row: dict[str, dict[str, str]] = {}
-    for task, label in study.cells:
-        method, _, variant = label.partition(" ")
-        if method == known.most_exploring(study.tasks[task]):
-            method = f"{known.TOGETHER}EC1, EC4)"
-        if not known.is_search(label):
-            labels_by_row.setdefault(f"{method} {variant}".strip(), {})[task] = label
-    instances = sample(study)
-    single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
-    for name, labels in labels_by_row.items():
-        of_single = {task: labels[task] for task in sorted(labels) if task in single}
-        row: Row = {"method": name}
-        gap = scores.mean_gap(study, of_single)
-        if len(of_single) == len(single) and gap is not None:
-            row |= interval("gap", gap)
-        for task, label in of_single.items():
-            row[f"on {task}"] = scores.run_gaps(study, task, label).mean()
-        by_family: dict[str, list[Runs]] = {}
-        for task, label in labels.items():
-            of_instance = instances.gap(task, label)
-            if of_instance is not None:
-                by_family.setdefault(str(study.tasks[task].family), []).append((of_instance,))
-        row["instances"] = sum(map(len, by_family.values()))
-        if by_family:
-            row |= interval("gap_in_general", other_tasks(by_family))
-        cells = [study.cells[key] for key in labels.items()]
-        costs = scores.scores(study).loc[list(labels.items())]
-        row |= {cost: costs[cost].mean() for cost in ("trials", "movement_ticks", "solve_s")}
-        yield name, row | {"runs": sum(len(cell.runs) for cell in cells)} | runs_of(*cells)
 
 
 @table(
