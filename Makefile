@@ -11,7 +11,7 @@ FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations locus optimum)
-STORED := comparison ablations locus families horizon fourteen practice stops dose resist human
+STORED := comparison ablations locus families horizon fourteen practice dose resist human
 
 .PHONY: benchmark test check format docs findings paper speed release-check setup clean
 

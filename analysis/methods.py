@@ -65,7 +65,6 @@ _PARAMETERS = {
     "hands=": "hands ",
     "timing=fixed": "fixed times",
     "stop=": "stop ",
-    "stop_every=": "goals per stop ",
 }
 _VARIANT = re.compile(r"=|\bEC\d-")
 

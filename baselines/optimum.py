@@ -83,7 +83,7 @@ class Optimum(Method):
                 chains=parameters.chains,
                 spread=not still,
             )
-            plans = shortest_plans(session, task, problem, starts, still=still, radius=task.radius)
+            plans = shortest_plans(session, task, problem, starts, still=still)
             best = fewest_ticks(session, task, problem, plans)
         details = {
             "path_length": plans.ranked[0][1].cost,

@@ -92,17 +92,9 @@ class PostureGraph:
     """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
     spent: Counter[str] = field(default_factory=Counter)
     """Kinematics evaluated while sampling."""
-    costs: Array | float = 1.0
-    """Cost of the movement of each joint, shape ``(dof,)``, or of all joints."""
 
     @classmethod
-    def sample(
-        cls,
-        task: Task,
-        count: int,
-        rng: np.random.Generator,
-        costs: Array | float = 1.0,
-    ) -> PostureGraph:
+    def sample(cls, task: Task, count: int, rng: np.random.Generator) -> PostureGraph:
         """A graph with at most ``count`` nodes per goal and hand.
 
         Half of a layer is sampled around the nodes of the goal before, by whichever hand: of
@@ -120,54 +112,43 @@ class PostureGraph:
                     starts[half] = before[rng.integers(len(before), size=count // 2)]
                 layers[goal, hand] = sample_postures(task, goal, hand, starts, rng, spent)
             before = np.concatenate([layers[goal, hand] for hand in task.hands])
-        return cls(task, layers, spent, costs)
+        return cls(task, layers, spent)
 
-    def chains(self, only: HandSequence | None = None, most: int | None = None) -> list[Chain]:
+    def chains(self, most: int | None = None) -> list[Chain]:
         """The cheapest chain of every hand sequence that has one, left before right.
 
-        ``only`` and ``most`` as in :meth:`sequences`.
-        """
-        return [self.chain_of(complete) for complete in self.sequences(only, most)]
-
-    def sequences(self, only: HandSequence | None, most: int | None) -> list[Beginning]:
-        """The cheapest chains of whole hand sequences, with their costs.
-
-        ``only`` asks for one sequence. ``most`` bounds their number: of the beginnings of
-        sequences, goal by goal, the cheapest are kept; none is lost while there are no more
-        than that.
+        ``most`` bounds their number: of the beginnings of sequences, goal by goal, the cheapest
+        are kept; none is lost while there are no more than that.
         """
         start = dict.fromkeys(HANDS, np.array(self.task.q0)[None, :])
         kept = [Beginning((), start, np.zeros((1, 1)), ())]
         for _ in range(len(self.task.goals)):
-            longer = [more for beginning in kept for more in self.longer(beginning, only)]
+            longer = [more for beginning in kept for more in self.longer(beginning)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        return kept
+        return [self.chain_of(complete) for complete in kept]
 
-    def why_none(self, only: HandSequence | None = None) -> str:
+    def why_none(self) -> str:
         """The reason why there is no chain, a goal without a posture; empty if there is a chain."""
         for goal in range(len(self.task.goals)):
-            hands = self.task.hands if only is None else (only[goal],)
-            if not any(len(self.layers[goal, hand]) for hand in hands):
+            if not any(len(self.layers[goal, hand]) for hand in self.task.hands):
                 return (
                     f"goal {goal + 1}: no posture was found that puts the "
-                    f"{' or the '.join(hands)} hand inside its disc"
+                    f"{' or the '.join(self.task.hands)} hand inside its disc"
                 )
         return ""
 
-    def longer(self, begun: Beginning, only: HandSequence | None) -> Iterator[Beginning]:
+    def longer(self, begun: Beginning) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
         goal = len(hands)
-        for hand in HANDS if only is None else (only[goal],):
+        for hand in HANDS:
             layer = self.layers.get((goal, hand))
             if layer is None or not len(layer):
                 continue
             last = hands[-1] if hands else hand
-            weighted = layer * self.costs
-            base = squared_distances(nodes[last] * self.costs, weighted, slice(0, BASE_DOF))
-            joints = self.task.robot.joints(hand)
-            arm = squared_distances(nodes[hand] * self.costs, weighted, joints)
+            base = squared_distances(nodes[last], layer, slice(0, BASE_DOF))
+            arm = squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
             if hand == last:
                 # (i, j) -> (k, j): the least over i.
                 step = np.sqrt(base + arm)
@@ -213,25 +194,22 @@ def cheapest_chains(
     chains: int,
     most: int = BEAM_WIDTH,
     spread: bool = False,
-    only: HandSequence | None = None,
-    costs: Array | float = 1.0,
 ) -> Iterator[Chain]:
     """The chains of ``graphs`` graphs with ``nodes`` postures per goal and hand, and of more
-    graphs until there are as many ``chains``; ``only`` and ``most`` as in
-    :meth:`PostureGraph.chains`, ``costs`` of joints as in :class:`PostureGraph`. The session counts
-    the effort.
+    graphs until there are as many ``chains``; ``most`` as in :meth:`PostureGraph.chains`. The
+    session counts the effort.
 
     With ``spread``, each of a robot with two hands also with its other arm spread out. Raises
     MethodError where a goal has no posture.
     """
     yielded = 0
     for number in itertools.count(1):
-        graph = PostureGraph.sample(task, nodes, rng, costs)
+        graph = PostureGraph.sample(task, nodes, rng)
         session.spend(**graph.spent)
-        missing = graph.why_none(only)
+        missing = graph.why_none()
         if missing:
             raise MethodError("infeasible", missing)
-        for hands, configurations in graph.chains(only, most):
+        for hands, configurations in graph.chains(most):
             yielded += 1
             yield hands, configurations
             if spread and len(task.hands) > 1:

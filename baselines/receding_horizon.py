@@ -15,57 +15,36 @@ ticks in every window each goal would lose half a tick for a reason that has not
 the horizon. With them a window loses half a tick at its last goal alone: that is once in all, but
 at every goal with a horizon of 0. ``path_length`` in the details has no such loss: it adds up the
 plans as they were before the rounding, from where the robot stood.
-
-The horizon limits choice of hand and posture alike. With ``hands`` ``optimal`` it limits postures
-alone: the hands are those of the plan with all goals. The loss by the hands alone, with the
-best postures, is in the details of the searches for the optimum, ``path_lengths`` by hand
-sequence.
-
-``costs`` makes some joints cost ``cost_factor`` times as much as the others: windows are then
-shortest by the weighted path length (:func:`coartic.motion.costs.segment_lengths`). The score
-remains ticks; the weighted path length of a stored solution follows from its
-:func:`~coartic.motion.ticks.trajectory`. Ticks are not weighted, so that such a window is not
-rounded: it aims a little inside the discs, and each movement ends with the first step inside.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from coartic import Movement, Task, execute
-from coartic.baselines.posture_graph import Chain, HandSequence, cheapest_chains
+from coartic import Movement, Task
+from coartic.baselines.posture_graph import Chain, cheapest_chains
 from coartic.baselines.shortest_paths import (
     KNOWS_REWARD,
     PlanInTicks,
-    ShortestPlans,
     check_ticks,
     fewest_ticks,
     shortest_plans,
 )
-from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.baselines.whole_ticks import movements
-from coartic.method import Method, MethodError, Parameters, Result, Session
-from coartic.motion.costs import CostlyJoints, joint_costs, segment_lengths
+from coartic.baselines.trajectory_problem import segment_lengths, trajectory_problem
+from coartic.method import Method, Parameters, Result, Session
 from coartic.robot import BASE_DOF, HANDS, Array
-from coartic.tasks.task import MOST_GOALS, Start, hands_of
+from coartic.tasks.task import MOST_GOALS, Start
 
 
 class RecedingHorizonParameters(Parameters):
-    """The horizon, the cost, and the effort of the search."""
+    """The horizon, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Goals in view beyond the one to be hit; all where there are no more."""
-    hands: Literal["planned", "optimal"] = "planned"
-    """``planned``: every window chooses its hands; ``optimal``: they are those of the plan with all
-    goals, and a window chooses postures only."""
-    costs: CostlyJoints = "none"
-    """Joints whose movement costs more than that of the others."""
-    cost_factor: Annotated[float, Field(ge=0.01, le=100)] = 3.0
-    """How many times as much, where there are such joints."""
     nodes: Annotated[int, Field(ge=10, le=1000)] = 200
     """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
     graphs: Annotated[int, Field(ge=1)] = 3
@@ -96,29 +75,20 @@ class RecedingHorizon(Method):
         """Plan, make a movement, and plan again, until the last goal is in view."""
         check_ticks(session.model)
         task, parameters = session.hand_over(*self.told), self.parameters
-        costs = joint_costs(task.robot, parameters.costs, parameters.cost_factor)
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[PlanInTicks] = []
-
-        def plan(window: Task, hands: HandSequence | None) -> PlanInTicks:
-            windows.append(plan_window(session, window, hands, parameters, costs, rng))
-            return windows[-1]
-
-        hands = None
-        if parameters.hands == "optimal":
-            hands = hands_of(plan(task, None).execution.hands)
         solution: list[Movement] = []
         length, q = 0.0, np.array(task.q0)
         while (goal := len(solution)) < len(task.goals):
             end = min(goal + parameters.horizon + 1, len(task.goals))
-            window = plan(remaining(task, q, goal, end), hands and hands[goal:end])
+            window = plan_window(session, remaining(task, q, goal, end), parameters, rng)
+            windows.append(window)
             followed = 1 if end < len(task.goals) else end - goal
             solution += [
                 replace(movement, goal=goal + movement.goal)
                 for movement in window.movements[:followed]
             ]
-            planned = np.vstack([q, window.plan.configurations[:followed]])
-            length += float(segment_lengths(planned, costs).sum())
+            length += float(window.plan.lengths(q)[:followed].sum())
             q = window.execution.configurations[followed - 1]
         details = {
             "path_length": length,
@@ -133,23 +103,11 @@ METHODS = (RecedingHorizon,)
 
 
 def plan_window(
-    session: Session,
-    task: Task,
-    only: HandSequence | None,
-    parameters: RecedingHorizonParameters,
-    costs: Array,
-    rng: np.random.Generator,
+    session: Session, task: Task, parameters: RecedingHorizonParameters, rng: np.random.Generator
 ) -> PlanInTicks:
     """The shortest movements through all goals of a task, or through those that remain of one."""
-    weighted = parameters.costs != "none"
     with session.building():
-        problem = trajectory_problem(
-            task.robot,
-            task.hands,
-            len(task.goals),
-            "path-length",
-            tuple(costs.tolist()) if weighted else None,
-        )
+        problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
     with session.solving():
         starts = cheapest_chains(
             session,
@@ -159,23 +117,13 @@ def plan_window(
             graphs=parameters.graphs,
             chains=parameters.chains,
             spread=len(task.goals) > 1,  # with one goal it is the chain itself
-            only=only,
-            costs=costs,
         )
 
-        def weighted_length(start: Chain) -> float:
-            return float(segment_lengths(np.vstack([task.q0, start[1]]), costs).sum())
+        def length(start: Chain) -> float:
+            return float(segment_lengths(np.vstack([task.q0, start[1]])).sum())
 
-        plans = shortest_plans(
-            session,
-            task,
-            problem,
-            sorted(starts, key=weighted_length)[: parameters.starts],
-            still=False,
-            radius=task.radius - (session.model.arrival_tolerance if weighted else 0.0),
-        )
-        if weighted:
-            return without_rounding(session, task, plans)
+        ranked = sorted(starts, key=length)[: parameters.starts]
+        plans = shortest_plans(session, task, problem, ranked, still=False)
         return fewest_ticks(session, task, problem, plans)
 
 
@@ -185,14 +133,3 @@ def remaining(task: Task, q: Array, first: int, end: int) -> Task:
     start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
     goals = task.goals[first:end]
     return task.model_copy(update={"goals": goals, "start": start})
-
-
-def without_rounding(session: Session, task: Task, plans: ShortestPlans) -> PlanInTicks:
-    """The shortest plan as it is; its movements end with the first step inside a disc."""
-    instance, plan = plans.ranked[0]
-    planned = movements(session, task, instance, plan.configurations)
-    execution = execute(task, planned, model=session.model)
-    session.spend(forward_kinematics=execution.evaluations)
-    if not execution.completed:
-        raise MethodError("solver-failed", f"a movement missed its goal: {execution.reason}")
-    return PlanInTicks(planned, execution, plan, plans.solves, plans.failed)

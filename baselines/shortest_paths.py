@@ -60,17 +60,15 @@ def shortest_plans(
     starts: Iterable[Chain],
     *,
     still: bool,
-    radius: float,
 ) -> ShortestPlans:
     """The shortest plan of each hand sequence; ``still`` holds the arm that is not chosen.
 
-    Hands end within ``radius`` of their goals' centres, length unit. Raises MethodError where no
-    solve finds a path.
+    Raises MethodError where no solve finds a path.
     """
     best: dict[HandSequence, tuple[Instance, PathPlan]] = {}
     solves = failed = 0
     for hands, start in starts:
-        instance = Instance.of(task, hands, still=still, radius=radius)
+        instance = Instance.of(task, hands, still=still, radius=task.radius)
         plan = problem.solve(instance, start)
         session.spend(**plan.spent)
         solves += 1

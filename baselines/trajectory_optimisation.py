@@ -33,7 +33,6 @@ from coartic.motion.movement import follow
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
-_REST = 1e-6  # rates below this are none: IPOPT fixes a variable whose bounds are equal
 SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
 
 
@@ -56,19 +55,13 @@ class TrajectoryParameters(Parameters):
 
 
 class SmoothParameters(TrajectoryParameters):
-    """The plans and starts, the timing, and the stops."""
+    """The plans and starts, the timing, and whether the plan stops."""
 
     timing: Literal["free", "fixed"] = "free"
     """Times at which the goals are hit: free at a constant total, or equal intervals."""
-    stop: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """From passing through a goal (0) to a full stop at it (1): velocities there, for jerk
-    accelerations too, are at most 1 - ``stop`` of those in the cheapest plan of the
-    same hands that passes through, joint by joint. The model is kinematic. Its plans have no
-    torques, inertia, delays, feedback or limit of speed, its score counts steps along the
-    path whatever their times, and it cannot say when a person stops, or why: a stop here is
-    given, and shows only the effect on a plan that makes it."""
-    stop_every: Annotated[int, Field(ge=1)] = 1
-    """The plan stops at each goal whose number is a multiple of this; it passes the others."""
+    stop: Literal[0, 1] = 0
+    """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
+    are 0."""
 
 
 def cheapest_plan(
@@ -78,16 +71,13 @@ def cheapest_plan(
     starts: list[Array],
     *,
     free_times: bool = False,
-    most_rates: Array | None = None,
+    stops: bool = False,
 ) -> PathPlan:
     """The cheapest plan that starts lead to; where none converges the last one.
 
-    ``free_times`` and ``most_rates`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
+    ``free_times`` and ``stops`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
     """
-    plans = [
-        problem.solve(instance, start, free_times=free_times, most_rates=most_rates)
-        for start in starts
-    ]
+    plans = [problem.solve(instance, start, free_times=free_times, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
     converged = [plan for plan in plans if plan.converged]
@@ -252,20 +242,14 @@ class Acceleration(TrajectoryOptimisation):
     def cheapest(
         self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
     ) -> PathPlan:
-        """The cheapest plan that passes the goals or, with stops, that one with its stops.
-
-        A plan with stops starts from the plan that passes and from every other start.
-        """
+        """The cheapest plan; one that stops starts from the one that passes the goals as well."""
         parameters: SmoothParameters = self.parameters
         free = parameters.timing == "free"
         passing = cheapest_plan(session, problem, instance, starts, free_times=free)
         if not (parameters.stop and passing.converged):
             return passing
-        most_rates = with_stops(passing.rates, parameters.stop, parameters.stop_every)
         starts = [passing.configurations, *starts]
-        return cheapest_plan(
-            session, problem, instance, starts, free_times=free, most_rates=most_rates
-        )
+        return cheapest_plan(session, problem, instance, starts, free_times=free, stops=True)
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan
@@ -288,17 +272,6 @@ class Jerk(Acceleration):
 
 
 METHODS: tuple[type[Method], ...] = (PathLength, SquaredChanges, Acceleration, Jerk)
-
-
-def with_stops(rates: Array, stop: float, every: int) -> Array:
-    """Most of each rate, shape ``(derivatives, G + 1, dof)``, where a plan with ``rates`` stops.
-
-    At goals whose numbers are multiples of ``every`` 1 - ``stop`` of their size; elsewhere inf.
-    """
-    most = np.full_like(rates, np.inf)
-    slowed = (1.0 - stop) * np.abs(rates[:, every::every])
-    most[:, every::every] = np.where(slowed < _REST, 0.0, slowed)
-    return most
 
 
 def path_movements(

@@ -9,7 +9,7 @@ position p of the chosen hand h_g, the nonlinear programme is::
 
 where f is one of the costs
 
-    path length        Σ_g l_g  with  |W Δ_g|² <= l_g²,  W the costs of the joints
+    path length        Σ_g l_g  with  |Δ_g|² <= l_g²
     squared changes    Σ_g |Δ_g|²
     acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
     jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
@@ -37,7 +37,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method import Information
-from coartic.motion.costs import segment_lengths
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
@@ -128,21 +127,10 @@ class PathPlan:
 
 
 class TrajectoryProblem:
-    """The compiled programme of one cost, for every task of a robot with so many goals.
+    """The compiled programme of one cost, for every task of a robot with so many goals."""
 
-    ``joint_costs`` weigh the joints in path lengths (:mod:`coartic.motion.costs`).
-    """
-
-    def __init__(
-        self,
-        robot: Robot,
-        hands: tuple[Hand, ...],
-        goals: int,
-        cost: Cost,
-        joint_costs: tuple[float, ...] | None = None,
-    ) -> None:
+    def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
         self.robot, self.goals, self.cost = robot, goals, cost
-        self._joint_costs = 1.0 if joint_costs is None else np.array(joint_costs)
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
         steps = casadi.SX.sym("steps", dof, goals)  # configuration changes, goal by goal
@@ -164,8 +152,7 @@ class TrajectoryProblem:
             limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
-            weighted = steps if joint_costs is None else casadi.diag(joint_costs) @ steps
-            limits += [casadi.sumsqr(weighted[:, g]) - lengths[g] ** 2 for g in range(goals)]
+            limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
@@ -198,7 +185,7 @@ class TrajectoryProblem:
         *,
         lengths: Array | None = None,
         free_times: bool = False,
-        most_rates: Array | None = None,
+        stops: bool = False,
         deep: Sequence[int] | None = None,
     ) -> PathPlan:
         """A locally cheapest plan, from configurations ``start`` ``(G, dof)``.
@@ -206,14 +193,13 @@ class TrajectoryProblem:
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
         (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
-        segments' durations vary at a constant total (smoothness costs only). No rate exceeds
-        ``most_rates``, shape as :attr:`PathPlan.rates`, in size. A solve that fails is a plan that
-        has not converged.
+        segments' durations vary at a constant total, ``stops`` holds all rates at the goals at 0
+        (smoothness costs only). A solve that fails is a plan that has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
-        rates = self.rate_bound(instance, most_rates)
+        rates = self.rate_bound(instance, stops)
         rim = instance.radius - _RIM
         deepest = 0.0 if deep is None else rim
         # A start, a least and a most value of each variable, in the order of the programme's.
@@ -239,19 +225,19 @@ class TrajectoryProblem:
         )
         return self.plan_from(instance, solution)
 
-    def rate_bound(self, instance: Instance, most_rates: Array | None) -> Array:
-        """Most of every rate: 0 at rest (start and end) and for joints held on either side."""
+    def rate_bound(self, instance: Instance, stops: bool) -> Array:
+        """Most of every rate: 0 at rest (start and end, with stops each goal) and for joints held
+        on either side."""
         still = np.vstack([instance.held[:1] | True, instance.held])
         still[:-1] |= instance.held
         still[-1] = True
-        bound = np.tile(np.where(still, 0.0, np.inf).ravel(), self._order)
-        return bound if most_rates is None else np.minimum(bound, most_rates.ravel())
+        return np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
 
     def length_bounds(self, steps: Array, lengths: Array | None) -> Bounds:
         """Lengths of the segments."""
         if self.cost != "path-length":
             return (np.zeros(self.goals),) * 3
-        at = np.sqrt(((steps * self._joint_costs) ** 2).sum(axis=1))
+        at = np.sqrt((steps**2).sum(axis=1))
         low, high = np.zeros(self.goals), np.full(self.goals, np.inf)
         if lengths is not None:
             given = ~np.isnan(lengths)
@@ -327,14 +313,16 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 
 @lru_cache(maxsize=32)
 def trajectory_problem(
-    robot: Robot,
-    hands: tuple[Hand, ...],
-    goals: int,
-    cost: Cost,
-    joint_costs: tuple[float, ...] | None = None,
+    robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
     """The compiled problem, built once per process."""
-    return TrajectoryProblem(robot, hands, goals, cost, joint_costs)
+    return TrajectoryProblem(robot, hands, goals, cost)
+
+
+def segment_lengths(configurations: Array) -> Array:
+    """Joint-space distances from each configuration ``(k, dof)`` to the next, shape ``(k - 1,)``,
+    length unit and rad together."""
+    return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
 
 
 def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:

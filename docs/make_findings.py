@@ -38,7 +38,6 @@ KEPT = {
     "horizon": ("horizon horizon-signs claims", "horizon"),
     "fourteen": ("fourteen claims", "fourteen"),
     "practice": ("practice claims", "practice"),
-    "stops": ("stops claims", "stops"),
     "dose": ("dose claims", "dose"),
     "resist": ("resist claims", "resist"),
     "human": ("human human-effects", "human"),

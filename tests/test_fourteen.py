@@ -40,8 +40,7 @@ def planted(*, many=NUMBER, many_two=None, seven=NUMBER[:3], learner=60.0, cma=4
             for h, gain in enumerate(of_family):
                 ticks -= factor * gain * sum(left >= h for left in range(goals))
                 words = {"variant": f"horizon={h}", "run_id": f"{task.name} {h}"}
-                asked = {"horizon": h, "hands": "planned", "costs": "none", "cost_factor": 3.0}
-                words |= {"parameters": json.dumps(asked), "task": task.name}
+                words |= {"parameters": json.dumps({"horizon": h}), "task": task.name}
                 rows.append(row("receding-horizon", -round(ticks), **words))
             for method, loss in (("dual-process/EC1", learner), ("cma-es/bandit", cma)):
                 name = "dual-process/EC4" if method[0] == "d" and len(task.hands) > 1 else method

@@ -14,7 +14,6 @@ from coartic.baselines.posture_graph import (
     sample_postures,
 )
 from coartic.method import Information, Session
-from coartic.motion.costs import joint_costs
 from tests.support.strategies import changed
 
 TASKS = {
@@ -24,7 +23,7 @@ TASKS = {
 }
 
 
-def cheapest(graph, hands, costs):
+def cheapest(graph, hands):
     """Every combination of nodes, one by one."""
     task, best = graph.task, np.inf
     layers = [graph.layers[goal, hand] for goal, hand in enumerate(hands)]
@@ -34,31 +33,27 @@ def cheapest(graph, hands, costs):
             q = before.copy()
             q[:2], joints = node[:2], task.robot.joints(hand)
             q[joints] = node[joints]
-            length += np.linalg.norm(costs * (q - before))
+            length += np.linalg.norm(q - before)
             before = q
         best = min(best, length)
     return best
 
 
-def length_of(task, configurations, costs=1.0):
-    steps = costs * np.diff(np.vstack([task.q0, configurations]), axis=0)
+def length_of(task, configurations):
+    steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
     return np.linalg.norm(steps, axis=1).sum()
 
 
 @pytest.mark.parametrize("name", TASKS)
-@pytest.mark.parametrize("costly", ["none", "base"])
-def test_chains_are_the_cheapest(name, costly):
+def test_chains_are_the_cheapest(name):
     task = TASKS[name]
-    costs = joint_costs(task.robot, costly, 3.0)
-    graph = PostureGraph.sample(task, 5, np.random.default_rng(3), costs)
+    graph = PostureGraph.sample(task, 5, np.random.default_rng(3))
     chains = list(graph.chains())
     assert len(chains) == len(task.hands) ** len(task.goals)
     assert len(dict(chains)) == len(chains)
     for hands, configurations in chains:
         steps = np.diff(np.vstack([task.q0, configurations]), axis=0)
-        assert length_of(task, configurations, costs) == pytest.approx(
-            cheapest(graph, hands, costs)
-        )
+        assert length_of(task, configurations) == pytest.approx(cheapest(graph, hands))
         for goal, hand in enumerate(hands):
             (other,) = {"left", "right"} - {hand}
             assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
@@ -90,7 +85,8 @@ def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
 def test_a_free_arm_is_spread_over_its_way():
     task = TASKS["two-armed-2"]
     graph = PostureGraph.sample(task, 10, np.random.default_rng(6))
-    ((hands, chain),) = graph.chains(("left", "right", "right", "left"))
+    hands = ("left", "right", "right", "left")
+    chain = dict(graph.chains())[hands]
     spread = move_other_arm(task, hands, chain)
     left = task.robot.joints("left")
     first, last = chain[0, left], chain[3, left]
@@ -119,7 +115,6 @@ def test_a_goal_without_a_posture_is_named():
     task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
     graph = PostureGraph.sample(task, 20, np.random.default_rng(7))
     assert graph.why_none().startswith("goal 2: no posture was found that puts the left or")
-    assert "the right hand" in graph.why_none(("right", "right"))
     assert list(graph.chains()) == []
 
 

@@ -1,4 +1,4 @@
-"""The planner with a receding horizon, and path lengths in which joints cost unlike."""
+"""The planner with a receding horizon."""
 
 import math
 from functools import cache
@@ -11,8 +11,6 @@ from coartic import PAPER, Robot, load_task
 from coartic.baselines.optimum import Optimum
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.motion.costs import joint_costs, segment_lengths
-from coartic.motion.ticks import trajectory
 from tests.support.strategies import solve, tiny_task
 from tests.support.suites import KNOWN
 
@@ -31,10 +29,6 @@ def solved(task, method=RecedingHorizon, **parameters):
 def planned(name, **parameters):
     """The same on a task by its name, once for all tests."""
     return solved(load_task(name), nodes=100, **parameters)
-
-
-def weighted_length(task, solution, costs):
-    return segment_lengths(trajectory(task, solution).configurations, costs).sum()
 
 
 @pytest.mark.parametrize("name", ["descending", "two-armed/v1/d006"])
@@ -123,64 +117,18 @@ def test_the_shortest_starts_are_polished():
     assert planned("two-armed-2", horizon=3, starts=1)[1].hands == "RLRR"
 
 
-def test_with_hands_given_only_postures_look_ahead():
-    _, best = planned(THREE_GOALS, horizon=9)
-    _, postures_alone = planned(THREE_GOALS, horizon=0, hands="optimal")
-    assert postures_alone.hands == best.hands
-    assert postures_alone.reward <= best.reward
-
-
-def test_weighted_lengths_by_hand():
-    robot = Robot(left_links=(1.0,), right_links=(1.0, 1.0))
-    assert joint_costs(robot, "none", 3.0).tolist() == [1, 1, 1, 1, 1]
-    assert joint_costs(robot, "base", 3.0).tolist() == [3, 3, 1, 1, 1]
-    assert joint_costs(robot, "arms", 2.0).tolist() == [1, 1, 2, 2, 2]
-    assert joint_costs(robot, "left-arm", 3.0).tolist() == [1, 1, 3, 1, 1]
-    assert joint_costs(robot, "right-arm", 3.0).tolist() == [1, 1, 1, 3, 3]
-    rows = np.array([[0, 0, 0, 0, 0], [1, 0, 4, 0, 0], [1, 0, 4, 0, 2]], dtype=float)
-    costs = joint_costs(robot, "base", 3.0)
-    assert segment_lengths(rows, costs).tolist() == [5, 2]
-
-
-def test_costly_joints_move_less():
-    task = load_task(THREE_GOALS)
-    costs = joint_costs(task.robot, "base", 4.0)
-    equal, execution = planned(THREE_GOALS, horizon=9)
-    weighted, _ = planned(THREE_GOALS, horizon=9, costs="base", cost_factor=4.0)
-    lengths = [weighted_length(task, plan.solution, costs) for plan in (equal, weighted)]
-    assert lengths[1] < 0.98 * lengths[0]
-    # Each movement may go a step too far, of which the base's part costs four times as much.
-    most = 4.0 * PAPER.step * len(task.goals)
-    assert abs(lengths[1] - weighted.details["path_length"]) < most
-    # Without costly joints the executed path is that of the ticks, less one for each arrival.
-    steps = execution.ticks - np.count_nonzero(execution.ticks_by_goal())
-    plain = weighted_length(task, equal.solution, np.ones(task.robot.dof))
-    assert plain == pytest.approx(steps * PAPER.step)
-
-
-def test_costs_that_are_equal_give_the_plan_without_costs():
-    task = load_task("descending")
-    plain, _ = solved(task, horizon=9, nodes=60)
-    same, execution = solved(task, horizon=9, nodes=60, costs="base", cost_factor=1.0)
-    # It aims a little inside the discs, at most by the radius that is left out.
-    assert 0 < same.details["path_length"] - plain.details["path_length"] < 0.03
-    assert execution.corrections == 0
-
-
 def test_the_suite_has_test_instances_of_all_families():
     cells = select_cells(load_suite("horizon"), KNOWN)
     tasks = {cell.task.name: cell.task for cell in cells}
     assert len(tasks) >= 200
     assert {task.split for task in tasks.values()} == {"test"}
     assert {len(task.goals) for task in tasks.values()} == set(range(2, 9))
-    planned = [
-        (cell.task.name, cell.method.complete(cell.parameters))
+    curve = [
+        (cell.task.name, cell.parameters["horizon"])
         for cell in cells
         if cell.method.name == RecedingHorizon.name
     ]
-    plain = {"hands": "planned", "costs": "none"}
-    curve = [(name, given) for name, given in planned if plain.items() <= given.items()]
     for name, task in tasks.items():
-        seen = {given["horizon"] for of_task, given in curve if of_task == name}
+        seen = {horizon for of_task, horizon in curve if of_task == name}
         assert set(range(min(5, len(task.goals)))) <= seen
         assert max(seen) == len(task.goals) - 1  # all goals, and no plan twice

@@ -16,6 +16,7 @@ from coartic.baselines.trajectory_problem import Instance, segment_cost, spline,
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 from coartic.motion.solution import other_arm_travel
+from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve
 
 ORDERS = {"acceleration": 2, "jerk": 3}
@@ -85,7 +86,7 @@ def test_plans_agree_with_another_optimiser(cost, hands, still):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
     graph = PostureGraph.sample(task, 60, np.random.default_rng(0))
-    ((_, chain),) = graph.chains(hands)
+    chain = dict(graph.chains())[hands]
     problem = trajectory_problem(task.robot, task.hands, 2, cost)
     plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
@@ -152,6 +153,59 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost, free_times):
         h = plan.durations[goal] / 400
         total += ((np.diff(points, n=order, axis=0) / h**order) ** 2).sum() * h
     assert total == pytest.approx(plan.cost, rel=0.03)
+
+
+ONE_SEGMENT = {"acceleration": (12, 3), "jerk": (720, 5)}  # from rest to rest: factor · L² / Tᵏ
+QUICK = {"nodes": 20, "graphs": 1, "chains": 1, "noisy_starts": 0}
+
+
+def planned(cost, task, **parameters):
+    """The plan of a task's initial hands by the method of a cost."""
+    (kind,) = (kind for kind in METHODS if kind.cost == cost)
+    method, session = kind(kind.Parameters(**QUICK, **parameters)), Session(task, 0, kind.told)
+    problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
+    hands = hands_of(task.initial_hands)
+    instance = Instance.of(task, hands, still=False, radius=task.radius - PAPER.arrival_tolerance)
+    plan = method.cheapest(session, problem, instance, method.starts(session, task)[hands])
+    assert plan.converged
+    return plan
+
+
+@pytest.mark.parametrize("cost", ["acceleration", "jerk"])
+@pytest.mark.parametrize("timing", ["free", "fixed"])
+def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost, timing):
+    """In straight lines; at free times no goal would gain by time from another."""
+    goals = ((2.6, 1.0), (3.2, -0.4), (1.5, -1.2), (0.2, 1.9), (2.2, 1.6))
+    task = small_task(goals=goals, initial_hands="RRRLR")
+    plan = planned(cost, task, timing=timing, stop=1)
+    factor, power = ONE_SEGMENT[cost]
+    lengths, times = plan.lengths(task.q0), plan.durations
+    assert plan.cost == pytest.approx((factor * lengths**2 / times**power).sum(), rel=1e-9)
+    assert plan.cost > 2 * planned(cost, task, timing=timing).cost
+    corners = np.vstack([task.q0, plan.configurations])
+    for piece, begin, end, length in zip(
+        spline(plan, task.q0, 50), corners[:-1], corners[1:], lengths, strict=True
+    ):
+        along = (piece - begin) @ (end - begin) / length**2
+        np.testing.assert_allclose(piece, begin + along[:, None] * (end - begin), atol=1e-9)
+    if timing == "free":
+        longer = times > 0.06  # than the least time, which binds where one posture hits two goals
+        savings = power * (lengths**2 / times ** (power + 1))[longer]
+        np.testing.assert_allclose(savings, savings.mean(), rtol=1e-3)
+        assert longer.sum() >= 4
+
+
+@pytest.mark.parametrize("cost", ["acceleration", "jerk"])
+@pytest.mark.parametrize("name", ["ascending", "descending"])
+def test_full_stops_at_equal_times_are_the_plan_of_squared_changes(cost, name):
+    """Nothing of smoothness is left: the same programme, solved as another one."""
+    task = load_task(name)
+    plan, jordan = planned(cost, task, timing="fixed", stop=1), planned("squared-changes", task)
+    assert plan.cost == pytest.approx(ONE_SEGMENT[cost][0] * jordan.cost, rel=1e-6)
+    np.testing.assert_allclose(plan.configurations, jordan.configurations, atol=1e-3)
+    (kind,) = (kind for kind in METHODS if kind.cost == cost)
+    _, execution, _ = solve(kind, task, stop=1, most_sequences=1, **QUICK)
+    assert (execution.completed, execution.corrections) == (True, 0)
 
 
 def test_the_cheapest_plan_that_converged_is_kept():
@@ -230,8 +284,9 @@ def test_joints_and_rates_that_are_held():
         [False, True, True, False, False], [False, True, False, True, True],
     ]  # fmt: skip
     rest, passing = [0.0] * 5, [np.inf, 0.0, np.inf, np.inf, np.inf]
-    assert problem.rate_bound(free, None).tolist() == [*rest, *passing, *rest]
-    assert problem.rate_bound(still, None).tolist() == [*rest, np.inf, *rest[1:], *rest]
+    assert problem.rate_bound(free, False).tolist() == [*rest, *passing, *rest]
+    assert problem.rate_bound(still, False).tolist() == [*rest, np.inf, *rest[1:], *rest]
+    assert not problem.rate_bound(free, True).any()
     alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
     assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
 

@@ -30,8 +30,7 @@ import coartic.analysis.topics.horizon
 import coartic.analysis.topics.paper.claims
 import coartic.analysis.topics.paper.coarticulation
 import coartic.analysis.topics.practice
-import coartic.analysis.topics.resist
-import coartic.analysis.topics.stops  # noqa: F401
+import coartic.analysis.topics.resist  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.hypotheses import holm

@@ -19,7 +19,6 @@ from coartic.analysis.topics import (
     practice,
     resist,
     settings,
-    stops,
     tasks,
 )
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
@@ -50,7 +49,6 @@ SECTIONS: tuple[Section, ...] = (
     horizon.HORIZON,
     fourteen.FOURTEEN,
     practice.PRACTICE,
-    stops.STOPS,
     dose.DOSE,
     resist.RESIST,
     families.SIGNS,

@@ -26,8 +26,6 @@ MANY = "fourteen-one/v1", "fourteen-two/v1"
 HALF = "seven-one/v1", "seven-two/v1"
 """Families with half as many goals, drawn alike."""
 ARMS = "one arm", "two arms"
-PLAIN = "planned", "none"
-"""``hands`` and ``costs`` of the planner that chooses its hands, and takes all joints alike."""
 
 
 @cached
@@ -43,9 +41,9 @@ def gains_by_horizon(study: Study) -> pd.DataFrame:
     """
     references = sample(study).references
     rows = []
-    for (name, *kind), plans in horizon.plans_by_horizon(study).items():
+    for name, plans in horizon.plans_by_horizon(study).items():
         task = study.tasks[name]
-        if task.family not in MANY + HALF or tuple(kind) != PLAIN or 0 not in plans:
+        if task.family not in MANY + HALF or 0 not in plans:
             continue
         goals, shortest = len(task.goals), -float(references[name].reward)
         together, before, longer = 0.0, 0, plans[0][0]

@@ -21,7 +21,6 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.words import interval_in_words, plural
-from coartic.motion.costs import joint_costs, segment_lengths
 
 ALL_GOALS = "all"
 HORIZONS: tuple[int | str, ...] = (0, 1, 2, 3, 4, ALL_GOALS)
@@ -50,54 +49,38 @@ ENOUGH = 0.9
 
 
 @cached
-def plans_by_horizon(
-    study: Study,
-) -> dict[tuple[str, str, str], dict[int, tuple[float, CellRuns]]]:
-    """Length of what the planner made of every random task, and its cell, by goals ahead.
+def plans_by_horizon(study: Study) -> dict[str, dict[int, tuple[int, CellRuns]]]:
+    """Ticks of what the planner made of every random task, and its cell, by task and goals ahead.
 
-    Keys are task, ``hands`` and ``costs``. Lengths are ticks; with costly joints the weighted path
-    length that was executed. All goals in view are as many as follow the first.
+    All goals in view are as many as follow the first. Of version 1, plans with given hands or
+    costly joints are left out.
     """
-    seen: dict[tuple[str, str, str], dict[int, tuple[float, CellRuns]]] = {}
+    seen: dict[str, dict[int, tuple[int, CellRuns]]] = {}
     for cell, parameters in random_tasks.solved_cells(study).get(random_tasks.RECEDING_HORIZON, ()):
-        task, costly = study.tasks[cell.task], parameters["costs"]
-        if task.family is None:
-            continue
-        length = -float(cell.rewards[0])
-        if costly != "none":
-            costs = joint_costs(task.robot, costly, parameters["cost_factor"])
-            (executed,) = study.trajectories(cell.task, cell.label).runs
-            length = float(segment_lengths(executed.configurations, costs).sum())
-        at = min(parameters["horizon"], len(task.goals) - 1)
-        seen.setdefault((cell.task, parameters["hands"], costly), {})[at] = length, cell
+        task, plain = study.tasks[cell.task], {"hands": "planned", "costs": "none"}
+        if task.family is not None and plain.items() <= (plain | parameters).items():
+            at = min(parameters["horizon"], len(task.goals) - 1)
+            seen.setdefault(cell.task, {})[at] = -int(cell.rewards[0]), cell
     return seen
 
 
 @cached
 def gaps_by_horizon(study: Study) -> pd.DataFrame:
-    """Gaps of the planner on every random task, a row for each: per cent of the shortest.
+    """Gaps of the planner on every random task, a row for each: per cent of the best known.
 
-    Indexed by task, ``hands`` and ``costs``; columns :data:`HORIZONS`, missing where nothing was
-    run and where the task has not so many goals ahead; ``ahead``: goals ahead at the first
-    movement, four of five; ``cells`` behind the gaps by horizon. Of ticks, over the best known of
-    the task; with costly joints over the shortest of all runs with the same costs.
+    Columns :data:`HORIZONS`, missing where nothing was run and where the task has not so many goals
+    ahead; ``ahead``: goals ahead at the first movement, four of five; ``cells`` behind the gaps by
+    horizon.
     """
     references = sample(study).references
-    seen = plans_by_horizon(study)
     rows = {}
-    for (name, hands, costly), plans in seen.items():
-        last = len(study.tasks[name].goals) - 1
-        planned = seen.get((name, "planned", costly), {})
-        by_horizon = dict(plans)
-        if hands == "optimal" and last in planned:  # with all goals in view it is the same plan
-            by_horizon.setdefault(last, planned[last])
-        lengths = {at: length for at, (length, _) in by_horizon.items()}
-        shortest = -float(references[name].reward) if costly == "none" else min(lengths.values())
+    for name, plans in plans_by_horizon(study).items():
+        last, shortest = len(study.tasks[name].goals) - 1, -float(references[name].reward)
+        lengths = {at: ticks for at, (ticks, _) in plans.items()}
         ticks = [lengths.get(last if h == ALL_GOALS else int(h), math.nan) for h in HORIZONS]
-        cells = {at: cell for at, (_, cell) in by_horizon.items()}
-        rows[name, hands, costly] = [*(100 * (np.array(ticks) / shortest - 1)), last, cells]
-    index = pd.MultiIndex.from_tuples(list(rows), names=["task", "hands", "costs"])
-    return pd.DataFrame(list(rows.values()), index, [*HORIZONS, "ahead", "cells"])
+        cells = {at: cell for at, (_, cell) in plans.items()}
+        rows[name] = [*(100 * (np.array(ticks) / shortest - 1)), last, cells]
+    return pd.DataFrame.from_dict(rows, orient="index", columns=[*HORIZONS, "ahead", "cells"])
 
 
 def cells_at(gaps: pd.DataFrame, horizon: int | str) -> list[CellRuns]:
@@ -108,26 +91,12 @@ def cells_at(gaps: pd.DataFrame, horizon: int | str) -> list[CellRuns]:
 
 
 def groups(study: Study) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Kinds of tasks and of planners, each with its gaps by horizon.
-
-    A planner that has its hands given, or dear joints, follows the plain one on the same tasks.
-    """
-    every = gaps_by_horizon(study)
-    parts = dict(list(every.groupby(["hands", "costs"], sort=False)))
-    plain = parts.pop(("planned", "none"), every[:0])
-    yield "all", "all", plain
-    names = plain.index.get_level_values("task")
+    """Kinds of tasks, each with its gaps by horizon."""
+    gaps = gaps_by_horizon(study)
+    yield "all", "all", gaps
     for kind, value_of in KINDS.items():
-        for value, part in plain.groupby(np.array([value_of(study.tasks[n]) for n in names])):
+        for value, part in gaps.groupby(np.array([value_of(study.tasks[n]) for n in gaps.index])):
             yield kind, str(value), part
-    given = [("given", part) for (hands, _), part in parts.items() if hands == "optimal"]
-    dear = [(f"{costs} dear", part) for (_, costs), part in parts.items() if costs != "none"]
-    for kind, plainly, others in (("hands", "planned", given), ("costs", "equal", dear)):
-        tasks = {name for _, part in others for name in part.index.get_level_values("task")}
-        if others:
-            yield kind, plainly, plain[names.isin(tasks)]
-        for planner, part in others:
-            yield kind, planner, part
 
 
 @table("group, value, h, tasks, gap[], gain[], seconds")
@@ -165,9 +134,8 @@ def enough(gaps: pd.Series) -> bool:
 def horizon_signs(study: Study) -> Rows:
     """Signs of coarticulation of the planner by goals ahead, means over tasks that have more, and
     what they gain by all goals."""
-    gaps = gaps_by_horizon(study).query("hands == 'planned' and costs == 'none'")
+    gaps = gaps_by_horizon(study)
     cells = {h: {cell.task: cell for cell in cells_at(gaps, h)} for h in HORIZONS}
-    ahead = gaps.ahead.droplevel(["hands", "costs"])
     for name, sign in SIGNS.items():
         signs = {
             h: {
@@ -178,7 +146,7 @@ def horizon_signs(study: Study) -> Rows:
         }
         for h in HORIZONS:
             values = pd.DataFrame({"here": signs[h], "all": signs[ALL_GOALS]}).dropna()
-            values = values[ahead[values.index] > (0 if h == ALL_GOALS else h)]
+            values = values[gaps.ahead[values.index] > (0 if h == ALL_GOALS else h)]
             if len(values):
                 row: Row = {"sign": name, "words": sign.words, "h": str(h), "tasks": len(values)}
                 row |= random_tasks.mean_of("mean", values.here)
@@ -194,38 +162,30 @@ PLACES = [str(h) for h in HORIZONS]
     "horizon",
     "Gap of a planner by how far it looks ahead",
     f"Gap to the best known solution, mean over random tasks with its {style.COVERAGE} interval "
-    "(bootstrap over tasks), linear below 1 %, at horizons that all of a line's tasks have. By "
-    "goals of the task: a line ends where all goals are in view. Given hands: hands chosen by each "
-    "plan, or those of the plan with all goals. Dear joints cost three times as much, by weighted "
-    "path length.",
+    "(bootstrap over tasks), linear below 1 %, by goals of the task, at horizons that all of a "
+    "line's tasks have. A line ends where all goals are in view.",
 )
 def draw_horizon(study: Study) -> Parts:
-    """The curves by number of goals, with given hands, and with dear joints."""
+    """A curve for each number of goals."""
     data = horizon(study)
     if not len(data):
         raise missing(study, "no runs of the planner on instances of a family of tasks")
-    titles = {"goals": "goals of the task", "hands": "given hands", "costs": "dear joints"}
-    shown = [group for group in titles if (data.group == group).any()]
-    drawing, panels = style.figure_of((1, len(shown)), (style.TWO, 2.6), sharey=True)
-    for axes, group in zip(panels, shown, strict=True):
-        parts = data[data.group == group].groupby("value", sort=False)
-        for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
-            if group == "goals" and BEYOND not in set(rows.h):
-                rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
-            rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
-            at = rows.h.map(PLACES.index) + 0.08 * number
-            line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
-            style.means(axes, at, rows, "gap", **line, label=str(name))
-        axes.set_xticks(range(len(PLACES)), PLACES)
-        axes.set_xlabel("goals ahead")
-        axes.set_title(titles[group])
-        axes.legend(loc="upper right")
-    first = panels[0]
-    first.set_yscale("symlog", linthresh=1, linscale=0.6)
-    first.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
-    first.set_ylim(bottom=-0.1)
-    first.set_ylabel("gap (%)")
-    style.letters(panels)
+    drawing, (axes,) = style.figure_of((1, 1), (style.ONE, 2.6))
+    parts = data[data.group == "goals"].groupby("value", sort=False)
+    for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
+        if BEYOND not in set(rows.h):
+            rows = rows[rows.h != ALL_GOALS]  # that is its last horizon
+        rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
+        at = rows.h.map(PLACES.index) + 0.08 * number
+        line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
+        style.means(axes, at, rows, "gap", **line, label=str(name))
+    axes.set_xticks(range(len(PLACES)), PLACES)
+    axes.set_xlabel("goals ahead")
+    axes.legend(title="goals of the task", loc="upper right")
+    axes.set_yscale("symlog", linthresh=1, linscale=0.6)
+    axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
+    axes.set_ylim(bottom=-0.1)
+    axes.set_ylabel("gap (%)")
     gained = data[(data.group == "all") & data.gain.notna()]
     each = (f"{h} ahead: {gain:.1%}" for h, gain in zip(gained.h, gained.gain, strict=True))
     return drawing, data, f"Gain of each goal ahead where it exists. {'; '.join(each)}.", ()
@@ -254,10 +214,9 @@ def finding_of_horizon(study: Study) -> str:
     return sentence
 
 
-def gaps_of(data: Data, hands: str = "planned", costs: str = "none") -> pd.DataFrame:
+def gaps_of(data: Data) -> pd.DataFrame:
     """Gaps by horizon on the tasks that methods were not tuned on, indexed by task."""
-    gaps = gaps_by_horizon(data.study).query("hands == @hands and costs == @costs")
-    gaps = gaps.droplevel(["hands", "costs"])
+    gaps = gaps_by_horizon(data.study)
     gaps = gaps.loc[[name for name in gaps.index if data.task(name).split != "development"]]
     runs = data.study.runs
     planned = runs[(runs.method == random_tasks.RECEDING_HORIZON) & runs.task.isin(gaps.index)]
@@ -296,40 +255,6 @@ def further_goals_gain_little(data: Data) -> Finding:
 
 
 @judges(
-    "most-of-the-loss-is-posture",
-    test="one-tailed bootstrap test over random tasks, with no goal ahead: the gap with given "
-    "hands less {share_of_loss:g} of the gap with planned hands is above 0",
-)
-def most_of_the_loss_is_posture(data: Data) -> Finding:
-    """Loss without look-ahead, with given hands less a share of that with planned ones."""
-    planned, given = gaps_of(data)[0], gaps_of(data, hands="optimal")[0]
-    share = MARGINS["share_of_loss"]
-    sentence = (
-        "Without look-ahead the planner with given hands loses {} points more than "
-        f"{share:.0%} of what it loses with its own"
-    )
-    return random_tasks.means_over_tasks({sentence: (given - share * planned, 0.0, 1)})
-
-
-@judges(
-    "dear-joints-keep-the-horizon-where-goals-are",
-    test="one-tailed bootstrap tests over random tasks, of the weighted path length that was "
-    "executed: from one goal ahead to two the gap falls by more than {gain:g} % on tasks with "
-    "four goals or six, and from four to all by less on those with six, with either dear",
-)
-def dear_joints_keep_the_horizon(data: Data) -> Finding:
-    """Gains of the second goal ahead, and of those beyond the fourth, with dear joints."""
-    parts, least = {}, MARGINS["gain"]
-    for costs in ("base", "right-arm"):
-        gaps = gaps_of(data, costs=costs)
-        dear = f"with a dear {costs.replace('-', ' ')}"
-        parts[f"{dear} the second goal ahead gains {{}} points"] = gaps[1] - gaps[2], least, 1
-        beyond = (gaps[4] - gaps[ALL_GOALS]).where(gaps.ahead > 4)
-        parts[f"{dear} those beyond the fourth gain {{}} points together"] = beyond, least, -1
-    return random_tasks.means_over_tasks(parts)
-
-
-@judges(
     "learner-behind-one-goal-ahead",
     test="one-tailed bootstrap test over random tasks: the learner's gap is higher by more than "
     "{gain:g} %",
@@ -357,9 +282,7 @@ HORIZON = Section(
     table="horizon",
     note=(
         "Rows are over tasks that have so many goals ahead at their first movement, with the gain"
-        " of the last of these goals (5+: of all beyond the fourth); all is over all tasks. With "
-        "hands given, and with dear joints, they stand beside those of the plain planner on the "
-        "same tasks. Gaps with dear joints are of weighted path lengths. Table horizon-signs has "
-        "the signs of coarticulation."
+        " of the last of these goals (5+: of all beyond the fourth); all is over all tasks. Table "
+        "horizon-signs has the signs of coarticulation."
     ),
 )

@@ -169,7 +169,7 @@ class _Environment(_Stored):
 
 
 GONE = frozenset(
-    {"objectives", "believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"}
+    {"objectives", "stops", "believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"}
 )
 """Suites and methods of version 1 that are no longer here."""
 _ROWS = 2_000  # that are read at once
