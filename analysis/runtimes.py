@@ -8,29 +8,19 @@ from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from coartic.analysis import methods as known
-from coartic.analysis.figures import style
 from coartic.analysis.optima import locks_base
 from coartic.analysis.study import Study, load
 from coartic.analysis.topics.comparison import scores
-from coartic.analysis.topics.comparison.figures import draw_shares
 from coartic.analysis.topics.comparison.running_times import SPENDS, TARGETS, ecdf, times_of
 from coartic.errors import CoarticError
 from coartic.robot import Array
 from coartic.text import id_named, unknown
 
 By = Literal["task", "family"]
-AXES = {
-    "trials": "trials",
-    "forward_kinematics": "forward-kinematics evaluations",
-    "solve_s": "seconds",
-}
-"""What can be spent, in words."""
 EVERYTHING = "all"
 """The group of all tasks."""
-_MOST_GROUPS = 20  # of a figure
 
 
 def runtimes(
@@ -116,40 +106,3 @@ def runtimes(
                     steps = steps or [(np.inf, 0.0)]
                     rows += [(group, name, spend, budget, share) for budget, share in steps]
     return pd.DataFrame(rows, columns=["group", "method", "spend", "budget", "share"])
-
-
-def summary(curves: pd.DataFrame, share: float = 0.5) -> pd.DataFrame:
-    """One row for each group and method of :func:`runtimes`: per cent of the targets reached in the
-    end, and the least budget of each kind that reaches a share of them, infinite without any."""
-    keys = ["group", "method"]
-    enough = curves[curves.share >= share - 1e-9]
-    least = enough.pivot_table("budget", keys, "spend", "min").reindex(columns=SPENDS)
-    table = pd.DataFrame({"reached (%)": 100 * curves.groupby(keys, sort=False).share.max()})
-    return table.join(least.rename(columns=AXES)).fillna(np.inf).reset_index()
-
-
-@style.styled
-def draw(curves: pd.DataFrame) -> Figure:
-    """A figure of :func:`runtimes`: a row for each group, a panel for each kind of budget.
-
-    Raises CoarticError for more groups than a figure has room for.
-    """
-    groups = list(dict.fromkeys(curves.group))
-    if len(groups) > _MOST_GROUPS:
-        raise CoarticError(f"{len(groups)} groups; a figure has room for {_MOST_GROUPS}")
-    reached = curves[np.isfinite(curves.budget)]
-    spends = [spend for spend in SPENDS if (reached.budget[reached.spend == spend] > 0).any()]
-    looks = style.looks(curves.method)
-    size = style.TWO, 0.6 + 1.7 * len(groups)
-    drawing, panels = style.figure_of((len(groups), len(spends)), size, sharey=True)
-    for place, axes in enumerate(panels):
-        row, column = divmod(place, len(spends))
-        here = (reached.group == groups[row]) & (reached.spend == spends[column])
-        if (reached.budget[here] > 0).any():
-            draw_shares(axes, reached[here], looks)
-        axes.set_title(groups[row])
-        axes.set_xlabel(AXES[spends[column]] if row == len(groups) - 1 else "")
-        axes.set_ylabel("" if column else "targets reached (%)")
-    entries = [style.entry(known.name_of(name), **look) for name, look in looks.items()]
-    style.legend(drawing, entries, min(len(entries), 4))
-    return drawing

@@ -10,13 +10,11 @@ import hashlib
 import lzma
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.runs.store import RUNS_FILE, open_store, writing
+from coartic.runs.store import RUNS_FILE, Store, open_content, open_store, writing
 
 RELEASED = "released"
 """What stands for the shipped results in place of a folder."""
@@ -25,13 +23,9 @@ _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
 
 
-@contextmanager
-def results_folder(name: str | Path, suite: str) -> Iterator[Path]:
-    """A results folder, or, for the name ``released``, the shipped results of a suite in a folder
-    that is there for a while. Raises CoarticError where there are none, or they were changed."""
-    if str(name) != RELEASED:
-        yield folder_named(name)
-        return
+def open_released(suite: str) -> Store:
+    """The shipped results of a suite, unpacked in memory. Raises CoarticError where there are none,
+    or they were changed."""
     hashes = released_hashes()
     if suite not in hashes:
         raise CoarticError(
@@ -41,9 +35,7 @@ def results_folder(name: str | Path, suite: str) -> Iterator[Path]:
     content = path.read_bytes()
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
         raise CoarticError(f"{path} is not as it was released: install coartic again")
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / RUNS_FILE).write_bytes(lzma.decompress(content))
-        yield Path(folder)
+    return open_content(lzma.decompress(content), RELEASED)
 
 
 def released_hashes() -> dict[str, str]:

@@ -543,9 +543,10 @@ def best_known(tasks: Sequence[Task]) -> Array:
     known = {name: None if entry is None else entry.reward for name, entry in shipped.items()}
     if any(known[task.name] is None and task.split == "test" for task in tasks):
         released = import_module("coartic.benchmarks.released")
-        with released.results_folder(released.RELEASED, "families") as folder:
-            study = import_module("coartic.analysis.study").load(folder)
-            known |= {name: found.reward for name, found in study.optima.items() if name in known}
+        with released.open_released("families") as store:
+            runs, plan = store.frame("runs"), store.plan()
+        optima = import_module("coartic.analysis.optima").known_optima(runs, plan.tasks, plan.model)
+        known |= {name: found.reward for name, found in optima.items() if name in known}
     rewards = [known[task.name] for task in tasks]
     return np.array([np.nan if reward is None else reward for reward in rewards], dtype=np.float64)
 

@@ -323,7 +323,6 @@ def test_entry_points():
         (("run", "paper", "--runs", "0"), "runs"),
         (("run", "paper", "--jobs", "-2"), "jobs"),
         (("report", "nowhere"), "nowhere"),
-        (("compare", "nowhere", "else"), "nowhere"),
         (("verify", "nowhere"), "nowhere"),
         (("trace", "cells", "--in", "nowhere"), "nowhere"),
         (("reproduce", "0123456", "--in", "nowhere"), "nowhere"),

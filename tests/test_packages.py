@@ -12,8 +12,7 @@ import zipfile
 import pytest
 
 from coartic.benchmarks.registry import built_in
-from coartic.benchmarks.released import released_hashes, results_folder
-from coartic.runs.store import open_store
+from coartic.benchmarks.released import open_released, released_hashes
 from tests.support.suites import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -36,7 +35,7 @@ def do(*command, cwd):
 def test_shipped_results_are_of_this_code():
     """Otherwise nobody's runs of a built-in method go beside them."""
     for suite in released_hashes():
-        with results_folder("released", suite) as folder, open_store(folder) as store:
+        with open_released(suite) as store:
             shipped = store.plan().methods
         now = built_in()
         assert {name: card.code for name, card in shipped.items()} == {

@@ -7,9 +7,7 @@ import pytest
 
 import coartic
 from coartic import CoarticError, load_task
-from coartic.analysis.runtimes import draw, summary
 from coartic.analysis.topics.comparison.running_times import SPENDS
-from tests.support.commands import call
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "nullspace-qp/none"
@@ -85,13 +83,11 @@ def test_budgets_to_a_share(study):
     """Of the targets at half (-305.5 and -570) the first run of ascending hits its own at trial 4,
     the second at 3, and that of two-armed at 3; evaluations are 10 a trial."""
     curves = coartic.runtimes(study, methods=["own", PLAN], targets=[0.5])
-    table = summary(curves).set_index("method")
-    assert table.loc["own"].tolist() == ["all", 100.0, 3.0, 30.0, pytest.approx(0.25 * 3 / 5)]
-    assert table.loc[PLAN].tolist() == ["all", 100.0, 0.0, 7.0, 0.25]
-    top = summary(coartic.runtimes(study, targets=[1.0])).set_index("method")
-    assert (top["reached (%)"]["own"], top.trials["own"]) == (25.0, math.inf)
-    assert (top["reached (%)"][PLAN], top.trials[PLAN]) == (0.0, math.inf)
-    assert len(draw(curves).axes) == len(SPENDS)
+    half = curves[curves.share >= 0.5].groupby(["method", "spend"]).budget.min()
+    assert half["own"][list(SPENDS)].tolist() == [3.0, 30.0, pytest.approx(0.25 * 3 / 5)]
+    assert half[PLAN][list(SPENDS)].tolist() == [0.0, 7.0, 0.25]
+    top = coartic.runtimes(study, targets=[1.0]).groupby("method").share.max()
+    assert (top["own"], top[PLAN]) == (0.25, 0.0)
 
 
 def test_methods_that_are_named_share_their_tasks(study):
@@ -116,20 +112,3 @@ def test_what_cannot_be_shown(study, tmp_path):
         coartic.runtimes(MadeUp(study, optima={}))
     with pytest.raises(CoarticError, match="does not exist"):
         coartic.runtimes(tmp_path / "nowhere")
-
-
-def test_command(traced, monkeypatch, capsys, tmp_path):
-    """The steps as CSV are those of the function; a figure is a picture."""
-    command = ("runtimes", traced.folder, "--by", "task", "--targets", "0.5,1")
-    assert call(monkeypatch, capsys, *command, "--out", tmp_path / "r.csv")[0] == 0
-    read = pd.read_csv(tmp_path / "r.csv")
-    pd.testing.assert_frame_equal(read, coartic.runtimes(traced, by="task", targets=[0.5, 1]))
-    assert call(monkeypatch, capsys, *command, "--out", tmp_path / "r.svg")[0] == 0
-    assert "<svg" in (tmp_path / "r.svg").read_text()
-    for wrong, said in (
-        (("--targets", "x"), "write numbers, such as"),
-        (("--out", tmp_path / "r.txt"), "must end in .csv, .svg"),
-        (("--out", tmp_path / "r.csv"), "is there already"),
-    ):
-        code, _, error = call(monkeypatch, capsys, *command, *wrong)
-        assert (code, said in error) == (2, True)

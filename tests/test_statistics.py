@@ -5,7 +5,6 @@ import math
 
 import calibrate
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -171,18 +170,6 @@ def test_holm_leaves_out_what_was_not_tested():
         hypotheses.holm([0.01, 0.02, 0.03], 2)
     with pytest.raises(ValueError, match="between 0 and 1"):
         hypotheses.holm([0.5, 1.5])
-
-
-def test_pairing_by_seed():
-    first = pd.DataFrame({"seed": [3, 1, 2], "reward": pd.array([-3, -1, None], "Int64")})
-    second = pd.DataFrame({"seed": [1, 2, 3, 4], "reward": pd.array([-10, -20, -30, 0], "Int64")})
-    a, b = statistics.paired_by_seed(first, second)
-    assert a.tolist() == [-3, -1]
-    assert b.tolist() == [-30, -10]
-    with pytest.raises(ValueError, match="one-to-one"):
-        statistics.paired_by_seed(pd.concat([first, first]), second)
-    with pytest.raises(ValueError, match="one-to-one"):
-        statistics.paired_by_seed(first, pd.concat([second, second]))
 
 
 def test_closed_intervals():

@@ -20,7 +20,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from coartic.robot import Array
@@ -103,16 +102,6 @@ def varies(values: Array, axis: int = 0) -> Array:
 def centred(values: Array) -> Array:
     """Values less their mean over the first axis; 0 where they do not differ."""
     return np.where(varies(values), values - values.mean(axis=0), 0.0)
-
-
-def paired_by_seed(first: pd.DataFrame, second: pd.DataFrame) -> tuple[Array, Array]:
-    """Rewards of two frames of runs, for the values of ``seed`` where both have one.
-
-    Raises ValueError where a seed occurs twice in one of them.
-    """
-    rewards = [runs[["seed", "reward"]].dropna() for runs in (first, second)]
-    both = rewards[0].merge(rewards[1], on="seed", validate="one_to_one")
-    return both.reward_x.to_numpy(np.float64), both.reward_y.to_numpy(np.float64)
 
 
 def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:

@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, new, paper, play, read, run, share
+from coartic.cli import draw, new, paper, play, read, run
 from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
@@ -52,17 +52,12 @@ COMMANDS = (
     (run.check, "EC4"),
     (run.reproduce, "1a2b3c --in results/quick"),
     (read.report, "results/quick --for-paper"),
-    (read.runtimes, "results/comparison --by family --out runtimes.csv"),
     (read.trace, "ranking CMA-ES --in results/comparison"),
-    (read.compare, "results/old results/new --out cells.csv"),
     (read.verify, "results/quick --again 3"),
     (read.cite, "results/comparison --analysis"),
     (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
     (play.play, "two-armed-1 --out play.html"),
-    (share.merge, "results/a results/b --out results/all"),
-    (share.standings, "submissions --out standings.csv"),
-    (share.export, "results/comparison --ioh --out ioh"),
 )
 """The commands, each with what stands behind its name in the example of its help."""
 for command, example in COMMANDS:

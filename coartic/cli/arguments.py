@@ -73,7 +73,6 @@ Out = Annotated[
         "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
     ),
 ]
-OutFolder = Annotated[str, typer.Option("--out", metavar="FOLDER", help="Folder for the results.")]
 Readings = Annotated[
     list[str] | None,
     typer.Option(
@@ -137,7 +136,7 @@ RetryFailed = Annotated[
 ]
 Redo = Annotated[bool, typer.Option("--redo", help="Repeat every run.")]
 Beside = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         metavar="FOLDER",
         help="Put these results beside: a folder, or 'released' for the shipped ones.",

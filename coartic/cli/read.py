@@ -7,12 +7,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import split_names
 from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -66,55 +65,6 @@ def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
         yield "Failed", f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
 
 
-def runtimes(
-    folder: given.Results,
-    by: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="One for each 'task' or 'family'.")
-    ] = None,
-    methods: given.Methods = None,
-    targets: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y", help="Shares of the way to the optimum, such as 0.5,0.9,1."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            parser=given.output_named,
-            metavar="FILE",
-            help="All steps (.csv), or a figure (.svg, .pdf, .png).",
-        ),
-    ] = None,
-    replace: given.Replace = False,
-) -> None:
-    """Show what methods spend to reach targets (an ECDF)."""
-    from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.runtimes import draw, summary
-    from coartic.analysis.runtimes import runtimes as curves_of
-    from coartic.files import check_output, write_output
-
-    if out is not None:
-        endings = (".csv", *FORMATS)
-        if out.suffix.lower() not in endings:
-            raise CoarticError(f"--out {out}: the name must end in {', '.join(endings)}.")
-        check_output(out, replace=replace)
-    names, options = split_names(methods, "--methods"), dict[str, Any]()
-    if targets is not None:
-        try:
-            options["targets"] = [float(text) for text in targets.split(",")]
-        except ValueError:
-            raise CoarticError(f"--targets {targets}: write numbers, such as 0.5,0.9,1.") from None
-    curves = curves_of(folder, by=by, methods=names, **options)  # type: ignore[arg-type]
-    show_frame(summary(curves).map(lambda x: f"{x:.3g}" if isinstance(x, float) else x))
-    say("Budgets to half of the targets.")
-    if out is not None:
-        is_table = out.suffix.lower() == ".csv"
-        data = (
-            curves.to_csv(index=False).encode() if is_table else picture(draw(curves), out.suffix)
-        )
-        write_output(out, data, replace=replace)
-        say(f"{out}: {counted(len(curves), 'step')}.")
-
-
 def trace(
     table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
     row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
@@ -161,43 +111,6 @@ def trace(
             ("Film of one", f"coartic animate RUN {where} --out film.gif"),
         ]
     )
-
-
-def compare(
-    first: Annotated[
-        Path, typer.Argument(parser=folder_named, metavar="FOLDER_A", help="Results folder A.")
-    ],
-    second: Annotated[
-        Path, typer.Argument(parser=folder_named, metavar="FOLDER_B", help="Results folder B.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Table of all cells to write (.csv).")
-    ] = None,
-    replace: given.Replace = False,
-) -> None:
-    """Compare two results folders."""
-    from coartic.analysis.folders import compared_cells, differences, load_pair
-    from coartic.files import check_output, write_output
-
-    if out is not None:
-        if out.suffix.lower() != ".csv":
-            raise CoarticError(f"--out {out}: the name must end in .csv.")
-        check_output(out, replace=replace)
-    studies = load_pair(first, second)
-    show_frame(differences(*studies))
-    cells = compared_cells(*studies)
-    unlike = cells[cells.verdict != "identical"]
-    columns = ["task", "method", "reward_a", "reward_b", "difference", "verdict"]
-    show_frame(unlike[columns].head(20).round(1))
-    tally = ", ".join(
-        f"{count} {verdict}" for verdict, count in cells.verdict.value_counts().items()
-    )
-    say(f"{counted(len(cells), 'cell')} in both: {tally or 'nothing to compare'}.")
-    if out is not None:
-        write_output(out, cells.to_csv(index=False).encode(), replace=replace)
-        say(f"All cells: {out}")
-    elif len(unlike) > 20:
-        say("--out FILE.csv writes all cells.")
 
 
 def verify(

@@ -44,12 +44,11 @@ def run(
 
     If it is interrupted, repeat the command; it resumes where it stopped.
     """
+    from coartic.benchmarks.beside import put_beside
     from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.merge import put_beside
     from coartic.benchmarks.planning import Selection, plan_suite
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.released import results_folder
     from coartic.benchmarks.run import perform
     from coartic.benchmarks.suites import load_suite
 
@@ -57,10 +56,8 @@ def run(
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     registered = registry(method_file or ())
     names = given.methods_meant(split_names(methods, "--methods"), registered)
-    if beside is not None and not names:
-        names = sorted({*registered} - {*registry()})
-        if not names:
-            raise CoarticError("--beside needs a method to run: add --method-file or --methods")
+    if beside and not names:  # the user's own alone
+        names = [name for name, card in registered.items() if card.where.endswith(".py")]
     wanted = given.tasks_meant(split_names(tasks, "--tasks"))
     select = Selection(wanted, names, task_file or (), method_file or ())
     plan = plan_suite(
@@ -73,9 +70,6 @@ def run(
         trial_budget=trial_budget,
         readings=reading or (),
     )
-    if beside is not None:
-        with results_folder(beside, plan.suite) as theirs:
-            plan = put_beside(plan, theirs, out)
     display = Display(chosen.name)
 
     def saved() -> str:
@@ -83,6 +77,9 @@ def run(
         return f"Saved in {out}: {done}; repeat the command to resume."
 
     with interruptible(saved), display:
+        if beside:
+            display.line(f"Copying {' and '.join(beside)}, with every solution executed again.")
+            plan = put_beside(plan, beside, out)
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = perform(
             plan, out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update

@@ -226,7 +226,7 @@ class Store:
 
         Raises CoarticError for a folder of another suite.
         """
-        with self._writing():
+        with self.transaction():
             for row in self._db.execute("SELECT name FROM suite"):
                 if row["name"] != plan.suite:
                     raise CoarticError(
@@ -308,6 +308,28 @@ class Store:
         how = {"command": json.loads(row["command"]), "date": row["date"]}
         return {**json.loads(row["content"]), **how}
 
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """What is written in this block is there whole or not at all; it may stand within another.
+
+        Raises CoarticError where the disk does not take it.
+        """
+        if self._db.in_transaction:
+            yield
+            return
+        try:
+            self._wait_for("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._wait_for("COMMIT")
+            finally:
+                if self._db.in_transaction:
+                    self._db.rollback()
+        except sqlite3.OperationalError as error:
+            raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
+        except sqlite3.DatabaseError as error:
+            raise CoarticError(damage(self.folder / RUNS_FILE, error)) from None
+
     # Which runs there are.
 
     @explained
@@ -346,7 +368,7 @@ class Store:
         lost = self._file != identity(self.folder / RUNS_FILE)
         if lost:
             self._move()
-        with self._writing():
+        with self.transaction():
             for run in runs:
                 try:
                     self._write_run(run)
@@ -484,22 +506,6 @@ class Store:
             stored = [FAILED_TRIAL if reward is None else reward for reward in run.rewards]
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
-
-    @contextmanager
-    def _writing(self) -> Iterator[None]:
-        """One transaction. Raises CoarticError where the disk does not take it."""
-        try:
-            self._wait_for("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._wait_for("COMMIT")
-            finally:
-                if self._db.in_transaction:
-                    self._db.rollback()
-        except sqlite3.OperationalError as error:
-            raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
-        except sqlite3.DatabaseError as error:
-            raise CoarticError(damage(self.folder / RUNS_FILE, error)) from None
 
     def _wait_for(self, statement: str) -> None:
         """Execute it as soon as other programs that have the file open let it."""
@@ -645,6 +651,13 @@ def check_known(connection: sqlite3.Connection, folder: Path) -> None:
         raise CoarticError(
             f"{folder} has results of {gone[0]}: version 1.1.0 of coartic reads them"
         )
+
+
+def open_content(content: bytes, name: str) -> Store:
+    """The runs of a results folder whose file is in memory, to be read; ``name`` stands for it."""
+    with connect(":memory:", _WAIT_S) as connection:
+        connection.deserialize(content)
+    return Store(Path(name), connection)
 
 
 @contextmanager

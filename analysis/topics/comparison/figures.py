@@ -4,8 +4,7 @@ how rewards rise with trials."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -109,7 +108,7 @@ def ecdf_of_runtimes(study: Study) -> Parts:
     drawing, panels = style.figure_of((1, len(spends)), size)
     for axes, spend in zip(panels, spends, strict=True):
         of_spend = data[data.spend == spend]
-        draw_shares(axes, of_spend, looks, partial(name_in, study))
+        draw_shares(axes, study, of_spend, looks)
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
         axes.set_ylabel("targets reached (%)")
@@ -143,10 +142,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
 
 
 def draw_shares(
-    axes: Axes,
-    data: pd.DataFrame,
-    looks: Mapping[str, style.Look],
-    name_of: Callable[[str], str] = methods.name_of,
+    axes: Axes, study: Study, data: pd.DataFrame, looks: Mapping[str, style.Look]
 ) -> None:
     """A step curve for each method."""
     style.log_axis(axes)
@@ -159,7 +155,7 @@ def draw_shares(
         y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
         line: Any = {**looks[str(label)], "linewidth": 1.3}
         (drawn,) = axes.step(x, y, where="post", **line)
-        name = name_of(str(label))
+        name = name_in(study, str(label))
         style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         style.curve(name, drawn)
     axes.set_xlim(edge, most)

@@ -1,0 +1,213 @@
+"""Results of other folders beside those of a plan: the shipped ones, another machine's, another
+person's.
+
+They go together where suite, seed, readings, trial budget, the tasks of a name and the code of a
+method are the same. Versions of coartic and of libraries and machines may differ. The scorer is
+that of the code that copies: every solution is executed again.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+from coartic.benchmarks.provenance import command, current_environment, now
+from coartic.benchmarks.released import RELEASED, open_released
+from coartic.benchmarks.reproduce import compare_runs
+from coartic.benchmarks.scoring import score
+from coartic.benchmarks.worker import Job, Outcome
+from coartic.errors import CoarticError
+from coartic.files import folder_named
+from coartic.runs.card import MethodCard
+from coartic.runs.plan import Cell, Plan, hash_of
+from coartic.runs.run import PREFIXES, Run
+from coartic.runs.store import Store, open_store, writing
+from coartic.text import counted
+
+_SCORED = (
+    *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),
+    *("solution_corrections", "result"),
+)
+"""Columns of ``results`` that follow from the solutions of a run."""
+
+
+def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
+    """The plan with all that other folders hold, whose runs are copied into ``out``.
+
+    ``released`` names the shipped results. Performed in ``out``, the plan makes the runs that no
+    folder has. A warning names a folder that has fewer runs of a cell than are asked for.
+
+    Raises CoarticError where the folders do not go together, where one lacks runs that cannot be
+    performed here, where a stored solution does not do what is stored of it, and where two folders
+    have different results of a run. Then nothing is copied.
+    """
+    with ExitStack() as stack:
+        sources: dict[str, Store] = {}
+        for name in map(str, folders):
+            if name == RELEASED:
+                sources[name] = stack.enter_context(open_released(plan.suite))
+                continue
+            if folder_named(name).resolve() == out.resolve():
+                raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
+            sources[name] = stack.enter_context(open_store(folder_named(name)))
+        whole = join(plan, sources)
+        with writing(out) as target, target.transaction():
+            target.ask(whole, current_environment(), command(), now())
+            origin = dict.fromkeys(target.ids(""), str(out))
+            for name, source in sources.items():
+                copy_runs(name, source, target, origin)
+    return whole
+
+
+def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
+    """The plan with all cells of the sources. Raises CoarticError for what does not go together,
+    and for runs that no source has and that are not performed here."""
+    plans = {name: source.plan() for name, source in sources.items()}
+    held = {
+        (plans[name].settings[position].asked, number)
+        for name, source in sources.items()
+        for position, number, *_ in source.present()
+    }
+
+    def lacks(asked: str, cell: Cell) -> bool:
+        return any((asked, number) not in held for number in range(cell.runs))
+
+    # What a source has is not performed here, where the code of its method may be another.
+    missing = [cell for asked, cell in cells_of(plan) if lacks(asked, cell)]
+    parts = plans | {"this command": replace(plan, cells=tuple(missing))}
+    check_together(parts)
+    methods = {cell.method.name: cell.method for part in parts.values() for cell in part.cells}
+    cells: dict[str, Cell] = {}
+    for part in parts.values():
+        for asked, cell in cells_of(part):
+            runs = max(cell.runs, cells[asked].runs if asked in cells else 0)
+            cells[asked] = replace(cell, method=methods[cell.method.name], runs=runs)
+    own = dict(cells_of(plan))
+    for name, part in plans.items():
+        theirs = [(asked, cells[asked]) for asked, _ in cells_of(part)]
+        if left := [cell for asked, cell in theirs if not cell.method.where and lacks(asked, cell)]:
+            raise CoarticError(
+                f"{name} is not finished: it lacks runs of {named(left)}. Finish it first, or "
+                "perform them here: add --methods or --method-file"
+            )
+        few = [c for a, c in theirs if a not in own and c.method.stochastic and c.runs < plan.runs]
+        if few:
+            warnings.warn(
+                f"{name} has {counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked "
+                "for here",
+                stacklevel=3,
+            )
+    order = dict.fromkeys(asked for part in (plan, *plans.values()) for asked, _ in cells_of(part))
+    return replace(
+        plan,
+        runs=max(part.runs for part in parts.values()),
+        trials=max(part.trials for part in parts.values()),
+        cells=tuple(cells[asked] for asked in order),
+    )
+
+
+def cells_of(plan: Plan) -> Iterator[tuple[str, Cell]]:
+    """The cells of a plan, each after the hash of what is asked for, which leaves out the code."""
+    return zip((setting.asked for setting in plan.settings), plan.cells, strict=True)
+
+
+def named(cells: Sequence[Cell]) -> str:
+    """The first of some cells in words, and how many others there are."""
+    others = f" and of {counted(len(cells) - 1, 'other cell')}" if len(cells) > 1 else ""
+    return f"{cells[0].label} on {cells[0].task.name}{others}"
+
+
+def check_together(plans: Mapping[str, Plan]) -> None:
+    """Raises CoarticError where plans, by where they are from, say different things of one."""
+    said: dict[str, tuple[str, object]] = {}
+
+    def agree(where: str, what: str, value: object, hint: str = "") -> None:
+        origin, there = said.setdefault(what, (where, value))
+        if there != value:
+            raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
+
+    for where, plan in plans.items():
+        agree(where, "the suite", repr(plan.suite))
+        agree(where, "the seed", plan.seed)
+        agree(where, "the trial budget", plan.trial_budget)
+        agree(where, "the list of readings", list(plan.readings))
+        for cell, setting in zip(plan.cells, plan.settings, strict=True):
+            name, method = cell.task.name, cell.method
+            agree(where, f"task {name!r}", f"definition {hash_of(setting.definition)[:8]}")
+            hint = ": leave it out of one of them, or give it another name"
+            agree(where, f"method {method.name!r}", f"code {method.code}", hint)
+            cell_named = f"{cell.label} on {name}"
+            agree(where, f"the list of parameters of {cell_named}", sorted(cell.complete))
+            for key, value in cell.complete.items():
+                agree(where, f"{key} of {cell_named}", value)
+
+
+def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
+    """Copy the runs that a source was asked for, each scored again; ``origin`` says where those
+    are from that the target has. Raises CoarticError where a run does not do what is stored of it,
+    or the target has another result of it."""
+    methods = source.plan().methods
+    there = target.frame("runs").set_index("run_id").result.to_dict()
+    for _, cell in source.frame("runs").groupby(["task", "label"], sort=False):
+        results = dict(zip(cell.run_id, cell.result, strict=True))
+        for run_id in results.keys() & there.keys():
+            if results[run_id] != there[run_id]:
+                check_same(name, source.run(run_id), origin[run_id], target.run(run_id))
+        runs = [source.run(run_id) for run_id in results if run_id not in there]
+        if runs:
+            check_scores(name, methods[cell.method.iloc[0]], runs, results)
+            target.write(runs)
+        origin |= {run.key.id: name for run in runs}
+
+
+def check_same(name: str, run: Run, origin: str, other: Run) -> None:
+    """Raises CoarticError where two folders have different results of one run, but for rewards of
+    trials that one of them does not keep."""
+    if changes := compare_runs(other, run):
+        which = f"run {run.key.number} of {run.setting.method} on {run.setting.task.name}"
+        raise CoarticError(f"{which} differs in {origin} and {name} ({run.key.id}): {changes[0]}")
+
+
+def check_scores(
+    name: str, method: MethodCard, runs: Sequence[Run], results: Mapping[str, str]
+) -> None:
+    """Score runs of one cell again, side by side.
+
+    Raises CoarticError where one does not come to what is stored of it, or to the hash of its
+    result, which ``results`` has by id.
+    """
+    setting = runs[0].setting
+    stated = [
+        Outcome(
+            run.status,  # type: ignore[arg-type]  # the table takes no other
+            run.reason,
+            {part: list(score.movements) for part, score in run.scores.items()},
+            bound=run.bound,
+            details=run.details,
+            meter=run.meter,
+            rewards=run.rewards,
+        )
+        for run in runs
+    ]
+    again = score(Job(setting, method, tuple(run.key for run in runs)), stated)
+    for run, scored in zip(runs, again, strict=True):
+        before, after = run.to_row(), scored.to_row()
+        wrong = [
+            f"{column} is {after[column]}, not {before[column]}"
+            for column in _SCORED
+            if before[column] != after[column]
+        ]
+        if run.result != results[run.key.id]:
+            wrong.append("a joint or a trial was changed")
+        if run.key != setting.key(run.key.suite_seed, run.key.number):
+            wrong.append("it is not the run that its id says")
+        if not math.isclose(run.other_arm_travel or 0, scored.other_arm_travel or 0, abs_tol=1e-9):
+            wrong.append("the travel of the other arm is not as stored")
+        if wrong:
+            raise CoarticError(
+                f"{name}: run {run.key.id} does not do what is stored of it: {wrong[0]}"
+            )

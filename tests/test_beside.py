@@ -1,0 +1,254 @@
+"""Results beside others: the released ones, the parts of a suite, another person's folder."""
+
+import hashlib
+import lzma
+import shutil
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from coartic import CoarticError, load_task
+from coartic.analysis.report.contents import TABLES
+from coartic.analysis.study import load
+from coartic.analysis.verify import check_runs
+from coartic.benchmarks import released, template
+from coartic.benchmarks.beside import put_beside
+from coartic.benchmarks.planning import Selection, plan_suite
+from coartic.benchmarks.run import perform
+from coartic.benchmarks.suites import Cell
+from coartic.runs.store import RUNS_FILE, open_store, writing
+from tests.support.commands import call
+from tests.support.suites import KNOWN, InProcess, planned, run_and_write, same_results
+
+EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "trajectory-optimisation/jerk"
+OWN = Path(template.__file__)
+
+
+def cells(*pairs, runs=2):
+    return [Cell(load_task(task), KNOWN[method], runs=runs) for task, method in pairs]
+
+
+LEFT = cells(("ascending", EC1), ("ascending", PLAN))
+RIGHT = cells(("ascending", PLAN), ("descending", EC1), ("descending", ALONE))
+WHOLE = [*LEFT, *RIGHT[1:]]
+OPTIONS = {"trials": 40}
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    """What two machines ran of a suite; one cell both of them."""
+    folder = tmp_path_factory.mktemp("parts")
+    for name, its_cells in (("left", LEFT), ("right", RIGHT)):
+        run_and_write(folder / name, its_cells, **OPTIONS)
+    return folder / "left", folder / "right"
+
+
+def joined(folders, out, cells=WHOLE, **options):
+    """What is performed where folders stand beside a plan of cells."""
+    whole = put_beside(planned(cells, **OPTIONS | options), folders, out)
+    return perform(whole, out, executor=InProcess()).progress
+
+
+def test_parts_make_a_whole(parts, tmp_path):
+    out = tmp_path / "new" / "whole"
+    assert (joined(parts, out).present, joined(parts, out).done) == (2 + 1 + 2 + 1, 0)
+    same_results(load(out), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
+    assert check_runs(out).wrong == []
+    assert [path.name for path in out.iterdir()] == [RUNS_FILE]
+
+
+def test_what_no_folder_has_is_performed(parts, tmp_path):
+    """Cells of the plan, and runs of a folder that was not finished."""
+    left = shutil.copytree(parts[0], tmp_path / "left")
+    edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")
+    progress = joined([left], tmp_path / "whole")
+    assert (progress.present, progress.done) == (2, 1 + 3)
+    more = cells(*[(cell.task.name, cell.method.name) for cell in LEFT], runs=3)
+    assert joined(parts[:1], tmp_path / "more", more, runs=3).done == 1
+    same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
+    with pytest.raises(CoarticError, match=f"left is not finished: it lacks runs of {EC1} on asc"):
+        put_beside(planned(RIGHT[2:], **OPTIONS), [left], tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+
+
+def edit(folder, statement):
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
+        assert db.execute(statement).rowcount
+        db.commit()
+
+
+OF_EC1 = "(SELECT results.id FROM results JOIN settings ON settings.id = setting"
+OF_EC1 += f" WHERE method = '{EC1}' AND run = 0)"
+CHEATS = {
+    "reward is -": "UPDATE results SET reward = reward + 1",
+    "hands is RRR, not RRL": "UPDATE results SET hands = 'RRL'",
+    "initial_reward is -": f"UPDATE results SET initial_reward = -9 WHERE id = {OF_EC1}",
+    "result is ": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
+    "a joint or a trial": "UPDATE movements SET left_1 = left_1 + 1e-12",
+    "travel": "UPDATE results SET other_arm_travel = other_arm_travel + 1",
+    "its id": "UPDATE results SET seed = seed + 1",
+}
+
+
+@pytest.mark.parametrize("said", CHEATS)
+def test_what_was_changed_is_not_copied(parts, tmp_path, said):
+    """A joint of the arm that is not used changes no tick: the hash tells."""
+    left = shutil.copytree(parts[0], tmp_path / "left")
+    edit(left, CHEATS[said])
+    with pytest.raises(CoarticError, match=f"left: run .* does not do what is stored.*{said}"):
+        joined([parts[1], left], tmp_path / "whole")
+    with writing(tmp_path / "whole") as store:
+        assert store.count() == 0
+
+
+def test_two_results_of_one_run(parts, tmp_path):
+    """They are named, and nothing is copied; a thinned one is the same result."""
+    thin, other = (shutil.copytree(parts[0], tmp_path / name) for name in ("thin", "other"))
+    with writing(thin) as store:
+        store.write([store.run(run_id).thin() for run_id in store.ids("")])
+    assert joined([parts[0], thin], tmp_path / "same", LEFT).present == 3
+    with open_store(parts[0]) as store:
+        first, second = (run for run in map(store.run, store.ids("")) if run.rewards)
+    with writing(other) as store:
+        store.write([replace(second, key=first.key)])
+    words = f"run {first.key.number} of {EC1} on ascending differs in .*left and .*other "
+    with pytest.raises(CoarticError, match=words):
+        joined([parts[0], other], tmp_path / "whole", LEFT)
+    with writing(tmp_path / "whole") as store:
+        assert store.count() == 0
+    with pytest.raises(CoarticError, match="differs in .*same and .*other"):
+        joined([other], tmp_path / "same", LEFT)
+
+
+def test_what_does_not_go_together(parts, tmp_path):
+    moved = load_task("descending").model_copy(update={"name": "ascending"})
+    new = KNOWN[EC1].__class__(**vars(KNOWN[EC1]) | {"code": "0123456789ab"})
+    wrong = {
+        "the seed is 0 in .*left and 5 in this command": {"seed": 5},
+        "the trial budget is None in .* and 30 in": {"trial_budget": 30},
+        f"trials of {EC1} on ascending is 40 in .*left and 41 in this": {"trials": 41},
+        "task 'ascending' is definition": {"cells": [Cell(moved, KNOWN[EC1])]},
+        f"method '{EC1}' is code .* and code 0123456789ab in .*: leave it out": {
+            "cells": [Cell(load_task("descending"), new)]
+        },
+    }
+    for said, change in wrong.items():
+        with pytest.raises(CoarticError, match=said):
+            joined(parts[:1], tmp_path / "whole", **{"cells": LEFT} | change)
+    other = plan_suite("quick", cells=LEFT, **OPTIONS)
+    for plan, folder, said in (
+        (other, parts[0], "the suite is 'paper' in .*left and 'quick' in this command"),
+        (planned(LEFT, **OPTIONS), tmp_path / "nowhere", "nowhere does not exist"),
+        (planned(LEFT, **OPTIONS), tmp_path / "whole", "cannot stand beside itself"),
+    ):
+        with pytest.raises(CoarticError, match=said):
+            put_beside(plan, [folder], tmp_path / "whole")
+    assert not (tmp_path / "whole").exists()
+
+
+def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
+    """Where nothing of it is missing: it is copied as it is."""
+    new = KNOWN[EC1].__class__(**vars(KNOWN[EC1]) | {"code": "0123456789ab"})
+    ours = [replace(cell, method=new if cell.method.name == EC1 else cell.method) for cell in LEFT]
+    assert joined(parts[:1], tmp_path / "whole", ours).done == 0
+    assert set(load(tmp_path / "whole").runs.result) == set(load(parts[0]).runs.result)
+    words = "code 0123456789ab in this command"
+    with pytest.raises(CoarticError, match=words):
+        joined(parts[:1], tmp_path / "more", ours, runs=3)
+
+
+def test_a_stranger_beside_others(parts, tmp_path):
+    """Only the stranger's runs are made, also when all are to be made anew. Fewer runs of others
+    are said."""
+    select = Selection(methods=["NAME"], method_files=[OWN])
+    plan = plan_suite("paper", select=select, runs=2, trials=20)
+    assert {cell.method.name for cell in plan.cells} == {"NAME"}
+    out = tmp_path / "out"
+    for redo in (False, True):
+        whole = put_beside(plan, parts[1:], out)
+        report = perform(whole, out, executor=InProcess(), redo=redo)
+        assert (report.progress.present, report.progress.done) == (4, plan.size)
+    study = load(out)
+    theirs = study.runs[study.runs.method != "NAME"]
+    assert set(theirs.result) == set(load(parts[1]).runs.result)
+    assert {"NAME", EC1} <= set(TABLES["methods"](study).method)
+    more = plan_suite("paper", select=select, runs=3, trials=20)
+    with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
+        put_beside(more, parts[1:], tmp_path / "more")
+
+
+def test_released_results(monkeypatch, tmp_path):
+    """They are those of their hash, and are read as any folder."""
+    for suite in released.released_hashes():
+        with released.open_released(suite) as store:
+            plan = store.plan()
+            assert plan.suite == suite
+            assert store.count() == plan.size
+            some = [name for name in plan.tasks if "/" not in name or name.endswith("7")]
+            assert all(load_task(name) == plan.tasks[name] for name in some)  # as shipped today
+            assert store.run(store.ids("")[0]).is_thin
+    with pytest.raises(CoarticError, match="of suite 'quick' are released, but of comparison, "):
+        released.open_released("quick")
+    copy = shutil.copytree(Path(released.__file__).with_name("released"), tmp_path / "copy")
+    monkeypatch.setattr(released, "_FOLDER", copy)
+    (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
+    with pytest.raises(CoarticError, match="not as it was released"):
+        released.open_released("families")
+
+
+def test_packed_results_say_the_same(parts, tmp_path):
+    released.pack(parts[0], tmp_path)
+    content = (tmp_path / "paper.sqlite.xz").read_bytes()
+    assert (tmp_path / "SHA256SUMS").read_text().split()[0] == hashlib.sha256(content).hexdigest()
+    (tmp_path / "thin").mkdir()
+    (tmp_path / "thin" / RUNS_FILE).write_bytes(lzma.decompress(content))
+    assert check_runs(tmp_path / "thin").wrong == []
+    full, thin = load(parts[0]), load(tmp_path / "thin")
+    for name in ("learning", "ranking", "methods", "runtimes"):
+        before, after = TABLES[name](full), TABLES[name](thin)
+        assert before.equals(after)
+    assert full.runs.best_trial.equals(thin.runs.best_trial)
+
+
+@pytest.fixture
+def shipped(parts, tmp_path, monkeypatch):
+    """The right part of suite ``paper``, as if it were released."""
+    (tmp_path / "packed").mkdir()
+    released.pack(parts[1], tmp_path / "packed")
+    monkeypatch.setattr(released, "_FOLDER", tmp_path / "packed")
+    return parts[1]
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_command(shipped, parts, tmp_path, monkeypatch, capsys):
+    """A method is written by a command, run beside the released results, and there when that is
+    repeated; a colleague puts the folder beside another one, without the method's file."""
+    mine, out = tmp_path / "my_search.py", tmp_path / "out"
+
+    def coartic(*arguments):
+        return call(monkeypatch, capsys, *arguments)
+
+    assert coartic("new", "method", "my-search", "--out", mine)[0] == 0
+    command = ("run", "paper", "--method-file", mine, "--beside", "released", "--out", out)
+    small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
+    code, text, _ = coartic(*command, *small)
+    assert (code, text[:16]) == (0, "8 runs (4 reused")
+    assert coartic(*command, *small)[1].startswith("8 runs (8 reused)")
+    assert set(load(out).runs.method) == {"my-search", *load(shipped).runs.method}
+    assert coartic("verify", out)[0] == 0
+    both = ("--beside", out, "--beside", parts[0], "--out", tmp_path / "both", *small)
+    code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
+    assert (code, text[:19]) == (0, "10 runs (10 reused)")
+    for wrong, said in (
+        (("run", "quick", *command[2:]), "no results of suite 'quick' are released"),
+        ((*command, *small, "--seed", 3), "the seed is 0 in released and 3 in this command"),
+        (("new", "method", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
+        (("new", "method", "my search"), "letters, digits"),
+        (("new", "method", "other", "--out", mine), "is there already"),
+        (("new", "method", "other", "--out", tmp_path / "x.txt"), "must end in .py"),
+    ):
+        code, _, error = coartic(*wrong)
+        assert (code, said in error) == (2, True), error
