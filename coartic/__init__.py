@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.analysis.runtimes import runtimes
-    from coartic.benchmarks.recording import record_run as record_run
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from coartic.motion.solution import Execution, Movement, execute
     from coartic.motion.ticks import Trajectory, trajectory
     from coartic.motion.trials import movements_of
-    from coartic.optimisers import Objective, Optimiser, objective, problem, problems
+    from coartic.optimisers import Objective, Optimiser, objective, problems
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
@@ -70,7 +69,6 @@ __all__ = [
     "movements_of",
     "objective",
     "parse_task",
-    "problem",
     "problems",
     "runtimes",
     "trajectory",
@@ -78,7 +76,6 @@ __all__ = [
 
 _HOMES = {
     "analysis.runtimes": ("runtimes",),
-    "benchmarks.recording": ("record_run",),  # for Objective.record
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
@@ -91,7 +88,7 @@ _HOMES = {
     "motion.solution": ("Execution", "Movement", "execute"),
     "motion.ticks": ("Trajectory", "trajectory"),
     "motion.trials": ("movements_of",),
-    "optimisers": ("Objective", "Optimiser", "objective", "problem", "problems"),
+    "optimisers": ("Objective", "Optimiser", "objective", "problems"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),

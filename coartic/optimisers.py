@@ -7,10 +7,8 @@ method of the benchmark that consists of such a function and of what minimises i
 from __future__ import annotations
 
 import itertools
-import time
 from abc import abstractmethod
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -24,7 +22,6 @@ from coartic.method import (
     Information,
     Method,
     MethodError,
-    Outline,
     Parameters,
     Result,
     Session,
@@ -49,8 +46,6 @@ TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
-ALL = "all"
-"""In place of a hand sequence: points say which."""
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 
@@ -93,14 +88,10 @@ class Objective:
     acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
     target is always made and takes a tick at least.
 
-    With hands ``"all"`` a point also says with which hand to hit each goal: it has the targets of
-    every joint and then, if the robot has two hands, an entry for each goal, which is above 0 for
-    the right hand.
-
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence, of which the best is kept. Unless hands are ``"all"``, no point has other ones
-    than these, so that the lowest cost is that of the best solution with these hands, which other
-    hands may better.
+    hand sequence, of which the best is kept. A point has these hands, unless others are given
+    with it: the lowest cost is that of the best solution with these hands, which other hands may
+    better.
 
     Raises MethodError where the corrective process completes no sequence.
     """
@@ -118,8 +109,7 @@ class Objective:
         self._session, self._task = session, task
         self._asked: dict[str, Any] = {"hands": hands, "half_width": half_width, "trials": trials}
         self._end = None if trials is None else session.meter.trials + trials
-        given = hands not in (None, ALL)
-        sequences = [str(hands)] if given else sequences_of(session)
+        sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
         alone = session.trials(sequences, np.full(shape, np.nan))
@@ -127,44 +117,32 @@ class Objective:
         if not alone.completed[best]:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         self.hands = sequences[best]
-        """The hand sequence; the one to begin with, where points say which."""
-        self.searches_hands = hands == ALL and len(session.hands) > 1
-        """Whether a point says with which hand to hit each goal."""
+        """The hand sequence."""
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
-        if self.searches_hands:
-            self.joints = np.tile(self.joints[0], (session.goals_count, 1))
-            for hand in session.hands:
-                self.joints[:, session.joints(hand)] = True
         self.postures: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
         self._entries = np.flatnonzero(self.joints)
-        self._half_width = half_width
-        self.dim = len(self.x0)
+        self.dim = len(self._entries)
         """Number of parameters."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
-        if self.searches_hands:
-            self.bounds[len(self._entries) :] = -half_width, half_width
         self.evaluations = 0
         """Points evaluated; the first trials are not among them."""
         self.best_cost = float(-alone.rewards[best])
         """Cost of the best trial so far; at the start that of the corrective process alone."""
         self.best_hands = self.hands
         """Hand sequence of the best trial so far."""
-        self._best_x = self._point(np.full(len(self._entries), np.nan), self._codes[0])
+        self._best_x: Array = np.full(self.dim, np.nan)
         self._best_targets = alone.targets[best].copy()
         self._better = [(0, self.best_cost)]
-        self._began = self._ended = 0.0
 
     def __repr__(self) -> str:
-        hands = f"any hands, first {self.hands}" if self.searches_hands else f"hands {self.hands}"
         facts = [
-            f"Objective({self._session.task_name}, {hands}, {self.dim} parameters",
+            f"Objective({self._session.task_name}, hands {self.hands}, {self.dim} parameters",
             counted(self.evaluations, "evaluation"),
-            f"best cost {self.best_cost:g}"
-            + (f" with hands {self.best_hands}" if self.searches_hands else ""),
+            f"best cost {self.best_cost:g}",
         ]
         shipped = self._shipped
         if shipped is not None and shipped.reward is not None:
@@ -224,12 +202,7 @@ class Objective:
     def x0(self) -> Array:
         """A point to begin with, shape ``(dim,)``: the postures in which the corrective process
         alone hits the goals. Moving straight to them can cost more or less than it does."""
-        return self._point(self.postures[self.joints], self._codes[0])
-
-    def _point(self, targets: Array, codes: NDArray[np.int64]) -> Array:
-        """The point of targets and hands."""
-        sides = (codes - 0.5) * self._half_width
-        return np.append(targets, sides) if self.searches_hands else targets.copy()
+        return self.postures[self.joints].copy()
 
     @property
     def best_x(self) -> Array:
@@ -251,50 +224,25 @@ class Objective:
         session = Session(self.task, 0, TOLD, model=self._session.model)
         return Objective(session, task=self.task, **self._asked)
 
-    def record(self, folder: str | Path, name: str, *, suite: str = "problems") -> int:
-        """Store what was found, as a run of a method in a results folder; its number, from 0.
-
-        The solution is executed and scored as every method's, so that the report, the ranking and
-        :func:`coartic.runtimes` take the folder; ``suite`` names what it holds. The method has the
-        parameters of this problem, with the budget as ``trials``. Its seconds go from the first
-        evaluation to the end of the last.
-
-        Raises CoarticError for a name that is no method's id, is one of this project's, and for a
-        folder of another suite; UndeclaredError in a method.
-        """
-        from coartic import record_run  # through the package: what stores runs imports this
-
-        return record_run(
-            folder,
-            name,
-            suite,
-            task=self.task,
-            session=self._session,
-            seconds=self._ended - self._began,
-            solution=self.solution,
-            parameters=self._asked,
-        )
-
     # Evaluation.
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
         them; see :meth:`many`, which takes rows, for as many points as they have entries."""
         point = real_array("x", x)
-        size = self.dim if hands is None else len(self._entries)
-        if point.ndim not in (1, 2) or len(point) != size:
-            raise ValueError(f"x has shape {point.shape}; needed is ({size},) or ({size}, N)")
+        if point.ndim not in (1, 2) or len(point) != self.dim:
+            raise ValueError(
+                f"x has shape {point.shape}; needed is ({self.dim},) or ({self.dim}, N)"
+            )
         if point.ndim == 2:
             return self.many(point.T, hands)
         if hands is not None or not point @ point <= LARGEST_ENTRY:  # NaN, or far: to be looked at
             return float(self.many(point[None], hands)[0])
         self._trials_left(1)
-        self._began = self._began or time.perf_counter()
         codes, targets = self._trials_of(point[None], None)
         reward = self._session.unchecked_trial(codes, targets)
         cost = float(FAILED if reward is None else min(-reward, FAILED))
         self.evaluations += 1
-        self._ended = time.perf_counter()
         if cost < self.best_cost:
             self._keep(cost, self.evaluations, point, codes[0], targets[0])
         return cost
@@ -308,8 +256,8 @@ class Objective:
             Entries are finite, or NaN for all joints of a goal (the corrective process alone).
         hands : str, sequence of str or ndarray, optional
             The hand sequence of all points (``"RRLR"``), of each, or an array of shape ``(N, G)``
-            with 0 for left and 1 for right, whatever the hands of this problem are. Points have
-            no entries for hands then, and joints that have none keep still.
+            with 0 for left and 1 for right, whatever the hands of this problem are. Joints that
+            have no entries keep still.
 
         Returns
         -------
@@ -325,13 +273,11 @@ class Objective:
             fit the task.
         """
         array = real_array("points", points)
-        size = self.dim if hands is None else len(self._entries)
-        if array.ndim != 2 or array.shape[1] != size:
-            raise ValueError(f"points of shape {array.shape}: needed is (N, {size})")
+        if array.ndim != 2 or array.shape[1] != self.dim:
+            raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         self._check(array)
         codes = None if hands is None else self._session.hand_codes(hands, len(array))
         left, costs = self._trials_left(len(array)), np.empty(len(array))
-        self._began = self._began or time.perf_counter()
         for first in range(0, left, CHUNK):
             part = slice(first, min(first + CHUNK, left))
             some, found = array[part], costs[part]
@@ -345,7 +291,6 @@ class Objective:
                     at = self.evaluations + n + 1
                     self._keep(float(found[n]), at, some[n], chosen[n], targets[n])
             self.evaluations += len(some)
-        self._ended = time.perf_counter()
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
@@ -354,7 +299,7 @@ class Objective:
         self, cost: float, evaluations: int, point: Array, codes: Any, targets: Array
     ) -> None:
         """Note the best trial so far."""
-        self.best_cost, self._best_x = cost, self._point(point[: len(self._entries)], codes)
+        self.best_cost, self._best_x = cost, point.copy()
         self._best_targets = targets.copy()
         self.best_hands = letters_of([HANDS[code] for code in codes])
         self._better.append((evaluations, cost))
@@ -362,10 +307,8 @@ class Objective:
     def _trials_of(self, points: Array, codes: Any) -> tuple[NDArray[np.int64], Array]:
         """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
         targets = np.full((len(points), self.joints.size), np.nan)
-        targets[:, self._entries] = points[:, : len(self._entries)]
-        if codes is None and self.searches_hands:
-            codes = (points[:, len(self._entries) :] > 0).astype(np.int64)
-        elif codes is None:
+        targets[:, self._entries] = points
+        if codes is None:
             codes = self._codes if len(points) == 1 else np.repeat(self._codes, len(points), axis=0)
         return codes, targets.reshape(len(points), *self.joints.shape)
 
@@ -383,8 +326,6 @@ class Objective:
                 f"point {point}: of goal {goal + 1} some entries are NaN; needed are all of them "
                 "(the corrective process alone) or none"
             )
-        if np.isnan(points[:, len(self._entries) :]).any():
-            raise ValueError("an entry for a hand is NaN; needed is a number")
         if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
         if (np.abs(points) > LARGEST_ENTRY).any():
@@ -419,7 +360,7 @@ def objective(
         The task, its name or its file.
     hands : str, optional
         A hand sequence (``"RRLR"``), by default the one with which the corrective process alone
-        does best; ``"all"`` has points say which hands. The default hands need not be those of the
+        does best. These need not be those of the
         optimum: in ``two-armed-2`` they are others, and no point is known to come within 14 % of
         it.
     half_width : float
@@ -451,55 +392,16 @@ def objective(
         check_limits("budget", budget, 1, MOST_TRIALS)
     goals = len(chosen.goals)
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
-    if hands in (None, ALL) and reason:
+    if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; say which hands")
     session = Session(chosen, 0, TOLD, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
-
-
-def problem(
-    task: TaskLike,
-    hands: str | None = ALL,
-    *,
-    half_width: float = HALF_WIDTH,
-    model: MotionModel = PAPER,
-    budget: int | None = None,
-) -> Objective:
-    """A task as a problem for an optimiser: :func:`objective` over all hand sequences.
-
-    Parameters
-    ----------
-    task : Task, str or pathlib.Path
-        The task, its name or its file; also an instance of a family, ``"two-armed/v1/i017"``.
-    hands : str, optional
-        A hand sequence where it is to be given, or None for the one with which the corrective
-        process alone does best; by default each point says which hands.
-    half_width : float
-        That of the bounds around ``x0``, length unit (base) and rad (joints).
-    model : MotionModel
-        The constants of movement and of the corrective process.
-    budget : int, optional
-        Most trials, those included with which hands are chosen.
-
-    Returns
-    -------
-    Objective
-        The problem: ``dim``, ``x0``, ``bounds``, ``best_known`` and ``proven``, and its cost as a
-        function.
-
-    Raises
-    ------
-    TaskError, ValueError, TypeError, MethodError
-        As :func:`objective` does.
-    """
-    return objective(task, hands, half_width=half_width, model=model, budget=budget)
 
 
 def problems(
     family: str,
     split: Literal["test", "development"] = "test",
     count: int = 15,
-    hands: str | None = ALL,
     *,
     half_width: float = HALF_WIDTH,
     model: MotionModel = PAPER,
@@ -515,8 +417,6 @@ def problems(
         Instances to report on, or those to tune on.
     count : int
         How many, from 1 to 10,000.
-    hands : str, optional
-        ``"all"``, or None for those with which the corrective process alone does best.
     half_width : float
         That of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
@@ -539,7 +439,7 @@ def problems(
     if split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
     options: dict[str, Any] = {"half_width": half_width, "model": model, "budget": budget}
-    return [objective(name, hands, **options) for name in instance_names(family, split, count)]
+    return [objective(name, **options) for name in instance_names(family, split, count)]
 
 
 class OptimiserParameters(Parameters):
@@ -547,8 +447,8 @@ class OptimiserParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     hands: str | None = None
-    """Hand sequence, or ``"all"``; by default the one with which the corrective process alone does
-    best, or the task's own where there are too many to try."""
+    """Hand sequence; by default the one with which the corrective process alone does best, or the
+    task's own where there are too many to try."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Half the width of the bounds, length unit (base) and rad (joints)."""
 
@@ -561,10 +461,6 @@ class Optimiser(Method):
 
     told = TOLD
     Parameters = OptimiserParameters
-
-    def why_not(self, task: Outline) -> str | None:
-        """Reason why the task has too many hand sequences to search all; None if it does not."""
-        return task.too_many_sequences if self.parameters.hands == ALL else None
 
     def solve(self, session: Session) -> Result:
         """Optimise until the trials are used up; the solution is the best trial's."""

@@ -163,7 +163,10 @@ def test_the_objective_ends_with_the_trials(budget, trials, before):
 EXAMPLES = DOCS / "examples"
 
 
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+METHODS = [path for path in sorted(EXAMPLES.glob("*.py")) if path.stem != "ioh_logger"]
+
+
+@pytest.mark.parametrize("path", METHODS, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
 def test_the_examples_are_methods(path, in_this_process):
     text = path.read_text("utf-8")
@@ -178,6 +181,29 @@ def test_the_examples_are_methods(path, in_this_process):
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute(load_task("ascending"), solution).reward
     assert reward == max(session.rewards)
+
+
+def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
+    """What the reader of IOHprofiler finds is what the functions have kept."""
+    for library in ("cma", "ioh", "iohinspector"):
+        pytest.importorskip(library)
+    import iohinspector
+
+    monkeypatch.chdir(tmp_path)
+    costs = coartic.problems("one-armed/v1", count=3, budget=60)
+    monkeypatch.setattr(coartic, "problems", lambda *_, **__: costs)
+    exec((EXAMPLES / "ioh_logger.py").read_text("utf-8"), {})
+    manager = iohinspector.DataManager()
+    manager.add_folder("ioh-pycma")
+    assert manager.overview["evals"].sum() == sum(cost.evaluations for cost in costs)
+    read = manager.load(monotonic=True, include_meta_data=True)
+    for number, cost in enumerate(costs):
+        assert cost.evaluations == 60 - 1  # one arm has one hand sequence
+        rows = read.filter(read["instance"] == number)
+        steps = {*zip(rows["evaluations"], rows["raw_y"], strict=True)}
+        better = cost.history.iloc[1:]  # than the corrective process alone, which is no point
+        assert {*zip(better.evaluations, better.cost, strict=True)} <= steps
+        assert len(better) or rows["raw_y"].min() >= cost.best_cost
 
 
 def test_the_first_program_of_the_page(capsys):

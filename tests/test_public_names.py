@@ -50,7 +50,6 @@ TAKES_A_TASK = {
     "hand_sequences": lambda task: coartic.hand_sequences(task),
     "initial_hands": lambda task: coartic.initial_hands(task),
     "objective": lambda task: coartic.objective(task, HANDS).x0.tobytes(),
-    "problem": lambda task: coartic.problem(task).x0.tobytes(),
 }
 
 

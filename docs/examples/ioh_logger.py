@@ -1,0 +1,18 @@
+"""Runs of pycma on ten instances in the files of IOHprofiler: pip install ioh cma."""
+
+from contextlib import suppress
+
+import cma
+import ioh
+
+import coartic
+
+logger = ioh.logger.Analyzer(root=".", folder_name="ioh-pycma", algorithm_name="pycma")
+for number, cost in enumerate(coartic.problems("one-armed/v1", count=10, budget=2000)):
+    limits = {"lb": cost.bounds.min(), "ub": cost.bounds.max()}
+    problem = ioh.wrap_problem(cost, "one-armed", dimension=cost.dim, instance=number, **limits)
+    problem.attach_logger(logger)
+    with suppress(coartic.BudgetError):  # which ends it
+        cma.fmin2(problem, cost.x0, 0.05, {"seed": 1, "verbose": -9}, restarts=9)
+    problem.detach_logger()
+logger.close()
