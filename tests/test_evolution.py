@@ -15,9 +15,12 @@ COSTS = {
 }
 
 
-@pytest.mark.parametrize("cost", COSTS.values(), ids=COSTS)
-@pytest.mark.parametrize(("dim", "size"), [(2, 6), (11, 11), (20, 48)])
-def test_points_are_those_of_the_package_to_the_last_bit(dim, size, cost):
+@pytest.mark.parametrize(
+    ("cost", "dim", "size"),
+    [*zip(COSTS.values(), (11, 2, 20), (11, 6, 48), strict=True)],
+    ids=COSTS,
+)
+def test_points_are_those_of_the_package_to_the_last_bit(cost, dim, size):
     theirs = np.random.default_rng(3)
     options = {"popsize": size, "seed": np.nan, "verbose": -9}
     options["randn"] = lambda *shape: theirs.standard_normal(shape)
