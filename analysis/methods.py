@@ -63,7 +63,6 @@ _PARAMETERS = {
     "noise_sd=": "σ ",
     "epsilon=": "ε ",
     "hands=": "hands ",
-    "timing=fixed": "fixed times",
     "stop=": "stop ",
 }
 _VARIANT = re.compile(r"=|\bEC\d-")

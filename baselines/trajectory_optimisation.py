@@ -3,7 +3,7 @@
 One method per cost. Path length is the task's own reward as a formula; the others are
 the smoothness objectives that informed accounts of coarticulation use: the sum of squared
 configuration changes (Jordan 1986, 1992), minimum acceleration, and minimum jerk (Flash &
-Hogan 1985), the last two over times that are equal, or free at a constant total. Each
+Hogan 1985), the last two over times that are free at a constant total. Each
 hand sequence is planned from the cheapest chain of a posture graph; the plan that is
 cheapest *by the method's own cost* is handed over.
 """
@@ -50,15 +50,12 @@ class TrajectoryParameters(Parameters):
     chains: Annotated[int, Field(ge=1)] = 30
     """Chains of all hand sequences, from as many further graphs as that takes."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
-    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first. With
-    equal times jerk has many local minima."""
+    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 class SmoothParameters(TrajectoryParameters):
-    """The plans and starts, the timing, and whether the plan stops."""
+    """The plans and starts, and whether the plan stops."""
 
-    timing: Literal["free", "fixed"] = "free"
-    """Times at which the goals are hit: free at a constant total, or equal intervals."""
     stop: Literal[0, 1] = 0
     """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
     are 0."""
@@ -70,14 +67,13 @@ def cheapest_plan(
     instance: Instance,
     starts: list[Array],
     *,
-    free_times: bool = False,
     stops: bool = False,
 ) -> PathPlan:
     """The cheapest plan that starts lead to; where none converges the last one.
 
-    ``free_times`` and ``stops`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
+    ``stops`` as in :meth:`~.trajectory_problem.TrajectoryProblem.solve`.
     """
-    plans = [problem.solve(instance, start, free_times=free_times, stops=stops) for start in starts]
+    plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
     converged = [plan for plan in plans if plan.converged]
@@ -243,13 +239,11 @@ class Acceleration(TrajectoryOptimisation):
         self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
     ) -> PathPlan:
         """The cheapest plan; one that stops starts from the one that passes the goals as well."""
-        parameters: SmoothParameters = self.parameters
-        free = parameters.timing == "free"
-        passing = cheapest_plan(session, problem, instance, starts, free_times=free)
-        if not (parameters.stop and passing.converged):
+        passing = cheapest_plan(session, problem, instance, starts)
+        if not (self.parameters.stop and passing.converged):
             return passing
         starts = [passing.configurations, *starts]
-        return cheapest_plan(session, problem, instance, starts, free_times=free, stops=True)
+        return cheapest_plan(session, problem, instance, starts, stops=True)
 
     def movements_of(
         self, session: Session, task: Task, instance: Instance, plan: PathPlan

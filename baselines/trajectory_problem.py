@@ -184,7 +184,6 @@ class TrajectoryProblem:
         start: Array,
         *,
         lengths: Array | None = None,
-        free_times: bool = False,
         stops: bool = False,
         deep: Sequence[int] | None = None,
     ) -> PathPlan:
@@ -192,9 +191,8 @@ class TrajectoryProblem:
 
         ``lengths`` ``(G,)`` fixes the lengths of segments where it is not NaN (path-length
         cost only); ``deep`` then asks for hands as deep inside the discs of these goals
-        (0-based) as those lengths allow, instead of short paths. ``free_times`` lets the
-        segments' durations vary at a constant total, ``stops`` holds all rates at the goals at 0
-        (smoothness costs only). A solve that fails is a plan that has not converged.
+        (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
+        goals at 0 (smoothness costs only). A solve that fails is a plan that has not converged.
         """
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
@@ -206,7 +204,7 @@ class TrajectoryProblem:
         blocks = [
             (steps.ravel(), -free, free),
             self.length_bounds(steps, lengths),
-            self.time_bounds(steps, free_times),
+            self.time_bounds(steps),
             (np.zeros(1), np.zeros(1), np.full(1, deepest)),
             (np.zeros(rates.size), -rates, rates),
         ]
@@ -244,10 +242,10 @@ class TrajectoryProblem:
             at[given] = low[given] = high[given] = lengths[given]
         return at, low, high
 
-    def time_bounds(self, steps: Array, free: bool) -> Bounds:
-        """Durations of the segments."""
+    def time_bounds(self, steps: Array) -> Bounds:
+        """Durations of the segments, which vary at a constant total (smoothness costs only)."""
         goals = self.goals
-        if not (free and self._order):
+        if not self._order:
             return (np.ones(goals),) * 3
         times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
         times = np.maximum(times * (goals / times.sum()), 0.1)

@@ -295,7 +295,7 @@ def test_slopes_that_chance_turns_are_negative_and_what_preparing_saves():
 def test_paths_before_two_places_of_a_goal():
     """Stopping, paths to goal 1 lie 0.2 apart between the outer places; passing, twice that."""
     cells = [
-        (moved_goal(by), "trajectory-optimisation/jerk", {"timing": "free", "stop": stop},
+        (moved_goal(by), "trajectory-optimisation/jerk", {"stop": stop},
          (walk((0, apart * by), (1, apart * by), (2, apart * by)),))
         for stop, apart in ((1, 0.1), (0, 0.2))
         for by in (-1.0, 0.0, 1.0)

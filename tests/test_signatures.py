@@ -378,16 +378,6 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     assert abs(without - now) > 0.05
 
 
-# Form
-
-
-def test_turning_angles():
-    corners = np.array([[0, 0], [1, 0], [2, 0], [2, 3], [2, 1], [2, 1], [5, 5.0]])
-    angles = subtasks.turning_angles(corners)
-    np.testing.assert_allclose(angles[:3], [0, math.pi / 2, math.pi], atol=1e-12)
-    assert np.isnan(angles[3:]).all()
-
-
 # Locus
 
 

@@ -14,8 +14,6 @@ from coartic.robot import HANDS, Array
 
 ROUNDING = 1
 """Ticks that a planned movement can lose to rounding alone."""
-NO_LENGTH = 1e-9
-"""Length of a displacement in joint space below which it is rounding."""
 
 
 def other(hand: Hand) -> Hand:
@@ -112,23 +110,6 @@ def ticks_slower(task: Task, paths: Sequence[Trajectory]) -> Array:
     slower: Array = np.full_like(chosen, np.inf)
     np.subtract(chosen, alone.min(axis=0), out=slower, where=chosen < np.inf)
     return slower
-
-
-def turning_angles(postures: Array) -> Array:
-    """Angles between successive displacements in joint space, rad, shape ``(G - 1,)``.
-
-    ``postures`` has shape ``(G + 1, dof)``: the start and the configuration at each hit. 0
-    goes straight on, π turns back. NaN next to a displacement of no length. The base's length
-    unit and the joints' rad count alike, as in the model's joint-space distance.
-    """
-    steps = np.diff(postures, axis=0)
-    lengths = np.linalg.norm(steps, axis=1, keepdims=True)
-    units = np.divide(steps, lengths, out=np.full_like(steps, np.nan), where=lengths > NO_LENGTH)
-    # Accurate near 0 and π, unlike the arc cosine.
-    apart = np.linalg.norm(units[1:] - units[:-1], axis=1)
-    along = np.linalg.norm(units[1:] + units[:-1], axis=1)
-    angles: Array = 2 * np.arctan2(apart, along)
-    return angles
 
 
 def preshaping(path: Trajectory, initial: Execution) -> Array:
