@@ -31,6 +31,8 @@ from coartic.text import LONGEST_LINE, error_line, plain
 ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
+NAMES = ("CMA-ES", "learner", "optimum")
+"""What people call methods of this project, where it could be an id."""
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
@@ -93,12 +95,9 @@ def current_code(where: str, name: str) -> str:
 
 
 def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) -> None:
-    """Add methods by id. Raises CoarticError for an id that is reserved or taken."""
+    """Add methods by id. Raises CoarticError for an id that is reserved or taken, and for
+    one that differs from a name here in large and small letters alone."""
     for card in cards:
-        if card.name in CONDITIONS | VARIANTS:
-            raise CoarticError(
-                f"{card.origin}: method id {card.name!r} is a condition of the paper's learner"
-            )
         if card.name.startswith(RESERVED):
             raise CoarticError(
                 f"{card.origin}: method id {card.name!r} is reserved: ids that begin with "
@@ -108,6 +107,11 @@ def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) ->
             raise CoarticError(
                 f"{card.origin}: method id {card.name!r} is already taken "
                 f"({registered[card.name].origin})"
+            )
+        names = (*registered, *CONDITIONS, *VARIANTS, *NAMES)
+        if card.name.casefold() in map(str.casefold, names):
+            raise CoarticError(
+                f"{card.origin}: method id {card.name!r} is a name of a method here: choose another"
             )
         registered[card.name] = card
 

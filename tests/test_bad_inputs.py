@@ -101,6 +101,8 @@ METHODS = [
     (method('"a"', '"a b"'), "the name 'a b' must begin"),
     (method('"a"', '"dual-process/EC1"'), "'dual-process/EC1' is reserved"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
+    (method('"a"', '"CMA-ES"'), "'CMA-ES' is a name of a method here"),
+    (method('"a"', '"ec4"'), "'ec4' is a name of a method here"),
     (method("frozenset()", '"goals"'), "told must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
 ]

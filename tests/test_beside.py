@@ -246,6 +246,7 @@ def test_command(shipped, parts, tmp_path, monkeypatch, capsys):
         (("run", "quick", *command[2:]), "no results of suite 'quick' are released"),
         ((*command, *small, "--seed", 3), "the seed is 0 in released and 3 in this command"),
         (("new", "method", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
+        (("new", "method", "cma-es"), "'cma-es' is a name of a method here"),
         (("new", "method", "my search"), "letters, digits"),
         (("new", "method", "other", "--out", mine), "is there already"),
         (("new", "method", "other", "--out", tmp_path / "x.txt"), "must end in .py"),

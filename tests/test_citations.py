@@ -18,7 +18,8 @@ from coartic.analysis.citations import (
     software,
 )
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.benchmarks.registry import built_in, registry
+from coartic.benchmarks.reader import METHOD_NAME
+from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.benchmarks.suites import Cell
 from coartic.runs.card import MethodCard
 from coartic.runs.store import RUNS_FILE
@@ -68,6 +69,12 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
         assert plain(BIB[key]["author"]).partition(",")[0] in text
         title = re.sub("[{}]", "", plain(BIB[key]["title"])).lower().split(":")[0]
         assert title in text.lower() or key in ("kanoun2011", THE_PAPER)
+
+
+def test_no_file_may_take_a_name_that_people_read():
+    """Of those that could be an id."""
+    read = {text for row in KNOWN_METHODS.values() for text in (row.name, row.algorithm)}
+    assert {*filter(METHOD_NAME.fullmatch, read)} == {*NAMES}
 
 
 def test_every_method_has_a_row_and_every_entry_is_used():

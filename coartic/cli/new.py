@@ -11,7 +11,6 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say_pairs
 from coartic.errors import CoarticError
-from coartic.text import id_named
 
 group = typer.Typer(no_args_is_help=True, help="Begin a method of your own.")
 
@@ -33,7 +32,7 @@ def new_method(
     """Write a method that works, to be changed into one of your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
-    from coartic.benchmarks.registry import add_cards, built_in, registry
+    from coartic.benchmarks.registry import add_cards, registry
     from coartic.files import write_output
     from coartic.runs.card import card_of
 
@@ -42,11 +41,7 @@ def new_method(
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})
     check_declaration(mine, "new method")
-    registered = registry()
-    add_cards(registered, [card_of(mine, "new method", "", "")])
-    names = given.method_names(built_in())
-    if id_named(name, names) != name:
-        raise CoarticError(f"{name!r} is a name of a method here: choose another")
+    add_cards(registry(), [card_of(mine, "new method", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     say_pairs(
