@@ -421,7 +421,7 @@ def test_locus_slopes_by_hand():
     assert slope.p == pytest.approx(1 - 2 * math.atan(2.5 / math.sqrt(0.75)) / math.pi)
     # However many runs there are of each task, the evidence is that of three positions.
     many = np.repeat(q, 50, axis=0), np.repeat([-1, -1, 0, 1, 1], 50)
-    assert locus_slopes(*many)[0] == pytest.approx(slope)
+    assert repr(locus_slopes(*many)[0]) == repr(slope)
 
 
 # Studies
