@@ -43,7 +43,7 @@ def player(study: Study) -> str:
         for name in tasks
     }
     alone = {name: preset for name, preset in alone.items() if preset["runs"]}
-    presets += alone.values()
+    presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
     if not presets:
         return ""
     if not first and (most := most_improved(study)) is not None and most[0][0] in alone:
@@ -69,14 +69,14 @@ def player(study: Study) -> str:
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """Methods with solved runs on all of these tasks: their names, and of each task the movements
     of the run nearest the median reward; of several tasks also the postures of all runs at goal 1,
-    which they share."""
+    which they share. Methods that follow paths are left out: the script moves straight."""
     labels = [label for name, label in study.cells if name == tasks[0]]
     ranked = {label for labels in labels_by_task(study).values() for label in labels.values()}
     shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
     for label in in_order([label for label in labels if label in shown]):
         cells = [(name, label) for name in tasks]
-        if all(cell in study.cells and study.trajectories(*cell).runs for cell in cells):
+        if all(cell in study.cells and moves_straight(study, cell) for cell in cells):
             films = [typical_of(study, cell) for cell in cells]
             if len(tasks) > 1:
                 for film, cell in zip(films, cells, strict=True):
@@ -84,6 +84,13 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
                     film["reached"] = hits.round(3).tolist()
             runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
+
+
+def moves_straight(study: Study, cell: CellKey) -> bool:
+    """Whether a cell has solutions, and no movement of them follows a path."""
+    runs = study.trajectories(*cell).runs
+    kinds = {movement.kind for run in runs for movement in run.execution.movements}
+    return bool(kinds) and "path" not in kinds
 
 
 def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
@@ -99,55 +106,26 @@ def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
 
 
 def shortened(run: Trajectory, model: MotionModel) -> tuple[Movement, ...]:
-    """The movements of a run with fewer digits, and paths with fewer waypoints: as few as give each
-    goal the same ticks."""
+    """The movements of a run with as few digits as give each goal the same ticks."""
     made = run.execution
     for digits in range(2, 7):
-        before: Any = run.task.q0
-        shorter = []
-        for movement in made.movements:
-            shorter.append(rounded(movement, before, run.task.q0, digits))
-            before = movement.target
+        shorter = tuple(rounded(movement, run.task.q0, digits) for movement in made.movements)
         again = execute(run.task, shorter, model=model)
         if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
-            return tuple(shorter)
+            return shorter
     return made.movements
 
 
-def rounded(movement: Movement, before: Array, q0: Array, digits: int) -> Movement:
-    """A movement from ``before`` with so many decimals; what stands as at the start still does."""
-
-    def short(points: Array) -> Array:
-        return np.where(points == q0, points, np.round(points, digits))
-
-    target, waypoints = movement.target, movement.waypoints
-    if waypoints is not None:
-        waypoints = short(bends(np.vstack([before, waypoints]), 10.0**-digits)[1:])
-        target = waypoints[-1]
-    return replace(movement, target=None if target is None else short(target), waypoints=waypoints)
-
-
-def bends(points: Array, tolerance: float) -> Array:
-    """Those of the points ``(k, dof)`` of a polyline from which it keeps within a tolerance, its
-    ends among them. Splits at the worst point (Ramer 1972; Douglas and Peucker 1973)."""
-    kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
-    while spans:
-        first, last = spans.pop()
-        inner, line = points[first + 1 : last] - points[first], points[last] - points[first]
-        if not len(inner):
-            continue
-        share = np.clip(inner @ line / max(line @ line, 1e-30), 0.0, 1.0)
-        off = np.linalg.norm(inner - share[:, None] * line, axis=1)
-        worst = first + 1 + int(off.argmax())
-        if off.max() > tolerance:
-            kept.add(worst)
-            spans += [(first, worst), (worst, last)]
-    return points[sorted(kept)]
+def rounded(movement: Movement, q0: Array, digits: int) -> Movement:
+    """A movement with so many decimals; what stands as at the start still does."""
+    target = movement.target
+    if target is None:
+        return movement
+    return replace(movement, target=np.where(target == q0, target, np.round(target, digits)))
 
 
 def for_script(movement: Movement) -> dict[str, Any]:
     """A movement as ``model.js`` executes it."""
-    made = {"goal": movement.goal - 1, "hand": HANDS.index(movement.hand), "kind": movement.kind}
-    if movement.waypoints is not None:
-        return made | {"waypoints": movement.waypoints.tolist()}
-    return made | {"target": None if movement.target is None else movement.target.tolist()}
+    target = None if movement.target is None else movement.target.tolist()
+    hand = HANDS.index(movement.hand)
+    return {"goal": movement.goal - 1, "hand": hand, "kind": movement.kind, "target": target}

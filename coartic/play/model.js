@@ -15,7 +15,6 @@ const MOST_LINKS = 100;
 /* coartic/model.py */
 const PAPER = {
   step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
-  corrective_arrival: false, whole_last_step: false, first_step: false,
 };
 
 /* coartic/motion/problem.py; `task` has the content of a task file. */
@@ -38,7 +37,6 @@ function problem_of(task, model = PAPER) {
       arm(BASE_DOF + robot.left_links.length, robot.right_links, robot.right_shoulder),
     ],
     free: [!locked.includes("x"), !locked.includes("y")],
-    penalty: task.penalty ? terms_of(task) : null,
   };
 }
 
@@ -148,7 +146,6 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
   const distance = Math.sqrt(square);
   const last = Math.ceil(distance / model.step);
-  const target_step = model.whole_last_step && last > 0 ? -1 : last;
   const per_step = distance > 0 ? model.step / distance : 0;
   const base_x = (target[0] - q[0]) * per_step;
   const base_y = (target[1] - q[1]) * per_step;
@@ -174,8 +171,8 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
   let step = 0;
   for (;;) {
-    const fraction = step === target_step ? 0 : step * model.step / distance;
-    const here = step === target_step ? target : between;
+    const fraction = step === last ? 0 : step * model.step / distance;
+    const here = step === last ? target : between;
     if (here === between) {
       for (let j = 0; j < BASE_DOF; j += 1) between[j] = q[j] + fraction * (target[j] - q[j]);
       for (let j = first; j < first + tip; j += 1) between[j] = q[j] + fraction * (target[j] - q[j]);
@@ -203,8 +200,8 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
       );
     }
     const hit = Math.sqrt(to_goal) <= radius;
-    if ((stop || hit) && !(model.first_step && step === 0 && last > 0)) {
-      for (let j = 0; j < dof; j += 1) q[j] = step === target_step ? target[j] : q[j] + fraction * (target[j] - q[j]);
+    if (stop || hit) {
+      for (let j = 0; j < dof; j += 1) q[j] = step === last ? target[j] : q[j] + fraction * (target[j] - q[j]);
       return hit ? step + 1 : -(step + 1);
     }
     step = Math.min(step + 1 + Math.floor(Math.min(clear, last)), last);
@@ -240,78 +237,6 @@ function correct(problem, q, number, hand) {
   }
 }
 
-/* coartic/motion/movement.py: points of a path, a step each, and its end. */
-function path_points(q, waypoints, model) {
-  const corners = [q, ...waypoints];
-  const lengths = waypoints.map((point, k) => Math.sqrt(point.reduce((sum, value, j) => sum + (value - corners[k][j]) ** 2, 0)));
-  const ends = [0];
-  lengths.forEach((length) => ends.push(ends.at(-1) + length));
-  const count = Math.ceil(ends.at(-1) / model.step);
-  const points = [];
-  let k = 1;
-  for (let step = 0; step < count; step += 1) {
-    const at = step * model.step;
-    while (k < ends.length - 1 && ends[k] <= at) k += 1;
-    const share = ends[k] > ends[k - 1] ? (at - ends[k - 1]) / (ends[k] - ends[k - 1]) : 0;
-    points.push(Float64Array.from(corners[k], (value, j) => corners[k - 1][j] + share * (value - corners[k - 1][j])));
-  }
-  points.push(Float64Array.from(corners.at(-1)));
-  if (model.whole_last_step && count) {
-    const final = lengths.findLastIndex((length) => length > 0);
-    const beyond = (count * model.step - ends.at(-1)) / lengths[final];
-    points[count] = points[count].map((value, j) => value + beyond * (corners[final + 1][j] - corners[final][j]));
-  }
-  return points;
-}
-
-/* coartic/motion/movement.py: follow a path with `q` itself; ticks, negative for a miss. */
-function follow(problem, q, waypoints, number, hand) {
-  const points = path_points(q, waypoints, problem.model);
-  const from = problem.model.first_step && points.length > 1 ? 1 : 0;
-  let k = points.findIndex((point, step) => step >= from && distance_to_goal(problem, point, number, hand) <= problem.radius);
-  const hit = k >= 0;
-  if (!hit) k = points.length - 1;
-  q.set(points[k]);
-  return hit ? k + 1 : -(k + 1);
-}
-
-/* coartic/motion/penalty.py */
-function terms_of(task) {
-  const given = { joints: 0, costly: "arms", region: 0, radius: 1, distinct: 0, apart: 1, ...task.penalty };
-  const mean = (axis) => task.goals.reduce((sum, goal) => sum + goal[axis], 0) / task.goals.length;
-  return { ...given, centre: given.centre || [mean(0), mean(1)] };
-}
-
-/* coartic/motion/penalty.py: what hitting a goal in `q` loses beside ticks. */
-function penalty_at(problem, before, q, hand, first) {
-  const { penalty, arms } = problem;
-  const arm = arms[hand];
-  const change = (from, to) => {
-    let square = 0;
-    for (let j = from; j < to; j += 1) square += (q[j] - before[j]) * (q[j] - before[j]);
-    return Math.sqrt(square);
-  };
-  let ticks = 0;
-  if (penalty.joints > 0) {
-    const [middle, end] = [arms[RIGHT].first, q.length];
-    const bounds = { base: [0, BASE_DOF], arms: [BASE_DOF, end], "left-arm": [BASE_DOF, middle], "right-arm": [middle, end] };
-    ticks += penalty.joints * change(...bounds[penalty.costly]);
-  }
-  if (penalty.region > 0) {
-    chain(q, arm, xs, ys);
-    let deepest = 0;
-    for (let k = 1; k < arm.links.length; k += 1) {
-      const [dx, dy] = [xs[k] - penalty.centre[0], ys[k] - penalty.centre[1]];
-      deepest = Math.max(deepest, 1 - Math.sqrt(dx * dx + dy * dy) / penalty.radius);
-    }
-    ticks += penalty.region * deepest;
-  }
-  if (penalty.distinct > 0 && !first) {
-    ticks += penalty.distinct * Math.max(0, 1 - change(arm.first, arm.first + arm.links.length) / penalty.apart);
-  }
-  return Math.floor(ticks + 0.5);
-}
-
 /* ---- Trials ---- */
 
 /* What happens from the start on: movements as made, and where the goals were hit. */
@@ -323,21 +248,16 @@ class Trial {
     this.reached = [];
     this.hands = [];
     this.ticks = 0;
-    this.penalty = 0;
     this.going = true;
   }
 
-  /* coartic/motion/solution.py: note a movement that was made. */
-  take(goal, hand, kind, target, signed) {
+  /* coartic/motion/solution.py: make a movement and note it; whether it hits. */
+  moves(goal, hand, kind, target) {
+    const signed = move(this.problem, this.q, target, goal, hand, kind !== "corrective");
     const ticks = Math.abs(signed);
     this.ticks += ticks;
     this.movements.push({ goal, hand, kind, target: Float64Array.from(target), ticks });
     return signed > 0;
-  }
-
-  moves(goal, hand, kind, target) {
-    const stops = kind !== "corrective" || this.problem.model.corrective_arrival;
-    return this.take(goal, hand, kind, target, move(this.problem, this.q, target, goal, hand, stops));
   }
 
   /* coartic/motion/reach.py: **A** finishes what was missed; whether it hits. */
@@ -351,14 +271,10 @@ class Trial {
     return distance_to_goal(this.problem, this.q, goal, hand) <= this.problem.radius;
   }
 
-  /* The goal is hit: where, and what it costs. */
+  /* The goal is hit. */
   ends(goal, hand) {
     if (!this.movements.length || this.movements.at(-1).goal !== goal) {
       this.movements.push({ goal, hand, kind: "corrective", target: Float64Array.from(this.q), ticks: 0 });
-    }
-    if (this.problem.penalty) {
-      const before = goal ? this.reached[goal - 1] : this.problem.start;
-      this.penalty += penalty_at(this.problem, before, this.q, hand, goal === 0);
     }
     this.reached.push(Float64Array.from(this.q));
     this.hands.push(hand);
@@ -372,7 +288,7 @@ class Trial {
   }
 
   get reward() {
-    return this.going ? -(this.ticks + this.penalty) : -Infinity;
+    return this.going ? -this.ticks : -Infinity;
   }
 }
 
@@ -393,19 +309,16 @@ function corrective_trial(problem, hands) {
   return make_trial(problem, hands, hands.map(() => null));
 }
 
-/* coartic/motion/solution.py: execute movements, each with goal, hand, kind, and target or waypoints. */
+/* coartic/motion/solution.py: execute movements, each with goal, hand, kind and target. */
 function execute(problem, movements) {
   const trial = new Trial(problem);
   for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
     const due = movements.filter((movement) => movement.goal === goal);
     const { hand } = due[0];
     let hit = trial.looks(goal, hand);
-    [...due, { kind: "corrective" }].forEach(({ kind, target, waypoints }, place) => {
+    [...due, { kind: "corrective" }].forEach(({ kind, target }, place) => {
       if (!trial.going || (hit && (place > 0 || kind === "corrective"))) return;
-      if (kind === "path") {
-        hit = trial.take(goal, hand, kind, waypoints.at(-1), follow(problem, trial.q, waypoints, goal, hand));
-        trial.movements.at(-1).waypoints = waypoints;
-      } else hit = target ? trial.moves(goal, hand, kind, target) : trial.corrects(goal, hand);
+      hit = target ? trial.moves(goal, hand, kind, target) : trial.corrects(goal, hand);
     });
     trial.going = hit;
     if (trial.going) trial.ends(goal, hand);
@@ -419,15 +332,13 @@ function trajectory(problem, trial) {
   const rows = [];
   const hits = [];
   let q = problem.start;
-  trial.movements.forEach(({ goal, kind, target, waypoints, ticks }) => {
-    if (kind === "path") rows.push(...path_points(q, waypoints, problem.model).slice(0, ticks));
-    else if (ticks) {
+  trial.movements.forEach(({ goal, target, ticks }) => {
+    if (ticks) {
       const distance = Math.sqrt(target.reduce((square, value, j) => square + (value - q[j]) ** 2, 0));
       const last = Math.ceil(distance / step);
       for (let k = 0; k < ticks; k += 1) {
         const [from, fraction] = [q, (k * step) / distance];
-        const ends = k === last && !(problem.model.whole_last_step && last);
-        rows.push(ends ? target : target.map((value, j) => from[j] + fraction * (value - from[j])));
+        rows.push(k === last ? target : target.map((value, j) => from[j] + fraction * (value - from[j])));
       }
     }
     if (rows.length) q = rows.at(-1);
@@ -600,7 +511,7 @@ const VARIANTS = Object.fromEntries(["EC1", "EC4"].flatMap((base) => [
 ]));
 const EQUALLY_NEAR = 1e-9;
 
-/* coartic/learner/kernel.py, under the readings that the package takes by default. */
+/* coartic/learner/kernel.py */
 class Learner {
   constructor(problem, rules, seed, first_hands = initial_hands(problem)) {
     Object.assign(this, { problem, rules, first_hands });
@@ -968,7 +879,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
 
 /* The best of such paths over hand sequences, from the corrective process's postures and others. */
 function shortest_plan(problem, q, from, to, starts) {
-  const window = { ...problem, goals: problem.goals.slice(from, to), start: q, penalty: null };
+  const window = { ...problem, goals: problem.goals.slice(from, to), start: q };
   const rng = new Generator(from);
   let plans = [];
   hand_sequences(window).forEach((hands) => {
@@ -1014,7 +925,7 @@ function receding_horizon(problem, horizon, starts = 8) {
 if (typeof module !== "undefined") {
   module.exports = {
     CONDITIONS, VARIANTS, PAPER, Generator, Learner, Search, Trial, chain, correct, corrective_trial, distance_to_goal,
-    execute, initial_hands, joint_positions, learn, letters_of, make_trial, move, path_points, problem_of,
+    execute, initial_hands, joint_positions, learn, letters_of, make_trial, move, problem_of,
     receding_horizon, trajectory,
   };
 }

@@ -53,7 +53,7 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
             still=still or text_of("still.svg"),
             data=as_json({"presets": presets, **more}),
             model="\n".join(map(text_of, ("model.js", "worker.js"))),
-            script="\n".join(map(text_of, ("gif.js", "picture.js", "play.js", "begin.js"))),
+            script="\n".join(map(text_of, ("picture.js", "play.js", "begin.js"))),
         )
     )
 

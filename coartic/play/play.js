@@ -298,7 +298,6 @@ class Play {
       this.waiting = false;
       this.draw();
       this.say();
-      if (this.recording) this.capture();
     });
   }
 
@@ -350,7 +349,7 @@ class Play {
 
   /* The view follows the box in a few frames. */
   glide() {
-    if (!this.view || this.calm.matches || this.recording === "film") this.view = this.box;
+    if (!this.view || this.calm.matches) this.view = this.box;
     else {
       const off = Math.max(...this.box.map((value, k) => Math.abs(value - this.view[k])));
       this.view = off < 0.02 ? this.box : this.view.map((value, k) => value + 0.25 * (this.box[k] - value));
@@ -771,13 +770,12 @@ class Play {
     on("tick", "change", () => this.keep());
     on("speed", "change", (event) => { this.state.speed = Number(event.target.value); this.keep(); });
     on("pauses", "change", (event) => { this.state.pauses = Number(event.target.checked); this.keep(); });
-    on("gif", "click", () => this.saveFilm());
     on("png", "click", () => this.save(this.find("stage"), "coartic.png"));
-    on("record", "click", () => (this.recording ? this.endRecording() : this.record()));
+    on("record", "click", () => (this.recorder ? this.recorder.stop() : this.record()));
+    this.find("record").hidden = !(window.MediaRecorder && this.find("stage").captureStream);
     on("link", "click", () => this.copyLink());
     // A finger that drags a goal does not scroll the page.
     this.find("handles").addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
-    this.find("stage").parentElement.addEventListener("pointermove", (event) => { this.pointer = event; });
   }
 
   /* Show what a link holds, with the goals of the preset where it has none. */
@@ -835,7 +833,7 @@ class Play {
     this.find("pauses").checked = Boolean(state.pauses);
   }
 
-  /* ---- To keep: link, picture, film ---- */
+  /* ---- To keep: link, picture, recording ---- */
 
   get link() {
     const { goals, others } = this.state;
@@ -886,92 +884,20 @@ class Play {
     else what.toBlob(give);
   }
 
-  /* Stage, inset and curve side by side, as small pixels. */
-  shot(film) {
-    const [stage, inset, curve] = ["stage", "inset", "curve"].map((name) => this.find(name));
-    const canvas = this.sheet || (this.sheet = document.createElement("canvas"));
-    Object.assign(canvas, film);
-    const context = canvas.getContext("2d", { willReadFrequently: true });
-    context.fillStyle = this.stage.colour("page");
-    context.fillRect(0, 0, film.width, film.height);
-    const put = (from, [x, y, width]) => context.drawImage(from, x, y, width, (width * from.height) / from.width);
-    put(stage, [0, 0, film.stage]);
-    let y = 8;
-    [[inset, "together"], [curve, "learning"]].forEach(([from, box]) => {
-      if (this.find(box).hidden || film.stage === film.width) return;
-      put(from, [film.stage + 8, y, film.width - film.stage - 16]);
-      y += ((film.width - film.stage - 16) * from.height) / from.width + 8;
-    });
-    context.fillStyle = this.colours.ink;
-    context.font = "13px system-ui, sans-serif";
-    const words = [...this.find("score").children].map((line) => line.textContent).join("   ");
-    context.fillText(words, 8, film.height - 24);
-    context.fillText(this.find("finding").textContent, 8, film.height - 8, film.width - 16);
-    if (this.recording === "use" && this.pointer) {
-      const box = stage.getBoundingClientRect();
-      const scale = film.stage / box.width;
-      context.globalAlpha = 0.6;
-      context.beginPath();
-      context.arc((this.pointer.clientX - box.left) * scale, (this.pointer.clientY - box.top) * scale, this.held ? 9 : 6, 0, 7);
-      context.fill();
-      context.globalAlpha = 1;
-    }
-    return context.getImageData(0, 0, film.width, film.height).data;
-  }
-
-  frame(aside) {
-    const { width, height } = this.find("stage");
-    const stage = Math.min(560, width);
-    return { width: stage + (aside ? 240 : 0), height: Math.round((stage * height) / width) + 44, stage };
-  }
-
-  /* The film of the movement, every third tick. */
-  async saveFilm() {
-    this.playing = false;
-    this.recording = "film";
-    const [before, form] = [this.state.tick, this.frame(false)];
-    const film = new Film(form.width, form.height);
-    for (let tick = 0; tick <= this.last; tick += 3) {
-      this.state.tick = Math.min(tick, this.last);
-      const held = this.stops.some((stop) => stop > tick - 3 && stop <= tick);
-      this.draw();
-      film.add(this.shot(form), (held ? 0.8 : 0) + (tick + 3 > this.last ? 1.5 : 0.04));
-      if (tick % 30 === 0) {
-        this.note(`Film: ${Math.round((100 * tick) / this.last)} %`);
-        await new Promise((resolve) => { setTimeout(resolve); });
-      }
-    }
-    this.recording = null;
-    this.go(before);
-    this.save(film.blob(), "coartic.gif");
-    this.note("The film is saved.");
-  }
-
-  /* What the reader does, five pictures a second. */
+  /* What the stage shows, as the browser records it. */
   record() {
-    this.recording = "use";
-    this.form = this.frame(true);
-    this.film = new Film(this.form.width, this.form.height);
-    this.captured = null;
+    const parts = [];
+    const recorder = new MediaRecorder(this.find("stage").captureStream());
+    recorder.ondataavailable = ({ data }) => parts.push(data);
+    recorder.onstop = () => {
+      this.recorder = null;
+      this.find("record").textContent = "Record";
+      this.save(new Blob(parts, { type: recorder.mimeType }), `coartic.${recorder.mimeType.split(/[/;]/)[1]}`);
+      this.note("The recording is saved.");
+    };
+    recorder.start();
+    this.recorder = recorder;
     this.find("record").textContent = "Stop and save";
-    this.note("Recording what you do.");
-    this.refresh();
-  }
-
-  capture() {
-    if (this.recording !== "use") return;
-    const now = performance.now();
-    if (this.captured && now - this.captured.time < 200) return;
-    const pixels = this.shot(this.form);
-    if (this.captured) this.film.add(this.captured.pixels, (now - this.captured.time) / 1000);
-    this.captured = { time: now, pixels };
-  }
-
-  endRecording() {
-    this.recording = null;
-    this.film.add(this.captured.pixels, 1);
-    this.find("record").textContent = "Record";
-    this.save(this.film.blob(), "coartic-use.gif");
-    this.note("The recording is saved.");
+    this.note("Recording the picture.");
   }
 }
