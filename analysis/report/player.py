@@ -29,8 +29,9 @@ NO_SCRIPTS = "<p>The movements are played by a script, and scripts are switched 
 def player(study: Study) -> str:
     """The figure as HTML; empty where no run has a solution.
 
-    Of each task it has, for each method of figures that moves straight, the run nearest its median reward. It begins
-    with one goal before two others if two tasks share one, else where the learner gains most.
+    Of each task it has, for each method of figures that moves straight, the run nearest its median
+    reward. It begins with one goal before two others if two tasks share one, else where the learner
+    gains most.
     """
     tasks = [name for name in study.tasks if name in one_by_one(study)]
     presets, first = [], ""
