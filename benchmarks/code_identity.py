@@ -1,52 +1,66 @@
 """The code that a result comes from, as a hash of syntax trees.
 
-Comments, docstrings, ``__version__`` and the place of a file do not count: a changed number makes
-a result stale, a better sentence or a release does not.
+It is that of the method's file, of the session and the execution of solutions, and of the modules
+that these import, from the method's folder or package and from this one. Comments, docstrings,
+imports for type checkers, ``__version__`` and the place of a file do not count: a changed number
+makes a result stale, a better sentence or a release does not.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
+import re
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from coartic.motion.sources import model_files
+import coartic
+from coartic.motion.sources import PACKAGE
 
+_API = PACKAGE / "__init__.py"
+"""It imports nothing before it is asked for: names count where they are at home."""
+_EVERY_RUN = PACKAGE / "method.py", PACKAGE / "motion" / "solution.py"
+_AROUND = tuple(Path(__file__).with_name(name) for name in ("worker.py", "scoring.py"))
+"""What performs and scores a run: of what these import only the above decides results."""
 _WITHIN_STATEMENTS = ast.stmt | ast.excepthandler | ast.match_case
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
-    """Hash of the model's code, a method's file, the modules that it imports from its folder or
-    package, and the data files that it reads. Raises OSError or SyntaxError."""
-    root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
-    within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
-    model, files, waiting = model_texts(), dict[Path, None](), [method]
-    while waiting:
-        if (path := waiting.pop()) not in files and path not in model:
-            files[path] = None
-            waiting += [file for file in imported_files(path, root) if within in file.parents]
-    texts = [*model.values(), *map(code_text, sorted(files, key=lambda path: path.name))]
-    content = [text.encode() for text in texts] + [path.read_bytes() for path in data]
+    """Hash of the code of a method in a file, and of the data files that it reads.
+
+    Raises OSError or SyntaxError.
+    """
+    content = sorted(code_text(path).encode() for path in [*files_of(method), *_AROUND])
+    content += [path.read_bytes() for path in data]
     return hashlib.sha256(b"".join(content)).hexdigest()[:12]
 
 
-@cache
-def model_texts() -> dict[Path, str]:
-    """What counts of the model, and of the worker that hands it to methods, file by file."""
-    return {p: code_text(p) for p in [*model_files(), Path(__file__).with_name("worker.py")]}
+def files_of(method: Path) -> set[Path]:
+    """The file of a method, and all others that its runs execute."""
+    root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
+    within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
+    files, waiting = set[Path](), [method, *_EVERY_RUN]
+    while waiting:
+        if (path := waiting.pop()) not in files:
+            files.add(path)
+            places = {(root, within), (PACKAGE.parent, PACKAGE)}
+            waiting += imported_files(path, places)
+    return files
 
 
-def imported_files(path: Path, root: Path) -> Iterator[Path]:
-    """The files below ``root`` that a module imports."""
+def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[Path]:
+    """The files that a module imports, each from below a root, within a folder."""
     for level, module, names in syntax(path.read_bytes())[1]:
-        base = path.parents[level - 1] if level else root
-        base = base.joinpath(*filter(None, module.split(".")))
-        for name in names:
-            place = base.joinpath(*filter(None, name.split(".")))
-            yield from filter(Path.is_file, (place.with_suffix(".py"), place / "__init__.py"))
+        for root, within in places:
+            base = path.parents[level - 1] if level else root
+            base = base.joinpath(*filter(None, module.split(".")))
+            for name in names:
+                place = base.joinpath(*filter(None, name.split(".")))
+                for file in (place.with_suffix(".py"), place / "__init__.py"):
+                    if file.is_file() and within in file.parents and file != _API:
+                        yield file
 
 
 def code_text(path: Path) -> str:
@@ -59,16 +73,29 @@ def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]],
     """What counts of a module, as a text; its imports: level, module, names."""
     imports = []
     for node in statements(tree := ast.parse(content)):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            node.body = []
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             node.value.value = None
         elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__version__":
             node.value = ast.Constant(None)
         elif isinstance(node, ast.Import):
-            imports.append((0, "", tuple(alias.name for alias in node.names)))
+            names = tuple(alias.name for alias in node.names)
+            imports.append((0, "", names))
+            if "coartic" in names:
+                used = re.findall(r"\bcoartic\.(\w+)", content.decode())
+                imports += [(0, home, ("",)) for home in homes(used)]
         elif isinstance(node, ast.ImportFrom):
-            names = ("", *(alias.name for alias in node.names))
-            imports.append((node.level, node.module or "", names))
+            names = tuple(alias.name for alias in node.names)
+            imports.append((node.level, node.module or "", ("", *names)))
+            if node.module == "coartic" and not node.level:
+                imports += [(0, home, ("",)) for home in homes(names)]
     return ast.dump(tree), tuple(imports)
+
+
+def homes(names: Iterable[str]) -> set[str]:
+    """The modules of names of the API."""
+    return {coartic.HOME[name] for name in names if name in coartic.HOME}
 
 
 def statements(tree: ast.AST) -> Iterator[ast.AST]:
@@ -76,5 +103,5 @@ def statements(tree: ast.AST) -> Iterator[ast.AST]:
     waiting = deque([tree])
     while waiting:
         node = waiting.popleft()
-        waiting += [n for n in ast.iter_child_nodes(node) if isinstance(n, _WITHIN_STATEMENTS)]
         yield node
+        waiting += [n for n in ast.iter_child_nodes(node) if isinstance(n, _WITHIN_STATEMENTS)]

@@ -93,14 +93,15 @@ _HOMES = {
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),
 }
-_HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
+HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
+"""Where each name of the API is."""
 
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for, when it is: the compiler takes a while, and few need it."""
-    if name not in _HOME:
+    if name not in HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    value = globals()[name] = getattr(import_module(HOME[name]), name)
     return value
 
 
