@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic import PAPER, MotionModel, Task
+from coartic import Task
 from coartic.analysis.trajectories import initial_solution
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
@@ -37,12 +37,10 @@ class KnownOptimum:
         return self.bound == self.reward
 
 
-def known_optima(
-    runs: pd.DataFrame, tasks: Mapping[str, Task], model: MotionModel
-) -> dict[str, KnownOptimum]:
+def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, KnownOptimum]:
     """Optimum with all joints free by task, for the tasks of a folder.
 
-    What the shipped data say where task and model are the same in all that matters, bettered by
+    What the shipped data say where the task is the same in all that matters, bettered by
     what the folder's own searches found. Searches of an instance of a family are short, and any
     run of the folder may better them.
     """
@@ -55,7 +53,7 @@ def known_optima(
     for name, task in tasks.items():
         of_task = searches[searches.task == name]
         candidates = [from_runs(of_task)] if len(of_task) else []
-        entry = best_shipped(task) if model == PAPER else None
+        entry = best_shipped(task)
         if entry is not None and entry.reward is not None:
             candidates.append(KnownOptimum(entry.reward, entry.bound))
         if not candidates:
@@ -88,9 +86,9 @@ def gap_share(rewards: ArrayLike, optimum: float) -> Array:
     return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
 
 
-def initial_reward(task: Task, model: MotionModel) -> float:
+def initial_reward(task: Task) -> float:
     """Reward of the initial solution; NaN where there is none."""
-    solution = initial_solution(task, model)
+    solution = initial_solution(task)
     return math.nan if solution is None or solution.reward is None else float(solution.reward)
 
 

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic import Execution, MotionModel, NotApplicableError, Task, hand_sequences
+from coartic import Execution, NotApplicableError, Task, hand_sequences
 from coartic.analysis.optima import KnownOptimum, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
@@ -118,11 +118,6 @@ class Study:
         """The tasks as they were run, by name."""
         return self.plan.tasks
 
-    @cached_property
-    def model(self) -> MotionModel:
-        """The constants of movement of all runs."""
-        return self.plan.model
-
     def sequences(self, task: str) -> pd.DataFrame:
         """The corrective process alone on a task: a row for each hand sequence, best first.
 
@@ -134,7 +129,7 @@ class Study:
                 names = hand_sequences(self.tasks[task])
             except NotApplicableError:
                 names = []
-            ranked = ranked_sequences(self.tasks[task], names, model=self.model)
+            ranked = ranked_sequences(self.tasks[task], names)
             rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
             frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
             self._sequences[task] = frame.astype({"reward": "Int64"})
@@ -207,15 +202,15 @@ class Study:
 
     def _executed(self, key: CellKey, part: str) -> Trajectories:
         cell, task = self.cells[key], self.tasks[key[0]]
-        runs = (spell_out(task, execution, self.model) for execution in self._executions(key, part))
-        return Trajectories(task, cell.method, cell.variant, tuple(runs), self.model)
+        runs = (spell_out(task, execution) for execution in self._executions(key, part))
+        return Trajectories(task, cell.method, cell.variant, tuple(runs))
 
     def _executions(self, key: CellKey, part: str) -> list[Execution]:
         cell, task = self.cells[key], self.tasks[key[0]]
         solutions = self._movements(key, part)
         ids = [run_id for run_id in _executed_of(cell) if run_id in solutions]
         with explain_errors(self.folder):
-            executions = execute_all(task, [solutions[run_id] for run_id in ids], self.model)
+            executions = execute_all(task, [solutions[run_id] for run_id in ids])
             executed = []
             for run_id, execution in zip(ids, executions, strict=True):
                 if (
@@ -238,7 +233,7 @@ class Study:
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:
         """Best known reward by task, with all joints free."""
-        return known_optima(self.runs, self.tasks, self.model)
+        return known_optima(self.runs, self.tasks)
 
     def _frame(self, view: str) -> pd.DataFrame:
         return _frame(self.folder, view, (self.folder / RUNS_FILE).stat().st_mtime_ns)

@@ -9,16 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from coartic import (
-    PAPER,
-    Execution,
-    Hand,
-    MotionModel,
-    Task,
-    Trajectory,
-    corrective_trial,
-    initial_hands,
-)
+from coartic import Execution, Hand, Task, Trajectory, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError
 from coartic.robot import Array
 
@@ -31,7 +22,6 @@ class Trajectories:
     method: str
     variant: str
     runs: tuple[Trajectory, ...]
-    model: MotionModel = PAPER
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -39,7 +29,7 @@ class Trajectories:
 
         None where it completes the task with none.
         """
-        return initial_solution(self.task, self.model)
+        return initial_solution(self.task)
 
     @cached_property
     def sequences(self) -> list[str]:
@@ -56,9 +46,7 @@ class Trajectories:
 
         Shape ``(n, G)``: runs whose hands it completes the task with.
         """
-        references = {
-            hands: corrective(self.task, hands, self.model) for hands in set(self.sequences)
-        }
+        references = {hands: corrective(self.task, hands) for hands in set(self.sequences)}
         rows = [
             change_from(run.execution, reference)
             for run in self.runs
@@ -72,16 +60,16 @@ def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]
     return np.subtract(execution.ticks_by_goal(), reference.ticks_by_goal(), dtype=np.int64)
 
 
-def corrective(task: Task, hands: str, model: MotionModel) -> Execution | None:
+def corrective(task: Task, hands: str) -> Execution | None:
     """The corrective process alone with these hands; None where it fails the task."""
-    execution = corrective_trial(task, hands, model=model)
+    execution = corrective_trial(task, hands)
     return execution if execution.completed else None
 
 
-def initial_solution(task: Task, model: MotionModel) -> Execution | None:
+def initial_solution(task: Task) -> Execution | None:
     """The corrective process alone with the task's hands; None where it completes it with none."""
     try:
-        return corrective(task, initial_hands(task, model=model), model)
+        return corrective(task, initial_hands(task))
     except NotApplicableError:
         return None
 

@@ -45,6 +45,13 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
+MODEL = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
+    "arrival_tick": 1, "corrective_arrival": False, "first_step": False, "whole_last_step": False,
+}  # fmt: skip
+LEARNER = {
+    "equal_distance": "random", "first_trial": "learns", "state": "previous-hand", "ties": "left",
+    "unknown_target": "corrects",
+}  # fmt: skip
 SCHEMA = "c8883613a85a08599252c2d5029a36506c672dd894cb794fac9b1e5d8df2407f"  # see schema
 # Whatever a file says, it is checked in bounded time and memory.
 MOST_GOALS, LONGEST_TEXT = 100, 100_000  # of a task, and of what is stored of it in characters
@@ -105,7 +112,6 @@ def stored_task(definition: str, model: str) -> Any:
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
     need(not hasattr(task, "penalty"), "its task has a penalty, which version 1.1.0 reads")
-    need(getattr(task.model, "arrival_tick", 1) == 1, "arrival took no tick, as in version 1.0.0")
     need(1 <= len(task.goals) <= MOST_GOALS, "the task has too many goals")
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
@@ -138,8 +144,7 @@ def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Float
     last = math.ceil(distance / model.step)
     fractions = np.arange(min(last, most) + 1) * model.step / (distance or 1.0)
     points: Floats = q[:, None] + fractions * difference[:, None]
-    # Another reading has the last step pass q^t.
-    if last <= most and (last == 0 or not model.whole_last_step):
+    if last <= most:
         points[:, -1] = target
     return points
 
@@ -156,9 +161,6 @@ def path(q: Floats, waypoints: list[Floats], model: Any, most: int = MOST_TICKS)
     if last > most:
         return points[:, :-1]
     points[:, -1] = corners[-1]
-    if model.whole_last_step and last:
-        final, beyond = np.flatnonzero(lengths)[-1], last * model.step - ends[-1]
-        points[:, -1] += beyond / lengths[final] * (corners[final + 1] - corners[final])
     return points
 
 
@@ -173,11 +175,10 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
     stops = hits.copy()
-    if kind in ("learned", "planned") or (kind == "corrective" and model.corrective_arrival):
+    if kind in ("learned", "planned"):
         dx, dy = end_x - x, end_y - y
         stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
     stops[-1] = True
-    stops[0] &= len(stops) == 1 or not model.first_step  # in another reading it looks later
     k = int(np.argmax(stops))  # the first
     return points[:, k], k + 1, bool(hits[k])
 
@@ -248,6 +249,9 @@ def check_all(db: sqlite3.Connection) -> Report:
     if hash_of(schema(db)) != SCHEMA:
         foreign = "Tables or views are not as coartic makes them, so that they may say anything."
         return Report(0, 0, [foreign], ["The runs."])
+    if other := other_reading(db):
+        words = f"Runs were made under another reading of the paper, {other}"
+        return Report(0, 0, [f"{words}: version 1.1.0 of coartic checks them."], ["The runs."])
     wrong = [f"Damage: {row[0]}." for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
     wrong += [*check_cells(db)]
     runs = movements = unsolved = spent = 0
@@ -296,6 +300,21 @@ def schema(db: sqlite3.Connection) -> list[list[str]]:
     ]
 
 
+def fixed(method: str) -> dict[str, Any]:
+    """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
+    return LEARNER if method.startswith("dual-process/") else {}
+
+
+def other_reading(db: sqlite3.Connection) -> str:
+    """How runs read the paper otherwise than this version does, as ``ties=right``, or nothing."""
+    for method, *texts in db.execute("SELECT method, model, parameters FROM settings"):
+        for text, now in zip(texts, (MODEL, fixed(method)), strict=True):
+            for name, value in json.loads(text).items():
+                if now.get(name, value) != value:
+                    return f"{name}={value}"
+    return ""
+
+
 def check_identity(row: Any) -> None:
     """Raises ValueError where a run is not that of its setting: its id is a hash of task, method,
     parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
@@ -303,8 +322,8 @@ def check_identity(row: Any) -> None:
     asked = {
         "task": task,
         "method": row["method"],
-        "parameters": json.loads(row["parameters"]),
-        "model": {**model, "arrival_tick": 1},  # version 1.0.0 had it, and ids are as they were
+        "parameters": {**fixed(row["method"]), **json.loads(row["parameters"])},
+        "model": {**MODEL, **model},
         "trial_budget": row["trial_budget"],
     }
     need(row["asked"] == hash_of(asked), "its task, method, parameters or model were changed")

@@ -23,7 +23,7 @@ from pydantic import Field
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.certificate import certify
 from coartic.baselines.posture_graph import cheapest_chains
-from coartic.baselines.shortest_paths import KNOWS_REWARD, check_ticks, fewest_ticks, shortest_plans
+from coartic.baselines.shortest_paths import KNOWS_REWARD, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
@@ -69,7 +69,6 @@ class Optimum(Method):
         """Search and prove; the solution has the fewest ticks found."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
-        check_ticks(session.model)
         task = with_locks(session.hand_over(*self.told), parameters.base)
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")

@@ -30,7 +30,6 @@ from coartic.baselines.posture_graph import Chain, cheapest_chains
 from coartic.baselines.shortest_paths import (
     KNOWS_REWARD,
     PlanInTicks,
-    check_ticks,
     fewest_ticks,
     shortest_plans,
 )
@@ -73,7 +72,6 @@ class RecedingHorizon(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan, make a movement, and plan again, until the last goal is in view."""
-        check_ticks(session.model)
         task, parameters = session.hand_over(*self.told), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[PlanInTicks] = []

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from coartic import Execution, MotionModel, Movement, Task, execute
+from coartic import Execution, Movement, Task, execute
 from coartic.baselines.posture_graph import Chain, HandSequence
 from coartic.baselines.trajectory_problem import MODEL_BASED, Instance, PathPlan, TrajectoryProblem
 from coartic.baselines.whole_ticks import Rounding, movements
@@ -44,13 +44,6 @@ class PlanInTicks(NamedTuple):
     """The plan that was rounded."""
     solves: int
     failed: int
-
-
-def check_ticks(model: MotionModel) -> None:
-    """MethodError for a motion model whose ticks the rounding does not know."""
-    if model.whole_last_step:
-        needed = "proof and rounding need a last step that ends at the target"
-        raise MethodError("infeasible", needed)
 
 
 def shortest_plans(

@@ -1,9 +1,9 @@
 """Results of other folders beside those of a plan: the shipped ones, another machine's, another
 person's.
 
-They go together where suite, seed, readings, trial budget, the tasks of a name and the code of a
-method are the same. Versions of coartic and of libraries and machines may differ. The scorer is
-that of the code that copies: every solution is executed again.
+They go together where suite, seed, trial budget, the tasks of a name and the code of a method are
+the same. Versions of coartic and of libraries and machines may differ. The scorer is that of the
+code that copies: every solution is executed again.
 """
 
 from __future__ import annotations
@@ -134,7 +134,6 @@ def check_together(plans: Mapping[str, Plan]) -> None:
         agree(where, "the suite", repr(plan.suite))
         agree(where, "the seed", plan.seed)
         agree(where, "the trial budget", plan.trial_budget)
-        agree(where, "the list of readings", list(plan.readings))
         for cell, setting in zip(plan.cells, plan.settings, strict=True):
             name, method = cell.task.name, cell.method
             agree(where, f"task {name!r}", f"definition {hash_of(setting.definition)[:8]}")

@@ -25,7 +25,6 @@ from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import Job
 from coartic.method import METERED
-from coartic.model import PAPER
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import RunKey, Setting
 from coartic.runs.run import Run
@@ -61,7 +60,7 @@ def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[
 
     def job(task: Task, seed: int = 1, trial_budget: int | None = None) -> Job:
         complete = card.complete(parameters)
-        setting = Setting(task, card.name, card.code, card.told, complete, PAPER, trial_budget)
+        setting = Setting(task, card.name, card.code, card.told, complete, trial_budget)
         return Job(setting, card, (RunKey("check", 0, 0, seed),), CHECK_LIMIT_S)
 
     laws = [declaration_law(card), parameters_law(card)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,6 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, brief_value
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
-from coartic.tasks.readings import condition_under, load_readings, model_under
 from coartic.tasks.task import check_task
 
 LIMITS = {
@@ -42,14 +41,11 @@ class Options:
     """CPU time of a run."""
     trial_budget: int | None = None
     """Physical trials of a run, of any method; None for no budget."""
-    readings: Sequence[str] = ()
-    """Readings of the paper, as ``"ties=right"``, in all cells, beside the suite's."""
 
     def __post_init__(self) -> None:
         for name, (least, most) in LIMITS.items():
             if getattr(self, name) is not None or name == "seed":  # the suite has none
                 check_number(name, getattr(self, name), least, most)
-        check_list("readings", self.readings)
 
 
 @dataclass(frozen=True)
@@ -114,16 +110,14 @@ def plan_suite(
             methods=select.methods,
             task_files=[Path(path) for path in select.task_files],
         )
-    readings = load_readings([*suite.readings, *chosen.readings])
-    model, fields = model_under(readings), condition_under(readings)
     trials = suite.trials if chosen.trials is None else chosen.trials
     tasks: dict[str, Task] = {}
     planned: dict[str, Cell] = {}
     for cell in cells:
         name = cell.task.name
         if name not in tasks:
-            tasks[name] = check_task(cell.task, model)
-        wanted = complete_cell(replace(cell, task=tasks[name]), fields, trials, chosen.runs)
+            tasks[name] = check_task(cell.task)
+        wanted = complete_cell(replace(cell, task=tasks[name]), trials, chosen.runs)
         # A cell that is written in two ways is performed once.
         first = planned.setdefault(hash_of([name, cell.method.name, wanted.complete]), wanted)
         if first.runs != wanted.runs:
@@ -137,28 +131,22 @@ def plan_suite(
         seed=chosen.seed,
         runs=chosen.runs or suite.runs,
         trials=max((trials_in(cell.complete) for cell in planned.values()), default=0),
-        readings=tuple(map(str, readings)),
         time_limit_s=suite.time_limit_s if limit_s is None else limit_s,
         trial_budget=chosen.trial_budget,
         cells=tuple(planned.values()),
     )
 
 
-def complete_cell(
-    cell: Cell, fields: Mapping[str, object], trials: int | None, runs: int | None
-) -> Cell:
-    """A cell with all its parameters: the suite's go before those of the readings of the paper
-    (``fields``), which go before ``trials``; ``runs`` go before the suite's. Raises CoarticError
-    for more trials than are kept."""
-    defaults = cell.method.defaults
-    parameters = {key: value for key, value in fields.items() if key in defaults}
-    parameters |= cell.parameters
-    default_trials = {"trials": trials} if trials is not None and "trials" in defaults else {}
-    complete = cell.method.complete(default_trials | parameters)
+def complete_cell(cell: Cell, trials: int | None, runs: int | None) -> Cell:
+    """A cell with all its parameters: the suite's go before ``trials``; ``runs`` go before the
+    suite's. Raises CoarticError for more trials than are kept."""
+    takes_trials = trials is not None and "trials" in cell.method.defaults
+    default_trials = {"trials": trials} if takes_trials else {}
+    complete = cell.method.complete(default_trials | cell.parameters)
     if trials_in(complete) > MOST_TRIALS:
         raise CoarticError(
             f"{cell.task.name} x {cell.label}: {trials_in(complete):_} trials a run; "
             f"at most {MOST_TRIALS:_} are kept"
         )
     count = (runs or cell.runs) if cell.method.stochastic else 1
-    return replace(cell, parameters=parameters, complete=complete, runs=count)
+    return replace(cell, complete=complete, runs=count)

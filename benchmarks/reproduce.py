@@ -51,12 +51,12 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
     none that can be shown."""
     if "solution" not in run.scores:
         raise CoarticError(f"run {run.key.id} has no solution to show: {run.status}, {run.reason}")
-    task, model, movements = run.setting.task, run.setting.model, run.scores["solution"].movements
+    task, movements = run.setting.task, run.scores["solution"].movements
     try:
-        (execution,) = execute_all(task, [movements], model)
+        (execution,) = execute_all(task, [movements])
         if isinstance(execution, Exception):
             raise execution
-        return trajectory(task, movements, model)
+        return trajectory(task, movements)
     except (SolutionError, ValueError) as error:
         raise CoarticError(f"{folder}: run {run.key.id} cannot be shown: {error}") from None
 

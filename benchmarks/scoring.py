@@ -22,7 +22,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     outcomes = [check_rewards(outcome) for outcome in outcomes]
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
     solutions = [outcomes[n].parts[part] for n, part in parts]
-    executions = execute_all(job.setting.task, solutions, job.setting.model)
+    executions = execute_all(job.setting.task, solutions)
     by_run: list[dict[str, Execution | Exception]] = [{} for _ in outcomes]
     for (n, part), execution in zip(parts, executions, strict=True):
         by_run[n][part] = execution

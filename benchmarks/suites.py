@@ -115,8 +115,6 @@ class Suite(FileData):
     """Trials per run, for methods that have this parameter."""
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
     """CPU time of a run; the runs of a batch have it together."""
-    readings: tuple[Line, ...] = ()
-    """How the paper is read, as ``ties=right``; what is not named is the default."""
     cells: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 

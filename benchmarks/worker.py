@@ -150,7 +150,6 @@ def perform_job(job: Job) -> list[Outcome]:
             setting.task,
             key.seed,
             map(Information, setting.told),  # as declared, whatever became of the class since
-            model=setting.model,
             trial_budget=setting.trial_budget,
             trusted=job.method.is_ours,
             of_run=True,

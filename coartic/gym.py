@@ -545,7 +545,7 @@ def best_known(tasks: Sequence[Task]) -> Array:
         released = import_module("coartic.benchmarks.released")
         with released.open_released("families") as store:
             runs, plan = store.frame("runs"), store.plan()
-        optima = import_module("coartic.analysis.optima").known_optima(runs, plan.tasks, plan.model)
+        optima = import_module("coartic.analysis.optima").known_optima(runs, plan.tasks)
         known |= {name: found.reward for name, found in optima.items() if name in known}
     rewards = [known[task.name] for task in tasks]
     return np.array([np.nan if reward is None else reward for reward in rewards], dtype=np.float64)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from coartic.errors import CoarticError
 from coartic.inputs import brief_value, check_limits
 
 
@@ -36,15 +34,6 @@ class MotionModel(NamedTuple):
     max_iterations: int = 20_000
     """Corrective iterations after which a trial has failed (our bound)."""
 
-    corrective_arrival: bool = False
-    """Whether a corrective movement also stops where its hand has arrived."""
-
-    whole_last_step: bool = False
-    """Whether the last step is as long as the others and goes beyond the target."""
-
-    first_step: bool = False
-    """Whether a step is made before the conditions for stopping are evaluated."""
-
 
 PAPER = MotionModel()
 _BOUNDS = {
@@ -54,19 +43,6 @@ _BOUNDS = {
     "correction_tolerance": (1e-6, 1e6),
     "max_iterations": (0, math.inf),
 }
-
-
-def stored_model(fields: Mapping[str, Any]) -> MotionModel:
-    """The constants that a run is stored with.
-
-    Raises CoarticError for a run of version 1.0 in which arrival took no tick.
-    """
-    if fields.get("arrival_tick", 1) != 1:
-        raise CoarticError(
-            "the run was made under reading arrival-tick=0, which the printed results refute and "
-            "which is no longer here. Version 1.0.0 of coartic has it."
-        )
-    return MotionModel(**{name: fields[name] for name in MotionModel._fields})
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:

@@ -144,44 +144,15 @@ def fields(module: str, owner: str, but: str = "") -> Iterator[str]:
 def parameters() -> Iterator[str]:
     """The parameters of every built-in method; methods that share them stand together."""
     from coartic.benchmarks.registry import built_in
-    from coartic.learner.conditions import ExplorationCondition
-    from coartic.learner.method import DualProcessParameters
-    from coartic.tasks.readings import readings
 
-    condition = meanings_of(ExplorationCondition)
-    open_questions = {
-        reading.field: f"{condition[reading.field]} ([Reading](#readings) `{reading.id}`.)"
-        for reading in readings()
-        if reading.part == "condition"
-    }
     shared: dict[Any, list[str]] = {}
     for name, card in built_in().items():
         shared.setdefault(card.load().Parameters, []).append(f"`{name}`")
     for kind, names in shared.items():
-        meanings = meanings_of(kind)
-        if issubclass(kind, DualProcessParameters):
-            meanings |= open_questions
         yield from (", ".join(names), "")
-        rows = list(rows_of(kind, meanings))
+        rows = list(rows_of(kind, meanings_of(kind)))
         heads = ("parameter", "default", "values", "meaning")
         yield from table(heads, rows) if rows else ("None.", "")
-
-
-def readings() -> Iterator[str]:
-    """The open questions about the paper, with the choice made here and its alternatives."""
-    from coartic.tasks.readings import readings
-
-    for reading in readings():
-        yield from (f"**`{reading.id}`** (`{reading.parameter}`). {reading.question}", "")
-        yield from (f"“{reading.quote}” ({reading.place})", "")
-        for choice in reading.choices:
-            role = "or"
-            if choice is reading.default:
-                role = "default"
-            elif choice.printed:
-                role = "as printed"
-            yield f"- {role}: `{choice.written}`, {choice.says}"
-        yield from ("", reading.why, "")
 
 
 def signatures() -> Iterator[str]:

@@ -153,7 +153,6 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"runs": "3"}, "runs is '3'; it must be from 1 to "),
         ({"runs": True}, "runs is True; it must be from 1 to "),
         ({"seed": -1}, "seed is -1; it must be from 0 to "),
-        ({"readings": ["tie=right"]}, "did you mean 'ties'?"),
         ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
         ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
     ],

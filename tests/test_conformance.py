@@ -11,7 +11,6 @@ from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.pool import worker_context
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
-from coartic.model import PAPER
 from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.optima import entries
 from coartic.tasks.task import TASK_FOLDER
@@ -106,7 +105,7 @@ def test_methods_that_keep_every_law(methods, name):
 
 def test_what_a_session_shows_cannot_be_written(methods):
     card = methods["test/forger"]
-    asked = Setting(load_task("ascending"), card.name, card.code, card.told, {}, PAPER, None)
+    asked = Setting(load_task("ascending"), card.name, card.code, card.told, {}, None)
     (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
@@ -117,7 +116,7 @@ def test_what_a_session_shows_cannot_be_written(methods):
 def test_trials_outside_the_session_are_noticed(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
     card, task = methods["test/outsider"], load_task("ascending")
-    asked = Setting(task, card.name, card.code, card.told, {"means": means}, PAPER, None)
+    asked = Setting(task, card.name, card.code, card.told, {"means": means}, None)
     for _ in range(2):
         (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
         assert outcome.status == "crashed"

@@ -307,9 +307,7 @@ def test_trials_differ(name):
 
 OTHERS = [
     MotionModel(max_iterations=100),
-    MotionModel(max_iterations=300, corrective_arrival=True, arrival_tolerance=0.09),
-    MotionModel(max_iterations=300, whole_last_step=True),
-    MotionModel(max_iterations=300, first_step=True),
+    MotionModel(max_iterations=300, arrival_tolerance=0.09),
 ]
 
 

@@ -154,7 +154,7 @@ def test_presence():
 
 def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
-    monkeypatch.setattr(data, "initial_solution", lambda task, model: alone)
+    monkeypatch.setattr(data, "initial_solution", lambda task: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
     study = with_signs(rewarded(centres, families=ONE + TWO))
     entries = {entry.claim.id: entry for entry in judge.judgements(study)}

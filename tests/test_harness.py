@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from coartic import (
-    PAPER,
     CoarticError,
     Movement,
     corrective_trial,
@@ -312,7 +311,7 @@ def test_the_runs_of_a_batch_are_scored():
     """Solutions are the corrective process, 319 ticks; the second run has no tenths."""
     task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
-    setting = Setting(task, card.name, card.code, card.told, {}, PAPER, None)
+    setting = Setting(task, card.name, card.code, card.told, {}, None)
     keys = tuple(RunKey(f"run-{k}", 0, k, 10 + k) for k in (0, 9, 1, 2, 3))
     times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
@@ -348,8 +347,8 @@ def test_the_runs_of_a_batch_are_scored():
 
 def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
-    assert too_long(task, [move] * 10_000, PAPER) is None
-    assert "10001 movements" in str(too_long(task, [move] * 10_001, PAPER))
+    assert too_long(task, [move] * 10_000) is None
+    assert "10001 movements" in str(too_long(task, [move] * 10_001))
 
 
 def test_robots_of_different_size_share_a_table(tmp_path):

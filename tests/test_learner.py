@@ -100,9 +100,8 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition):
 
 
 CREDIT = [
-    {}, {"discount": 0.5}, {"discount": 1.0}, {"discount": 0.3, "first_trial": "forgotten"},
-    {"discount": 0.9, "state": "goal", "ties": "previous"},
-    {"discount": 0.4, "counted": "all"}, {"discount": 0.9, "counted": "all", "state": "goal"},
+    {}, {"discount": 0.5}, {"discount": 1.0}, {"discount": 0.4, "counted": "all"},
+    {"discount": 0.9, "counted": "all"},
 ]  # fmt: skip
 
 
@@ -461,3 +460,10 @@ def test_without_corrective_process_a_missed_goal_ends_the_trial():
     assert run.reward > run.initial_reward
     assert {movement.kind for movement in run.solution} == {"learned"}
     assert run.execute().corrections == 0
+
+
+def test_a_learned_replay_is_the_replay():
+    task = load_task("ascending")
+    run = learn(task, replace(CONDITIONS["EC1"], learned="replay"), seed=3, trials=25)
+    assert run.reward == run.replay_reward != max(run.rewards)
+    assert run.execute().reward == run.reward

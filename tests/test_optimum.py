@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import renew_optima
 
-from coartic import PAPER, builtin_tasks, execute, load_task
+from coartic import builtin_tasks, execute, load_task
 from coartic.analysis import optima
 from coartic.baselines.optimum import Optimum, with_locks
 from coartic.baselines.shortest_paths import fewer
@@ -172,8 +172,8 @@ def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_fami
     runs = runs.assign(status="ok", hands="RRR", parameters="{}")
     runs = runs.astype({"proven_bound": "Int64"})
     tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i001")}
-    best = optima.known_optima(runs, tasks, PAPER)
+    best = optima.known_optima(runs, tasks)
     free = {name: (o.reward, o.bound) for name, o in best.items()}
     assert free == {"ascending": (-290, -292), "one-armed/v1/i001": (-290, -250)}
     locked = runs.assign(parameters='{"base": "y"}')
-    assert optima.known_optima(locked, tasks, PAPER)["ascending"].reward == -292
+    assert optima.known_optima(locked, tasks)["ascending"].reward == -292

@@ -155,7 +155,7 @@ def examples():
         yield from task.provenance.values()
     yield from (coartic.CONDITIONS, coartic.VARIANTS, coartic.PAPER)
     yield from (coartic.CONDITIONS | coartic.VARIANTS).values()
-    yield replace(coartic.CONDITIONS["EC4"], id="x" * 1000, noise_sd=1 / 3, ties="nearest")
+    yield replace(coartic.CONDITIONS["EC4"], id="x" * 1000, noise_sd=1 / 3, corrects=False)
     failing = coartic.MotionModel(max_iterations=1)
     yield from (failing, coartic.corrective_trial(TASK, HANDS, model=failing))
     yield from (PATH, PATH.execution, *PATH.execution.movements)

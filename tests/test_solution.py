@@ -13,7 +13,7 @@ def test_no_way_is_followed_without_end():
     far = 0.9 * MOST_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
     out, back = planned(posture(far), posture(far)), planned(posture(far), posture(0.0))
-    first, second = execute_all(task, [out, back], PAPER)
+    first, second = execute_all(task, [out, back])
     assert first.reward == -192  # on the way
     assert "1800000 steps; at most 1000000 are allowed" in str(second)
 
@@ -72,9 +72,7 @@ def test_a_planned_movement_is_always_made():
     assert corrective.reward == 0
     assert corrective.hands == "R"
     stay = Movement(1, "right", "path", waypoints=np.array([posture(0.0)]))
-    for model in (PAPER, PAPER._replace(first_step=True)):  # there is no step to make
-        assert execute(task, [stay], model=model).reward == -1
-        assert execute(task, planned(posture(0.0)), model=model).reward == -1
+    assert execute(task, [stay]).reward == -1
 
 
 WAY = np.zeros((1, 10))

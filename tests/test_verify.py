@@ -79,7 +79,7 @@ def true_folder(tmp_path_factory):
     method = MethodCard("method", "", "", (), (), True, {}, "", "code")
     cells = tuple(Cell(task, method, each, each, 7) for task, each, _ in asked)
     with writing(folder) as store:
-        plan = Plan("suite", 0, 7, 300, (), None, None, cells)
+        plan = Plan("suite", 0, 7, 300, None, None, cells)
         store.ask(plan, {}, [], "")
         for setting, (_, _, runs) in zip(plan.settings, asked, strict=True):
             store.write(run_of(setting, number, made, **more) for number, made, more in runs)
@@ -242,15 +242,12 @@ def test_it_stands_on_its_own():
     task=st.sampled_from([tiny_task(), uneven_task([0.1], [0.1] * 4)]),
     aim=st.tuples(st.floats(0, 1), st.sampled_from([-1, 0, 1])),
     scale=st.sampled_from([1e-3, 0.1, 1.0, 9e4]),
-    readings=st.fixed_dictionaries(
-        {name: st.booleans() for name in ("corrective_arrival", "whole_last_step", "first_step")}
-        | {"step": st.sampled_from([0.01, 0.037])}
-    ),
+    step=st.sampled_from([0.01, 0.037]),
 )
-def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readings):
+def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step):
     """Exactly, with a goal whose rim runs through a point of the movement, or a bit beside it."""
-    robot, model, on_path = task.robot, PAPER._replace(**readings), kind == "path"
-    model = model._replace(step=model.step * max(scale, 1.0))
+    robot, on_path = task.robot, kind == "path"
+    model = PAPER._replace(step=step * max(scale, 1.0))
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
     judge = checker.stored_task(task.model_dump_json(), json.dumps(model._asdict()))
     points = checker.path(q, [middle, target], model) if on_path else checker.line(q, target, model)
@@ -262,8 +259,8 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, readi
     if on_path:
         due = follow(robot, q, np.array([middle, target]), hand, goal, judge.radius, model=model)
     else:
-        stops = {"stop_on_arrival": kind == "learned" or model.corrective_arrival}
-        due = move(robot, q, target, hand, goal, judge.radius, model=model, **stops)
+        stops = kind == "learned"
+        due = move(robot, q, target, hand, goal, judge.radius, stop_on_arrival=stops, model=model)
     movement = checker.MoveRow(0, 1, hand, kind, 10**6, target, [middle, target])
     stopped, *rest = checker.make(judge, q, movement)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)

@@ -283,7 +283,7 @@ class Data:
 
     def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""
-        execution = initial_solution(self.task(task), self.study.model)
+        execution = initial_solution(self.task(task))
         if execution is None:
             raise MissingError(f"the corrective process alone does not complete {task}")
         return execution

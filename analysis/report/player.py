@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from coartic import MotionModel, Movement, Trajectory, execute
+from coartic import Movement, Trajectory, execute
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.values import shared_goal
@@ -56,7 +56,6 @@ def player(study: Study) -> str:
         presets,
         still=NO_SCRIPTS,
         control=CONTROL,
-        model=study.model._asdict(),
         first={"who": first if first in ids else ids[0]},
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})
@@ -102,16 +101,16 @@ def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
     return {
         "run": str(good.run_id.iloc[k]),
         "ticks": runs[k].ticks,
-        "movements": [for_script(movement) for movement in shortened(runs[k], study.model)],
+        "movements": [for_script(movement) for movement in shortened(runs[k])],
     }
 
 
-def shortened(run: Trajectory, model: MotionModel) -> tuple[Movement, ...]:
+def shortened(run: Trajectory) -> tuple[Movement, ...]:
     """The movements of a run with as few digits as give each goal the same ticks."""
     made = run.execution
     for digits in range(2, 7):
         shorter = tuple(rounded(movement, run.task.q0, digits) for movement in made.movements)
-        again = execute(run.task, shorter, model=model)
+        again = execute(run.task, shorter)
         if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
             return shorter
     return made.movements

@@ -18,7 +18,7 @@ from typing import Annotated
 import typer
 
 import coartic
-from coartic.cli import draw, new, paper, play, read, run
+from coartic.cli import draw, new, play, read, run
 from coartic.cli.terminal import complain, say
 from coartic.errors import CoarticError
 
@@ -64,7 +64,6 @@ for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
     app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
 app.add_typer(new.group, name="new")
-app.add_typer(paper.group, name="paper")
 
 
 class Said(logging.Handler):

@@ -73,14 +73,6 @@ Out = Annotated[
         "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
     ),
 ]
-Readings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--reading",
-        metavar="NAME=VALUE",
-        help="How the paper is read (`coartic paper readings`), such as ties=right.",
-    ),
-]
 RunCount = Annotated[
     int | None,
     typer.Option(parser=whole("--runs", 1), metavar="N", help="Runs of each cell."),

@@ -101,9 +101,8 @@ def animate(
         title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
         panels.append((title, movement))
     if initial:
-        on, model = panels[0][1].task, found.setting.model
-        movements = corrective_trial(on, initial_hands(on, model=model), model=model).movements
-        initial_solution = trajectory(on, movements, model=model)
+        on = panels[0][1].task
+        initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
         panels.insert(0, (f"{on.label}: initial solution", initial_solution))
     frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")

@@ -34,7 +34,6 @@ def run(
     seed: given.Seed = 0,
     time_limit: given.TimeLimit = None,
     trial_budget: given.TrialBudget = None,
-    reading: given.Readings = None,
     scheduler: given.Scheduler = None,
     retry_failed: given.RetryFailed = False,
     redo: given.Redo = False,
@@ -68,7 +67,6 @@ def run(
         select=select,
         time_limit_s=time_limit,
         trial_budget=trial_budget,
-        readings=reading or (),
     )
     display = Display(chosen.name)
 
@@ -173,10 +171,8 @@ def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
     """What a method is told and takes, and the tasks that it applies to."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import name_of
-    from coartic.tasks.readings import readings
 
-    read = {each.field for each in readings()}
-    parameters = [f"{k}={v}" for k, v in card.defaults.items() if k not in read]
+    parameters = [f"{k}={v}" for k, v in card.defaults.items()]
     tasks = [name for name in builtin_tasks() if card.why_not(load_task(name)) is None]
     yield "Method", f"{card.name}: {card.title}"
     yield "Called", name_of(card.name)

@@ -32,14 +32,9 @@ MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
 HandExploration = Literal["none", "closest", "random"]
-Ties = Literal["left", "right", "random", "nearest", "previous"]
-EqualDistance = Literal["random", "computed"]
-FirstTrial = Literal["learns", "forgotten"]
-UnknownTarget = Literal["corrects", "explores"]
 Learned = Literal["best", "replay"]
 Credit = Literal["overall", "subtask"]
 Counted = Literal["later", "all"]
-State = Literal["previous-hand", "goal"]
 Share = Annotated[float, Field(ge=0, le=1)]
 Noise = Annotated[float, Field(ge=0, le=MOST_NOISE)]
 
@@ -70,17 +65,6 @@ class ExplorationCondition:
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
-    ties: Ties = "left"
-    """The hand among those of equal Q, most often unknown ones."""
-    equal_distance: EqualDistance = "random"
-    """The closest hand where both are as near: a random one, or what rounding makes nearer."""
-    first_trial: FirstTrial = "learns"
-    """Whether trial 0 fills Q and q*."""
-    unknown_target: UnknownTarget = "corrects"
-    """Of a pair (s, a) without a stored target: **A** acts at once, or first the noise, from
-    where the robot stands."""
-    state: State = "previous-hand"
-    """What Q and q* are learned for: a goal and the hand before it, or a goal alone."""
     learned: Learned = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
     credit: Credit = "overall"

@@ -10,9 +10,9 @@ One call of a compiled kernel performs many runs side by side, goal by goal and 
 trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy generator of its own
 (``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
 ε, where hands are explored; a second one that picks a hand, where the first fell below ε
-and the pick is random, or where two hands are equal and ties are broken at random; one
-standard normal per explored joint, in the order of ``q``, where a target is stored. Runs share
-nothing: the result of one depends neither on the others nor on their number.
+and the pick is random; one standard normal per explored joint, in the order of ``q``, where a
+target is stored. Runs share nothing: the result of one depends neither on the others nor on their
+number.
 """
 
 from __future__ import annotations
@@ -43,7 +43,6 @@ from coartic.tasks.task import Task
 NO_HAND = 2  # ∅, the previous hand before goal 1
 LEARNED, CORRECTIVE = 0, 1
 _EXPLORATION = {"none": 0, "random": 1, "closest": 2}
-_TIES = {"left": 0, "right": 1, "random": 2, "nearest": 3, "previous": 4}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 
 
@@ -57,11 +56,6 @@ class Rules(NamedTuple):
     epsilon: float
     noise_sd: float
     corrects: bool
-    ties: int
-    rounding: float  # distances that differ by no more are equal
-    first_learns: bool
-    explores_unknown: bool
-    goal_alone: bool
     by_subtask: bool
     discount: float
     counts_earlier: bool
@@ -134,11 +128,6 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         epsilon=float(condition.epsilon),
         noise_sd=float(condition.noise_sd),
         corrects=bool(condition.corrects),
-        ties=_TIES[condition.ties],
-        rounding=_EQUALLY_NEAR if condition.equal_distance == "random" else -1.0,
-        first_learns=condition.first_trial == "learns",
-        explores_unknown=condition.unknown_target == "explores",
-        goal_alone=condition.state == "goal",
         by_subtask=condition.credit == "subtask",
         discount=float(condition.discount),
         counts_earlier=condition.counted == "all",
@@ -217,12 +206,6 @@ def greedy_hand(entries: Any, hands: Any) -> int:
 
 
 @inner
-def have_equal_values(entries: Any, hands: Any) -> bool:
-    """Whether there are two hands, of equal value."""
-    return len(hands) > 1 and bool(entries[hands[0]].value == entries[hands[1]].value)
-
-
-@inner
 def random_hand(hands: Any, rng: Any) -> int:
     """One of the hands, each as likely."""
     return int(hands[int(rng.random() * len(hands))])
@@ -236,30 +219,10 @@ def closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: 
     tie = False
     for hand in rules.hands[1:]:
         distance = distance_to_goal(n, number, hand, problem, work)
-        tie = abs(distance - nearest_distance) <= rules.rounding
+        tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
     return int(random_hand(rules.hands, rng)) if tie else int(nearest)
-
-
-@inlined
-def hand_of_equals(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
-    """Which of two hands of equal value, where it is not always the left one."""
-    hand = 1
-    if rules.ties == 2:
-        hand = random_hand(rules.hands, rng)
-    elif rules.ties == 3:
-        left = distance_to_goal(n, number, 0, problem, work)
-        hand = 1 if distance_to_goal(n, number, 1, problem, work) < left else 0
-    elif rules.ties == 4:
-        hand = 1 if work.trials[n].previous == 1 else 0
-    return hand
-
-
-@inlined
-def previous_hand(trial: Any, rules: Any) -> int:
-    """What the tables know of the goal before: its hand, or nothing."""
-    return NO_HAND if rules.goal_alone else int(trial.previous)
 
 
 @inlined
@@ -280,10 +243,7 @@ def choose_hands(
                 else:
                     hand = closest_hand(n, number, problem, rules, rng, work)
         if hand < 0:
-            entries = tables[n, number, previous_hand(trial, rules)]
-            hand = greedy_hand(entries, rules.hands)
-            if rules.ties != 0 and have_equal_values(entries, rules.hands):
-                hand = hand_of_equals(n, number, problem, rules, generator_at(rngs, n), work)
+            hand = greedy_hand(tables[n, number, trial.previous], rules.hands)
         trial.hand = hand
 
 
@@ -321,16 +281,12 @@ def aim(
             trial.stored, trial.aimed, run.acting = False, True, True
             fill_row(run.target, first_targets[number])
             continue
-        learned = tables[n, number, previous_hand(trial, rules), hand]
-        stored = learned.target
+        learned = tables[n, number, trial.previous, hand]
         trial.stored = trial.aimed = learned.value > -math.inf
-        if not trial.stored and rules.explores_unknown and explore and not first:
-            trial.aimed = True
-            stored = run.q
-        if not trial.aimed:
+        if not trial.stored:
             run.hit = distance_to_goal(n, number, hand, problem, work) <= problem.radius
             continue
-        set_target(run.target, run.q, stored, hand, explore, rules, generator_at(rngs, n))
+        set_target(run.target, run.q, learned.target, hand, explore, rules, generator_at(rngs, n))
         run.acting = True
 
 
@@ -359,17 +315,13 @@ def move_runs(number: int, kind: int, problem: Any, log: Any, work: Any) -> None
             depart(work.lanes.at, count, n, run.q, run.target, arm)
             count += 1
     goal = goal_of(problem, number)
-    stops = kind == LEARNED or problem.model.corrective_arrival
-    move_lanes(work.lanes, count, goal, stops, problem.model, work.runs)
+    move_lanes(work.lanes, count, goal, kind == LEARNED, problem.model, work.runs)
     for n in range(len(work.runs)):
         run, trial = work.runs[n], work.trials[n]
         if run.acting:
             trial.ticks += run.ticks
             trial.counts[COUNT.ticks] += run.ticks
             record_movement(log, n, number, trial.hand, kind, run.ticks, run.target)
-            if kind == CORRECTIVE and not run.hit:
-                trial.counts[COUNT.failed] += 1
-                trial.going = False
 
 
 @inlined
@@ -473,8 +425,7 @@ def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> N
     for number in range(log.hits.shape[1]):
         hit = log.hits[n, number]
         credit = hit.credit if rules.by_subtask else reward
-        knows = number > 0 and not rules.goal_alone
-        before = log.hits[n, number - 1].hand if knows else NO_HAND
+        before = log.hits[n, number - 1].hand if number > 0 else NO_HAND
         learned = tables[n, number, before, hit.hand]
         if credit > learned.value:
             learned.value = credit
@@ -504,8 +455,7 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
             continue
         if earlier == 0:
             copy_movements(n, log, kept.first)
-        if earlier > 0 or rules.first_learns:
-            update_tables(n, float(reward), rules, tables, log)
+        update_tables(n, float(reward), rules, tables, log)
         best = kept.best_trial[n]
         if best < 0 or reward > kept.rewards[n, best]:
             kept.best_trial[n] = earlier

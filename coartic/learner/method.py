@@ -20,12 +20,7 @@ from coartic.learner.conditions import (
     MOST_NOISE,
     VARIANTS,
     Counted,
-    EqualDistance,
     ExplorationCondition,
-    FirstTrial,
-    State,
-    Ties,
-    UnknownTarget,
 )
 from coartic.learner.learning import TRIALS, learn_many
 from coartic.learner.run import CORRECTIONS, LearningRun
@@ -52,12 +47,6 @@ class DualProcessParameters(Parameters):
     """ε"""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
-    ties: Ties = "left"
-    equal_distance: EqualDistance = "random"
-    first_trial: FirstTrial = "learns"
-    unknown_target: UnknownTarget = "corrects"
-    state: State = "previous-hand"
-    """What the paper leaves open (:class:`coartic.learner.conditions.ExplorationCondition`)."""
     of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "best"}
 
     @model_validator(mode="before")

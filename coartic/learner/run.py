@@ -111,9 +111,9 @@ class LearningRun:
     @property
     def reward(self) -> int | None:
         """Learned reward: the highest total reward of any trial, which is max Q of state 1 if
-        trial 0 learns and the overall reward is credited; that of the replay where the condition
-        says so. Where subtasks are credited, what the tables lead to is the replay
-        (:attr:`replay_reward`): the best trial is one that noise made good."""
+        the overall reward is credited; that of the replay where the condition says so. Where
+        subtasks are credited, what the tables lead to is the replay (:attr:`replay_reward`): the
+        best trial is one that noise made good."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])

@@ -100,7 +100,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
         "distance": (),  # from start to target; its square, before the arm sets off
-        **dict.fromkeys(("step", "last", "target_step", "slowness", "bend", "clearance"), ()),
+        **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
     }
     passing = {"x": (links + 1,), "y": (links + 1,), "fate": ()}  # shoulder, joints, hand
     shapes = corrected | shared | moved | passing

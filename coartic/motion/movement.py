@@ -133,7 +133,6 @@ def set_off(at: Any, count: int, model: Any) -> bool:
         at.distance[i], at.slowness[i], at.bend[i] = distance, 1.0 / speed, bend
         last = np.ceil(distance / model.step)
         at.step[i], at.last[i] = 0.0, last
-        at.target_step[i] = -1.0 if model.whole_last_step & (last > 0.0) else last
         # No joint turns farther than at the farther end, and, where it passes it, a step.
         most = winding(at.start, i) + winding(at.target, i) + model.step * len(at.length)
         far += 0 if most < trigonometry.LARGEST else 1
@@ -152,7 +151,7 @@ def place_between(at: Any, count: int, model: Any) -> None:
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
             between = begin + fraction * (end - begin)
-            at.q[j, i] = end if at.step[i] == at.target_step[i] else between
+            at.q[j, i] = end if at.step[i] == at.last[i] else between
 
 
 @lanewise
@@ -187,8 +186,6 @@ def look(
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
         fate = _IN_GOAL if to_goal <= hit else fate
-        early = (at.step[i] == 0.0) & (at.last[i] > 0.0)
-        fate = GOING if model.first_step & early else fate
         # Every step up to step + clear is clear of both discs.
         after = min(at.step[i] + 1.0 + np.floor(min(clear, at.last[i])), at.last[i])
         at.step[i] = after if fate == GOING else at.step[i]
@@ -233,7 +230,7 @@ def move_lanes(
                 continue
             run = runs[at.run[lane]]
             q, target = run.q, run.target
-            at_end = at.step[lane] == at.target_step[lane]
+            at_end = at.step[lane] == at.last[lane]
             fraction = 0.0 if at_end else at.step[lane] * model.step / at.distance[lane]
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
@@ -338,16 +335,13 @@ def follow(
     The k-th point lies at arc length ``k m`` of the polyline from ``q`` through the
     waypoints, the last point at its end. The movement stops at the first point with
     the hand within ``radius`` of the goal, or at the end; k steps take k + 1 ticks, as
-    for :func:`move`, whose readings of the first and the last step hold here too
-    (:class:`coartic.model.MotionModel`). Raises ValueError for a wrong shape.
+    for :func:`move`. Raises ValueError for a wrong shape.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
     misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
     inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
-    if model.first_step and last:
-        inside = inside[inside > 0]
     k = int(inside[0]) if inside.size else last
     return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
 
@@ -356,8 +350,7 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     """The points of a path, ``(n + 1, dof)``: its steps of length m and its end.
 
     Point k lies at arc length ``k m`` of the polyline from ``q`` through ``waypoints``
-    (k, dof). A whole last step goes beyond the end, straight on. Raises ValueError for a
-    wrong shape.
+    (k, dof). Raises ValueError for a wrong shape.
     """
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
@@ -365,10 +358,6 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
     points[-1] = corners[-1]
-    if model.whole_last_step and len(points) > 1:
-        final = np.flatnonzero(lengths)[-1]  # repeated waypoints have no direction
-        missing = (len(points) - 1) * model.step - ends[-1]
-        points[-1] += missing / lengths[final] * (corners[final + 1] - corners[final])
     return points
 
 

@@ -159,7 +159,7 @@ def correct_missed(
             if run.converged:
                 reached.corrections[first + i, g] = 1
                 fill_row(reached.corrected[first + i, g], run.target)
-    move_acting(first, count, g, goal, setup.model.corrective_arrival, arms, setup, batch)
+    move_acting(first, count, g, goal, False, arms, setup, batch)
     for i in range(count):
         if batch.runs[i].acting:
             reached.correcting[first + i, g] = batch.runs[i].ticks

@@ -331,7 +331,7 @@ def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) 
     targets = np.full((len(due), 1, task.robot.dof), np.nan)
     if how == "move":
         targets[:, 0] = [movement.target for _, movement in due]
-    ends = [movement.kind != "corrective" or model.corrective_arrival for _, movement in due]
+    ends = [movement.kind != "corrective" for _, movement in due]
     arms = Requests(
         starts=np.array([run.q for run, _ in due]),
         hands=np.array([[HANDS.index(movement.hand)] for _, movement in due]),

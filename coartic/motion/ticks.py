@@ -287,7 +287,7 @@ def trajectory(
     return spell_out(task, execution, model)
 
 
-def spell_out(task: Task, execution: Execution, model: MotionModel) -> Trajectory:
+def spell_out(task: Task, execution: Execution, model: MotionModel = PAPER) -> Trajectory:
     """Every control tick of an execution that has hit all goals."""
     q = np.array(task.q0)
     rows = [q[None, :][:0]]
@@ -321,5 +321,5 @@ def line_points(q: Array, target: Array, count: int, model: MotionModel) -> Arra
     if not last:
         return np.repeat(target[None, :], count, axis=0)
     between = q + k * model.step / distance * difference
-    points: Array = np.where((k < last) | model.whole_last_step, between, target)
+    points: Array = np.where(k < last, between, target)
     return points

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic.model import MotionModel
 from coartic.runs.card import MethodCard
-from coartic.tasks.readings import load_readings, model_under
+from coartic.runs.earlier import MODEL, parameters_then
 from coartic.tasks.task import Task
 
 SEARCH = "optimum/"
@@ -65,7 +64,6 @@ class Setting:
     told: tuple[str, ...]
     parameters: dict[str, Any]
     """All parameters of the method."""
-    model: MotionModel
     trial_budget: int | None
     """Most physical trials of one run."""
 
@@ -84,8 +82,8 @@ class Setting:
             {
                 "task": self.definition,
                 "method": self.method,
-                "parameters": self.parameters,
-                "model": self.model._asdict() | {"arrival_tick": 1},  # a field of version 1.0
+                "parameters": parameters_then(self.method, self.parameters),
+                "model": MODEL,
                 "trial_budget": self.trial_budget,
             }
         )
@@ -107,8 +105,6 @@ class Plan:
     """Runs of a cell, where the suite does not say otherwise and the seed matters."""
     trials: int
     """Most trials of a run."""
-    readings: tuple[str, ...]
-    """Readings of the paper that are not the default, as ``ties=right``."""
     time_limit_s: float | None
     """CPU time of one run."""
     trial_budget: int | None
@@ -125,11 +121,6 @@ class Plan:
         """Methods by id."""
         return {cell.method.name: cell.method for cell in self.cells}
 
-    @cached_property
-    def model(self) -> MotionModel:
-        """The constants of movement under these readings."""
-        return model_under(load_readings(self.readings))
-
     @property
     def size(self) -> int:
         """Number of runs."""
@@ -145,7 +136,6 @@ class Plan:
                 code=cell.method.code,
                 told=cell.method.told,
                 parameters=cell.complete,
-                model=self.model,
                 trial_budget=self.trial_budget,
             )
             for cell in self.cells

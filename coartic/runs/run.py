@@ -15,7 +15,7 @@ from coartic.errors import SolutionError
 from coartic.learner.kernel import TENTHS
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
-from coartic.model import MotionModel
+from coartic.model import PAPER
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.task import Task
@@ -292,20 +292,18 @@ def movements_by_run(
     return {run_id: tuple(of_run) for run_id, of_run in movements.items()}
 
 
-def execute_all(
-    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel
-) -> list[Execution | Exception]:
+def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
     """Execute solutions side by side: the only scores that count.
 
     In place of an execution, the error of a solution that breaks the task's rules.
     """
-    errors = [too_long(task, solution, model) for solution in solutions]
+    errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(task, short, model=model))
+    executions = iter(execute_many(task, short))
     return [next(executions) if error is None else error for error in errors]
 
 
-def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> SolutionError | None:
+def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     """The error of a solution that would take very long to execute."""
     if len(solution) > MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {MOST_MOVEMENTS} are allowed")
@@ -314,7 +312,7 @@ def too_long(task: Task, solution: Sequence[Movement], model: MotionModel) -> So
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
     if len({np.shape(corner) for corner in corners}) == 1:  # or it breaks the rules
-        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / model.step
+        steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
         if steps > MOST_STEPS:
             return SolutionError(
                 f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"

@@ -30,9 +30,10 @@ from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
-from coartic.model import PAPER, check_model, stored_model
+from coartic.model import PAPER
 from coartic.robot import Array
 from coartic.runs.card import MethodCard
+from coartic.runs.earlier import other_reading, parameters_now
 from coartic.runs.plan import Cell, Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import parse_task
@@ -137,7 +138,6 @@ class _Suite(_Stored):
     seed: int
     runs: int
     trials: int
-    readings: Json[tuple[str, ...]]
     time_limit_s: float | None
     trial_budget: int | None
     command: Json[list[str]]
@@ -237,7 +237,8 @@ class Store:
                 self._db.execute(f"DELETE FROM {table}")
             self._insert("suite", {
                 "name": plan.suite,
-                **{key: getattr(plan, key) for key in (*_SUITE, "readings")},
+                **{key: getattr(plan, key) for key in _SUITE},
+                "readings": [],  # of versions 1.0 and 1.1
                 "command": command,
                 "date": date,
                 "environment": self._environment(environment),
@@ -275,15 +276,21 @@ class Store:
         }
         rows = self._db.execute(
             "SELECT task, method, cells.parameters, settings.parameters AS complete, runs, "
-            "variant, setting, definition, model FROM cells JOIN settings ON settings.id = setting "
+            "variant, setting, definition FROM cells JOIN settings ON settings.id = setting "
             "ORDER BY position"
         ).fetchall()
         asked = [_Cell.model_validate(dict(each)) for each in rows]
         plan = Plan(
-            **{key: getattr(suite, key) for key in (*_SUITE, "readings")},
+            **{key: getattr(suite, key) for key in _SUITE},
             suite=suite.name,
             cells=tuple(
-                Cell(tasks[c.task], methods[c.method], c.parameters, c.complete, c.runs)
+                Cell(
+                    tasks[c.task],
+                    methods[c.method],
+                    parameters_now(c.method, c.parameters),
+                    parameters_now(c.method, c.complete),
+                    c.runs,
+                )
                 for c in asked
             ),
         )
@@ -292,8 +299,6 @@ class Store:
                 raise ValueError(f"variant {each['variant']!r} is not that of its parameters")
             if json.loads(each["definition"]) != setting.definition:
                 raise ValueError(f"task {setting.task.name} is not the one of its runs")
-            if stored_model(json.loads(each["model"])) != plan.model:
-                raise ValueError("the readings are not those of the runs")
         if len({each["setting"] for each in rows}) < len(rows):
             raise ValueError("two cells have one setting")
         return plan
@@ -397,13 +402,9 @@ class Store:
             method=asked["method"],
             code=asked["code"],
             told=tuple(filter(None, asked["told"].split(", "))),
-            parameters=json.loads(asked["parameters"]),
-            model=check_model(stored_model(json.loads(asked["model"]))),
+            parameters=parameters_now(asked["method"], json.loads(asked["parameters"])),
             trial_budget=asked["trial_budget"],
         )
-        model = setting.model
-        if (model.step, model.max_iterations) != (PAPER.step, PAPER.max_iterations):
-            raise ValueError("no reading has this length of a step or number of iterations")
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
@@ -553,7 +554,7 @@ class Store:
             "definition": setting.definition,
             "method": setting.method,
             "parameters": to_json(setting.parameters, sort_keys=True),
-            "model": setting.model._asdict(),
+            "model": PAPER._asdict(),
             "trial_budget": setting.trial_budget,
             "told": ", ".join(setting.told),
         }
@@ -638,10 +639,16 @@ def open_store(folder: Path) -> Store:
 
 def check_known(connection: sqlite3.Connection, folder: Path) -> None:
     """Raises CoarticError for results of what version 1 had and this version does not have."""
+    for reading in other_readings(connection):
+        version = "1.0.0" if reading.startswith("arrival_tick") else "1.1.0"
+        raise CoarticError(
+            f"{folder} has results of another reading of the paper, {plain(reading, 80)}: version "
+            f"{version} of coartic reads them"
+        )
     asked = connection.execute(
         "SELECT name, content FROM suite JOIN environments ON id = environment"
     ).fetchone()
-    if asked is None or not json.loads(asked["content"])["coartic"].startswith("1."):
+    if asked is None or not json.loads(asked["content"]).get("coartic", "").startswith("1."):
         return
     methods = {name for (name,) in connection.execute("SELECT name FROM methods")}
     gone = sorted(GONE & {asked["name"], *methods})
@@ -658,6 +665,15 @@ def open_content(content: bytes, name: str) -> Store:
     with connect(":memory:", _WAIT_S) as connection:
         connection.deserialize(content)
     return Store(Path(name), connection)
+
+
+def other_readings(connection: sqlite3.Connection) -> Iterator[str]:
+    """In what runs of a folder read the paper otherwise than this version, as ``ties=right``."""
+    for (texts,) in connection.execute("SELECT readings FROM suite"):
+        yield from json.loads(texts)
+    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
+        if reading := other_reading(method, *map(json.loads, texts)):
+            yield reading
 
 
 @contextmanager

@@ -73,8 +73,8 @@ def plan_for(tasks, runs=None, *, trials=10_000, **more):
         for row in rows
     ]
     plan = Plan(
-        suite="paper", runs=3, seed=0, trials=trials, readings=(), time_limit_s=None,
-        trial_budget=None, cells=tuple(cells),
+        suite="paper", runs=3, seed=0, trials=trials, time_limit_s=None, trial_budget=None,
+        cells=tuple(cells),
     )  # fmt: skip
     return replace(plan, **more)
 

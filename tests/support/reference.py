@@ -26,7 +26,7 @@ from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task, hands_of
 
-State = tuple[int, Hand | None]
+State = tuple[int, Hand | None]  # goal, and the hand that hit the one before
 
 
 class ReferenceRun(NamedTuple):
@@ -60,12 +60,12 @@ def move(
     """
     arm = robot.arm(hand)
     rules = SimpleNamespace(
-        model=model._replace(corrective_arrival=stop_on_arrival),
+        model=model,
         arms={hand: (robot.joints(hand), arm.links, (arm.shoulder_x, arm.shoulder_y))},
         goals=[goal],
         radius=radius,
     )
-    kind = "path" if len(waypoints) else "corrective"
+    kind = "path" if len(waypoints) else "learned" if stop_on_arrival else "corrective"
     movement = verify.MoveRow(
         0, 1, hand, kind, verify.MOST_TICKS, np.array(target), list(waypoints)
     )
@@ -109,7 +109,7 @@ def execute(task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
                 if not found.converged:
                     break
             target = np.where(np.isnan(target), q, target)
-            stops = movement.kind != "corrective" or model.corrective_arrival
+            stops = movement.kind != "corrective"
             points = verify.path(q, way, model) if len(way) else verify.line(q, target, model)
             q, ticks, hit, _ = move(
                 task.robot, q, target, *where, stop_on_arrival=stops, model=model, waypoints=way
@@ -182,21 +182,20 @@ def learn(
         visited: list[tuple[State, Hand, Array]] = []
         subtasks: list[float] = []
         for number, goal in enumerate(task.goals):
-            state: State = (number, previous if condition.state == "previous-hand" else None)
+            state: State = (number, previous)
             spent_before = total
             if trial == 0:
                 hand = first_hands[number]
             else:
-                hand = _choose(task, condition, q, goal, state, previous, values, rng)
+                hand = _choose(task, condition, q, goal, state, values, rng)
             has_target = (state, hand) in targets
             if trial == 0 and start:
                 target = start[number].target
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
-            elif has_target or (trial > 0 and condition.unknown_target == "explores"):
-                stored = targets.get((state, hand), q)
-                target = _explore(task, condition, q, hand, stored, rng)
+            elif has_target:
+                target = _explore(task, condition, q, hand, targets[state, hand], rng)
                 result = move(task.robot, q, target, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
                 ticks += result.ticks
@@ -213,20 +212,18 @@ def learn(
                     break
                 result = move(
                     task.robot, q, correction.q, hand, goal, task.radius,
-                    stop_on_arrival=model.corrective_arrival, model=model,
+                    stop_on_arrival=False, model=model,
                 )  # fmt: skip
                 q, total = result.q, total - result.ticks
                 ticks += result.ticks
                 corrections += 1
                 by_trial[trial] += 1
-                if not result.hit:
-                    break
             visited.append((state, hand, q))
             subtasks.append(total - spent_before)
             previous = hand
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
-        if completed[trial] and (trial > 0 or condition.first_trial == "learns"):
+        if completed[trial]:
             for number, (state, hand, reached) in enumerate(visited):
                 credit: float = total
                 if condition.credit == "subtask":
@@ -252,32 +249,17 @@ def _choose(
     q: Array,
     goal: tuple[float, float],
     state: State,
-    previous: Hand | None,
     values: dict[tuple[State, Hand], float],
     rng: np.random.Generator,
 ) -> Hand:
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
         if condition.hand_exploration == "closest":
-            near = _distances(task, q, hands, goal)
-            tolerance = 1e-9 if condition.equal_distance == "random" else -1.0
-            if len(hands) == 1 or abs(max(near) - min(near)) > tolerance:
+            near = [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
+            if len(hands) == 1 or abs(max(near) - min(near)) > 1e-9:
                 return hands[int(np.argmin(near))]
         return hands[int(rng.random() * len(hands))]
-    learned = [values.get((state, hand), -math.inf) for hand in hands]
-    equal = [hand for hand, value in zip(hands, learned, strict=True) if value == max(learned)]
-    if len(equal) > 1:
-        if condition.ties == "random":
-            return equal[int(rng.random() * len(equal))]
-        if condition.ties == "nearest":
-            return equal[int(np.argmin(_distances(task, q, equal, goal)))]
-        if condition.ties == "right" or (condition.ties == "previous" and previous == "right"):
-            return equal[-1]
-    return equal[0]
-
-
-def _distances(task: Task, q: Array, hands: list[Hand], goal: tuple[float, float]) -> list[float]:
-    return [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
+    return max(hands, key=lambda hand: values.get((state, hand), -math.inf))
 
 
 def _explore(

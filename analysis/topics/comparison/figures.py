@@ -268,7 +268,7 @@ def draw_curves(
         trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
         style.curve(name_in(study, str(label)), middle_half, *best, *trials)
     floor, top = data.best.min(), data.best_high.max()
-    initial = initial_reward(task, study.model)
+    initial = initial_reward(task)
     if not math.isnan(initial):
         style.curve("initial solution", axes.axhline(initial, **style.INITIAL))
         floor, top = initial, max(top, initial)

@@ -164,7 +164,7 @@ def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
     for name, task in study.tasks.items():
         best = study.optima.get(name)
         if best is not None and best.reward != 0:
-            initial = initial_reward(task, study.model)
+            initial = initial_reward(task)
             if best.reward > initial:  # never where there is no initial solution: NaN
                 by_task[name] = initial, best.reward
     return by_task

@@ -133,7 +133,7 @@ def learning(study: Study) -> Rows:
         budgets = np.array([budget for budget in BUDGETS if budget <= trials], dtype=float)
         best = np.array([run.best("trials", budgets) for run in runs])
         best[~np.isfinite(best)] = math.nan
-        initial = initial_reward(study.tasks[task], study.model)
+        initial = initial_reward(study.tasks[task])
         halves = [half_gain(initial, run.rewards, run.spent("trials")) for run in runs]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row: Row = {

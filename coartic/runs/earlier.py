@@ -1,0 +1,56 @@
+"""How runs of versions 1.0 and 1.1 read the paper, which could then be read in several ways.
+
+Runs that read it as this version does count as its own. What they stored beside is dropped when
+they are read, and it is still a part of the hash with which the id of a run begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from coartic.learner.conditions import METHOD_PREFIX
+from coartic.model import PAPER
+
+MODEL = {
+    **PAPER._asdict(),
+    "arrival_tick": 1,
+    "corrective_arrival": False,
+    "first_step": False,
+    "whole_last_step": False,
+}
+"""The constants of movement, as they were stored."""
+_OF_LEARNER = {
+    "equal_distance": "random",
+    "first_trial": "learns",
+    "state": "previous-hand",
+    "ties": "left",
+    "unknown_target": "corrects",
+}
+
+
+def parameters_then(method: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters of a method as they were stored."""
+    return {**parameters, **_fixed(method)}
+
+
+def parameters_now(method: str, stored: Mapping[str, Any]) -> dict[str, Any]:
+    """Stored parameters of a method, without those that it no longer has."""
+    return {name: value for name, value in stored.items() if name not in _fixed(method)}
+
+
+def other_reading(method: str, model: Mapping[str, Any], parameters: Mapping[str, Any]) -> str:
+    """In what a setting reads the paper otherwise than this version, as ``ties=right``; nothing
+    where it does not. Raises KeyError where a constant of movement is missing."""
+    for name, value in MODEL.items():
+        stored = model[name] if name in PAPER._fields else model.get(name, value)
+        if stored != value:
+            return f"{name}={stored}"
+    for name, value in _fixed(method).items():
+        if parameters.get(name, value) != value:
+            return f"{name}={parameters[name]}"
+    return ""
+
+
+def _fixed(method: str) -> dict[str, Any]:
+    return _OF_LEARNER if method.startswith(METHOD_PREFIX) else {}

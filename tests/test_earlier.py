@@ -1,0 +1,103 @@
+"""Folders of version 1.1, in which the paper could be read in several ways."""
+
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from coartic import CoarticError, load_task
+from coartic.analysis.study import load
+from coartic.analysis.verify import check_runs
+from coartic.benchmarks import template
+from coartic.benchmarks.beside import put_beside
+from coartic.benchmarks.planning import Selection, plan_suite
+from coartic.learner.method import DualProcessParameters
+from coartic.runs.plan import Setting
+from coartic.runs.store import RUNS_FILE, open_store
+from tests.support.suites import paper_cells, run_and_write
+
+READ = (
+    "'$.ties', 'left', '$.state', 'previous-hand', '$.equal_distance', 'random', "
+    "'$.first_trial', 'learns', '$.unknown_target', 'corrects'"
+)
+MOVED = (
+    "'$.corrective_arrival', json('false'), '$.first_step', json('false'), "
+    "'$.whole_last_step', json('false')"
+)
+OF_1_1 = (
+    f"settings SET model = json_set(model, {MOVED})",
+    f"settings SET parameters = json_set(parameters, {READ}) WHERE method LIKE 'dual-process/%'",
+    f"methods SET defaults = json_set(defaults, {READ}) WHERE name LIKE 'dual-process/%'",
+)
+
+
+def edited(folder, out, *statements):
+    """A copy of a results folder in which tables are updated so."""
+    shutil.copytree(folder, out)
+    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as db:
+        for statement in statements:
+            db.execute(f"UPDATE {statement}")
+    return out
+
+
+@pytest.fixture(scope="module")
+def now(tmp_path_factory):
+    """A folder of this version."""
+    folder = tmp_path_factory.mktemp("earlier") / "now"
+    run_and_write(folder, paper_cells(tasks=["ascending"]), trials=20)
+    return folder
+
+
+def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
+    then = edited(now, tmp_path / "then", *OF_1_1)
+    assert load(then).plan.settings == load(now).plan.settings
+    assert load(then).plan.cells[0].complete == load(now).plan.cells[0].complete
+    assert check_runs(then).wrong == []
+    run_id = load(now).runs.run_id[0]
+    with open_store(then) as store:
+        assert store.run(run_id).key.id == run_id
+    select = Selection(
+        tasks=["ascending"], methods=["NAME"], method_files=[Path(template.__file__)]
+    )
+    plan = plan_suite("paper", select=select, runs=2, trials=20)
+    put_beside(plan, [then], tmp_path / "out")
+    with open_store(tmp_path / "out") as store:
+        assert {*store.ids("")} == {*load(now).runs.run_id}
+
+
+def test_ids_begin_as_in_1_1():
+    """This one is of suite quick with 60 trials; its end is the hash of the code."""
+    parameters = {"trials": 60, "epsilon": 0.2, "noise_sd": 0.05}
+    setting = Setting(load_task("ascending"), "dual-process/EC1", "", (), parameters, None)
+    assert setting.key(0, 0).id == "eb4e4adffc4d3218-"
+
+
+@pytest.mark.parametrize(
+    ("statement", "which"),
+    [
+        ("suite SET readings = json_array('model.gain=0.1')", "model.gain=0.1"),
+        ("settings SET model = json_set(model, '$.first_step', json('true'))", "first_step=True"),
+        ("settings SET model = json_set(model, '$.gain', 0.1)", "gain=0.1"),
+        ("settings SET parameters = json_set(parameters, '$.ties', 'right')", "ties=right"),
+    ],
+)
+def test_another_reading_is_refused_in_a_sentence(now, tmp_path, statement, which):
+    then = edited(now, tmp_path / "then", *OF_1_1, statement)
+    with pytest.raises(
+        CoarticError, match=rf"paper, {which}: version 1\.1\.0 of coartic reads them$"
+    ):
+        load(then)
+    if "gain" not in statement:  # which the check takes as it is stored
+        (words,) = check_runs(then).wrong
+        assert which in words
+        assert "version 1.1.0" in words
+
+
+def test_parameters_of_1_0_are_read():
+    old = {"trials": 5, "update": "greater", "learned": "best"}
+    assert DualProcessParameters(**old) == DualProcessParameters(trials=5)
+    with pytest.raises(ValidationError, match="update"):
+        DualProcessParameters(update="not-less")
