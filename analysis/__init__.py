@@ -1,20 +1,34 @@
-"""What stored runs say: comparisons and figures. Imports ``coartic`` and reads records.
+"""What stored runs say: estimates, tests, tables, figures. Imports ``coartic`` and reads records.
 
-``coartic.analysis.load(folder)`` reads a results folder.
+``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from coartic.analysis.claims.judging import all_of, judge, mean_beyond
+    from coartic.analysis.frames import ecdf, gaps, ranking
+    from coartic.analysis.signatures.signs import SIGNS
+    from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.study import Study, load
 
-__all__ = ["Study", "load"]
+__all__ = [
+    "SIGNS", "Study", "all_of", "ecdf", "gaps", "judge", "load", "mean", "mean_beyond", "ranking"
+]  # fmt: skip
+
+_HOMES = {
+    "claims.judging": ("all_of", "judge", "mean_beyond"),
+    "frames": ("ecdf", "gaps", "ranking"),
+    "signatures.signs": ("SIGNS",),
+    "statistics.estimates": ("mean",),
+    "study": ("Study", "load"),
+}
 
 
 def __getattr__(name: str) -> Any:
     """What is imported when it is asked for: not every command needs all of it."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from coartic.analysis import study
-
-    return getattr(study, name)
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"coartic.analysis.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -20,21 +19,7 @@ from coartic import Task
 from coartic.analysis.trajectories import initial_solution
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
-from coartic.tasks.optima import BASE, best_shipped
-
-
-@dataclass(frozen=True)
-class KnownOptimum:
-    """The best reward known for one task."""
-
-    reward: int
-    bound: int | None
-    """Reward that no solution exceeds; None where nothing is proven."""
-
-    @property
-    def proven(self) -> bool:
-        """Whether no solution can be better."""
-        return self.bound == self.reward
+from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 
 
 def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, KnownOptimum]:
@@ -54,8 +39,8 @@ def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, Kno
         of_task = searches[searches.task == name]
         candidates = [from_runs(of_task)] if len(of_task) else []
         entry = best_shipped(task)
-        if entry is not None and entry.reward is not None:
-            candidates.append(KnownOptimum(entry.reward, entry.bound))
+        if entry is not None:
+            candidates.append(entry)
         if not candidates:
             continue
         bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
@@ -65,6 +50,23 @@ def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, Kno
             reward = max(reward, from_runs(of_task).reward)
         optima[name] = KnownOptimum(reward, min(bounds, default=None))
     return optima
+
+
+def best_known(
+    runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, KnownOptimum]
+) -> dict[str, KnownOptimum]:
+    """What solutions of each task are measured by: its optimum as it is known, and of an instance
+    of a family at least the best of these runs. Rewards of 0, which leave no gap, do not count."""
+    known = dict(optima)
+    highest = runs[runs.status == "ok"].groupby("task").reward.max()
+    for name, task in tasks.items():
+        if task.family is not None and name in highest.index:
+            optimum = known.get(name)
+            reward, bound = int(highest[name]), None
+            if optimum is not None:
+                reward, bound = max(reward, optimum.reward), optimum.bound
+            known[name] = KnownOptimum(reward, bound)
+    return {name: optimum for name, optimum in known.items() if optimum.reward < 0}
 
 
 def locks_base(runs: pd.DataFrame) -> bool:

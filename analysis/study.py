@@ -6,6 +6,7 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, wraps
@@ -16,7 +17,8 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, NotApplicableError, Task, hand_sequences
-from coartic.analysis.optima import KnownOptimum, known_optima
+from coartic.analysis.frames import gaps
+from coartic.analysis.optima import best_known, known_optima
 from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -27,8 +29,9 @@ from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import PARTS, execute_all, movements_by_run
 from coartic.runs.store import RUNS_FILE, explain_errors, open_store
+from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of
-from coartic.text import counted
+from coartic.text import counted, unknown
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its name with its variant."""
@@ -88,7 +91,31 @@ def load(folder: str | Path) -> Study:
                 f"{folder} has {len(runs)} of {counted(plan.size, 'run')}: it was interrupted. "
                 "Repeat the `coartic run` command, which does what is missing."
             )
-        return Study(folder, plan, store.made_with(), runs)
+        return Study(folder, plan, store.made_with(), tidy(runs, plan))
+
+
+def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
+    """Stored runs with what is known of their tasks, their parameters and their gaps in columns.
+
+    A parameter whose name is that of a stored column is left out: ``trials`` are those made,
+    ``hands`` those of the solution.
+    """
+    tasks, parameters = plan.tasks, {text: json.loads(text) for text in runs.parameters.unique()}
+    known = best_known(runs, tasks, known_optima(runs, tasks))
+    rows = [
+        {
+            **parameters[text],
+            "family": tasks[name].family,
+            "split": tasks[name].split,
+            "goals": len(tasks[name].goals),
+            "best_known": known[name].reward if name in known else None,
+        }
+        for name, text in zip(runs.task, runs.parameters, strict=True)
+    ]
+    more = pd.DataFrame(rows, runs.index)
+    runs = runs.join(more[[name for name in more if name not in runs]])
+    runs["best_known"] = runs.get("best_known", pd.Series(dtype="Int64")).astype("Int64")
+    return runs.assign(gap=gaps(runs))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,7 +128,9 @@ class Study:
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     runs: pd.DataFrame
-    """One row a run: rewards, hand sequences, what was spent (docs/results.md)."""
+    """One row a run: rewards, hand sequences, what was spent (docs/results.md); of its task
+    ``family``, ``split``, ``goals`` (their number) and ``best_known``; its parameters by their
+    names; ``gap`` to the best known reward, as a share."""
     _computed: dict[Callable[..., Any], Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
@@ -192,26 +221,64 @@ class Study:
             self._replays[key] = self._executed(key, "replay")
         return self._replays[key]
 
-    def hits(self, task: str, label: str, *, replayed: bool = False) -> Array:
-        """Configuration in which each run of a cell hits each goal, shape ``(runs, G, dof)``.
+    def postures(self, task: str, label: str, *, replay: bool = False) -> Array:
+        """Postures in which the solved runs of a method hit the goals of a task.
 
-        Of its solution, or of its noiseless trial after learning; without the ticks between.
+        Parameters
+        ----------
+        task, label : str
+            Names as in :attr:`runs`.
+        replay : bool
+            Of the noiseless trial after learning in place of the solution.
+
+        Returns
+        -------
+        ndarray, shape (runs, G, dof)
+            Configurations, length unit (base) and rad (joints); at most 500 runs.
         """
-        executions = self._executions((task, label), "replay" if replayed else "solution")
-        return np.array([execution.configurations for execution in executions])
+        executions = self._executions((task, label), "replay" if replay else "solution")
+        return np.array([execution.configurations for execution in executions.values()])
+
+    def sign(self, name: str, *, replay: bool = False) -> pd.Series:
+        """A sign of coarticulation of every run.
+
+        Parameters
+        ----------
+        name : str
+            One of ``coartic.analysis.SIGNS``: ``"first"``, ``"arm"``, ``"hand"``, ...
+        replay : bool
+            Of the noiseless trial after learning in place of the solution.
+
+        Returns
+        -------
+        Series
+            By the index of :attr:`runs`; NaN for runs that have none, and for those after the
+            first 500 of a method on a task.
+        """
+        from coartic.analysis.signatures.signs import SIGNS
+
+        if name not in SIGNS:
+            raise CoarticError(unknown("sign", name, SIGNS))
+        values = pd.Series(np.nan, self.runs.index, name=name)
+        for key, cell in self.cells.items():
+            executed = self.replays(*key) if replay else self.trajectories(*key)
+            here = cell.runs.index[cell.runs.run_id.isin(executed.run_ids)]
+            values[here] = SIGNS[name].each(executed)
+        return values
 
     def _executed(self, key: CellKey, part: str) -> Trajectories:
         cell, task = self.cells[key], self.tasks[key[0]]
-        runs = (spell_out(task, execution) for execution in self._executions(key, part))
-        return Trajectories(task, cell.method, cell.variant, tuple(runs))
+        executions = self._executions(key, part)
+        runs = tuple(spell_out(task, each) for each in executions.values())
+        return Trajectories(task, cell.method, cell.variant, runs, run_ids=tuple(executions))
 
-    def _executions(self, key: CellKey, part: str) -> list[Execution]:
+    def _executions(self, key: CellKey, part: str) -> dict[str, Execution]:
         cell, task = self.cells[key], self.tasks[key[0]]
         solutions = self._movements(key, part)
         ids = [run_id for run_id in _executed_of(cell) if run_id in solutions]
         with explain_errors(self.folder):
             executions = execute_all(task, [solutions[run_id] for run_id in ids])
-            executed = []
+            executed = {}
             for run_id, execution in zip(ids, executions, strict=True):
                 if (
                     not isinstance(execution, Execution)
@@ -219,7 +286,7 @@ class Study:
                     or execution.ticks != sum(movement.ticks or 0 for movement in solutions[run_id])
                 ):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
-                executed.append(execution)
+                executed[run_id] = execution
         return executed
 
     @cached_property
@@ -234,6 +301,11 @@ class Study:
     def optima(self) -> dict[str, KnownOptimum]:
         """Best known reward by task, with all joints free."""
         return known_optima(self.runs, self.tasks)
+
+    @cached_property
+    def best_known(self) -> dict[str, KnownOptimum]:
+        """The same, and of an instance of a family without one the best of this folder's runs."""
+        return best_known(self.runs, self.tasks, self.optima)
 
     def _frame(self, view: str) -> pd.DataFrame:
         return _frame(self.folder, view, (self.folder / RUNS_FILE).stat().st_mtime_ns)

@@ -22,6 +22,7 @@ class Trajectories:
     method: str
     variant: str
     runs: tuple[Trajectory, ...]
+    run_ids: tuple[str, ...] = ()
 
     @cached_property
     def initial(self) -> Execution | None:
@@ -41,18 +42,17 @@ class Trajectories:
         return tuple(run for run in self.runs if run.hands[goal - 1] == hand)
 
     @cached_property
-    def against_same_hands(self) -> NDArray[np.int64]:
+    def against_same_hands(self) -> Array:
         """Ticks of subtasks less the corrective process's with each run's own hands.
 
-        Shape ``(n, G)``: runs whose hands it completes the task with.
+        Shape ``(n, G)``; NaN for runs with whose hands it does not complete the task.
         """
         references = {hands: corrective(self.task, hands) for hands in set(self.sequences)}
-        rows = [
-            change_from(run.execution, reference)
-            for run in self.runs
-            if (reference := references[run.execution.hands]) is not None
-        ]
-        return np.array(rows, dtype=np.int64).reshape(-1, len(self.task.goals))
+        changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
+        for row, run in zip(changes, self.runs, strict=True):
+            if (reference := references[run.execution.hands]) is not None:
+                row[:] = change_from(run.execution, reference)
+        return changes
 
 
 def change_from(execution: Execution, reference: Execution) -> NDArray[np.int64]:

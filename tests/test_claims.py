@@ -14,7 +14,6 @@ from coartic.analysis.claims import judge
 from coartic.analysis.claims.data import JUDGES, Data, Measurement, MissingError
 from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
 from coartic.analysis.claims.rules import all_of, higher, in_every_family, some_of
-from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.estimates import Estimate
@@ -24,6 +23,7 @@ from coartic.analysis.topics.paper import sentences
 from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.benchmarks.suites import Cell
+from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, run_and_write

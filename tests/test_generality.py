@@ -10,11 +10,11 @@ from coartic import load_task
 from coartic.analysis.claims import data, judge
 from coartic.analysis.claims.register import CLAIMS
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
-from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.families.sample import sample, signs
 from coartic.tasks.families import instances_in
+from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
@@ -58,7 +58,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
         (task.name,): pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
         for task in tasks
     }
-    parts = {"sequences": made(sequences)} | ({"optima": best} if optima else {})
+    parts = {"sequences": made(sequences)} | {"optima": best if optima else {}}
     return MadeUp(study_of(runs, tasks), **parts)
 
 

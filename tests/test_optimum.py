@@ -165,15 +165,15 @@ def test_renewing_with_what_is_there_changes_nothing():
 def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_family():
     rows = [
         ("ascending", "optimum/a", -290, -280), ("ascending", "other", -200, None),
-        ("one-armed/v1/i001", "optimum/a", -300, -250),
-        ("one-armed/v1/i001", "other", -290, None),
+        ("one-armed/v1/i901", "optimum/a", -300, -250),
+        ("one-armed/v1/i901", "other", -290, None),
     ]  # fmt: skip
     runs = pd.DataFrame(rows, columns=["task", "method", "reward", "proven_bound"])
     runs = runs.assign(status="ok", hands="RRR", parameters="{}")
     runs = runs.astype({"proven_bound": "Int64"})
-    tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i001")}
+    tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i901")}
     best = optima.known_optima(runs, tasks)
     free = {name: (o.reward, o.bound) for name, o in best.items()}
-    assert free == {"ascending": (-290, -292), "one-armed/v1/i001": (-290, -250)}
+    assert free == {"ascending": (-290, -292), "one-armed/v1/i901": (-290, -250)}
     locked = runs.assign(parameters='{"base": "y"}')
     assert optima.known_optima(locked, tasks)["ascending"].reward == -292

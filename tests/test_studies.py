@@ -56,7 +56,7 @@ def planted(*, stream="i", plain=FALLING, learner=20.0, short=()):
                 rows.append(row("receding-horizon", -round(ticks), run_id=run, **words))
         ticks = round(BEST * (1 + factor * loss / 100))
         rows.append(row("dual-process/EC4", -ticks, run_id=f"{task.name} EC4", task=task.name))
-    return MadeUp(study_of(pd.DataFrame(rows), tasks, suite="horizon"))
+    return MadeUp(study_of(pd.DataFrame(rows), tasks, suite="horizon"), optima={})
 
 
 def verdicts(study):

@@ -13,7 +13,6 @@ from scipy import stats
 
 from coartic.analysis.claims.data import Data, LearnedHands, Measurement, MissingError, RunCount
 from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.statistics.estimates import (
     FEWEST,
     Estimate,
@@ -24,6 +23,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
 from coartic.analysis.topics.families.sample import sample
 from coartic.analysis.topics.paper.published import published_cell
 from coartic.analysis.words import capital, estimate, number
+from coartic.tasks.optima import KnownOptimum
 
 RESAMPLES_OF_FAMILIES = 99_999
 """More than elsewhere: some verdicts on families are close, and samples are small."""

@@ -57,12 +57,17 @@ class Signature:
     of_run: Callable[[Array], Array] = np.asarray
     """The signs (n,) from the values of the runs, (n,) or (n, G)."""
 
+    def each(self, runs: Trajectories) -> Array:
+        """The sign of each run, shape ``(n,)``; NaN where a run has none."""
+        values = np.empty(0)
+        if runs.runs and (len(runs.task.hands) > 1 or not self.two_hands):
+            values = np.asarray(self.measure(runs), dtype=np.float64)
+        signs = self.of_run(values) if values.size else values
+        return signs if signs.size else np.full(len(runs.runs), np.nan)
+
     def of(self, runs: Trajectories) -> Array:
-        """The sign of each run that has one, shape ``(n,)``."""
-        if not runs.runs or (self.two_hands and len(runs.task.hands) < 2):
-            return np.empty(0)
-        values = np.asarray(self.measure(runs), dtype=np.float64)
-        signs = self.of_run(values) if values.size else np.empty(0)
+        """The sign of each run that has one, shape ``(k,)``."""
+        signs = self.each(runs)
         return signs[np.isfinite(signs)]
 
 
@@ -86,10 +91,12 @@ def signature(name: str, kind: Scope = "runs", **about: Any) -> Callable[[Functi
 
 
 def mean_over_goals(values: Array) -> Array:
-    """Mean of the values (n, G - 1) of each run that has some, ``(n,)``."""
-    some = values[~np.isnan(values).all(axis=1)]
+    """Mean of the values (n, G - 1) that each run has, ``(n,)``; NaN where it has none."""
+    means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
     # The last goal counts as a missing value: the order of summation decides the last bit.
-    return np.asarray(np.nanmean(np.pad(some, ((0, 0), (0, 1)), constant_values=np.nan), axis=1))
+    padded = np.pad(values[some], ((0, 0), (0, 1)), constant_values=np.nan)
+    means[some] = np.nanmean(padded, axis=1)
+    return means
 
 
 # One method's runs on one task
@@ -109,8 +116,8 @@ def mean_over_goals(values: Array) -> Array:
     of_run=lambda values: values[:, 0],
 )
 def first_subtask(runs: Trajectories) -> Array:
-    """t(i, 1) - c(i, 1), shape ``(n, 1)``, of the runs with whose hands the corrective process
-    ends."""
+    """t(i, 1) - c(i, 1), shape ``(n, 1)``; NaN where the corrective process fails with the hands
+    of the run."""
     return np.asarray(runs.against_same_hands[:, :1])
 
 
@@ -125,7 +132,7 @@ def first_subtask(runs: Trajectories) -> Array:
     of_run=np.negative,
 )
 def total(runs: Trajectories) -> Array:
-    """Σ_g t(i, g) - c(i, g), of the runs with whose hands the corrective process ends.
+    """Σ_g t(i, g) - c(i, g); NaN where the corrective process fails with the hands of the run.
 
     As a sign, Σ_g c(i, g) - t(i, g).
     """

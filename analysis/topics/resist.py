@@ -123,7 +123,7 @@ def slopes_of(
     replayed = label.startswith(LEARNER)
     sizes = []
     for _, places in sorted(by_goal.items()):
-        means = [study.hits(name, label, replayed=replayed).mean(axis=0) for name in places]
+        means = [study.postures(name, label, replay=replayed).mean(axis=0) for name in places]
         sizes.append(slope_size(np.array(means), np.array(list(places.values()))))
     by_place = np.array(sizes).T  # posture at the goal of the row, place of the goal of the column
     return np.diagonal(by_place, -1).copy(), np.diagonal(by_place, 1).copy()

@@ -229,16 +229,13 @@ class Trajectory:
                 rows[other] = alone.reward, alone.hands, 1
             elif other == "optimum":
                 known = best_shipped(self.task)
-                if known is None or known.reward is None:
+                if known is None:
                     raise CoarticError(
                         f"no optimum of task {self.task.name!r} is known; search for it: "
                         "coartic run comparison --tasks FILE --methods optimum/branch-and-bound"
                     )
-                rows["optimum" if known.bound == known.reward else "best known"] = (
-                    known.reward,
-                    known.hands,
-                    1,
-                )
+                which = "optimum" if known.proven else "best known"
+                rows[which] = known.reward, known.hands, 1
             else:
                 names = [*CONDITIONS, "corrective process", "optimum"]
                 raise CoarticError(unknown("movement", str(other), names))

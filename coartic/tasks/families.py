@@ -47,8 +47,7 @@ from coartic.text import Line, counted, unknown
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Instances of each split that an agent is given, from the first one: of the test split those whose
-best known solutions are shipped."""
+"""Instances of each split that an agent is given, from the first one."""
 MOST_ATTEMPTS = 10_000
 """Draws of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]

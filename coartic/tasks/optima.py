@@ -1,14 +1,18 @@
-"""The optima that are shipped: ``optima.json`` holds what suite ``optimum`` found for the shipped
-tasks, with the run ids and the solutions.
+"""The best rewards known, as they are shipped, with what is proven about them.
 
-``docs/scripts/renew_optima.py`` makes it from the results folder of that suite.
+``optima.json`` holds what suite ``optimum`` found for the shipped tasks, with run ids and
+solutions; ``docs/scripts/renew_optima.py`` makes it from the results folder of that suite.
+``best_known.csv`` holds the best reward that any method found for test instances of families;
+``docs/scripts/renew_best_known.py`` makes it from results folders.
 """
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -19,11 +23,30 @@ from coartic.tasks.task import Task
 BASE = "task"
 """Base locked as the task has it: the case that rewards compare with."""
 DATA = Path(__file__).with_name("optima.json")
+BEST_KNOWN = Path(__file__).with_name("best_known.csv")
+"""Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``hands`` and
+``essence``."""
 
 OtherArm = Literal["free", "still"]
 """Whether the arm that is not chosen may move, or is kept still."""
 KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
+
+
+@dataclass(frozen=True)
+class KnownOptimum:
+    """The best reward known of a task, with all joints free and under the paper's model."""
+
+    reward: int
+    bound: int | None
+    """Reward that no solution exceeds; None where nothing is proven."""
+    hands: str = ""
+    """Hand sequence of a solution that has the reward."""
+
+    @property
+    def proven(self) -> bool:
+        """Whether no solution can be better."""
+        return self.bound == self.reward
 
 
 class ShippedOptimum(FileData):
@@ -61,16 +84,27 @@ def essence(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def best_shipped(task: Task) -> ShippedOptimum | None:
-    """What is shipped of a task under its own restrictions, with all joints free and under the
-    paper's model; None where nothing is, as for instances of families."""
+def best_shipped(task: Task) -> KnownOptimum | None:
+    """The best reward that is shipped of a task, however it is called.
+
+    None where none is: for a task of one's own, and for instances beyond the first of each family.
+    """
     return _by_essence().get(essence(task))
 
 
 @cache
-def _by_essence() -> dict[str, ShippedOptimum]:
-    free = [entry for entry in entries() if (entry.base, entry.other_arm) == (BASE, "free")]
-    return {entry.essence: entry for entry in free}
+def _by_essence() -> dict[str, KnownOptimum]:
+    with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
+        known = {
+            row["essence"]: KnownOptimum(
+                int(row["reward"]), int(row["bound"]) if row["bound"] else None, row["hands"]
+            )
+            for row in csv.DictReader(lines)
+        }
+    for entry in entries():
+        if (entry.base, entry.other_arm) == (BASE, "free") and entry.reward is not None:
+            known[entry.essence] = KnownOptimum(entry.reward, entry.bound, entry.hands)
+    return known
 
 
 def entries() -> list[ShippedOptimum]:

@@ -27,7 +27,7 @@ def collect(study: Study) -> list[ShippedOptimum]:
     if not proofs.any():
         raise CoarticError(f"{study.folder}: has no runs of methods {SEARCH}*")
     runs = study.runs[proofs | (study.runs.method == OTHER_SEARCH)]
-    runs = runs.join(restrictions(runs))
+    runs = runs.assign(**restrictions(runs))
     keys = ("coartic", "commit", "model_code", "python", "date")
     made_by = {key: study.made_with[key] for key in keys}
     collected = []

@@ -7,10 +7,10 @@ from pathlib import Path
 import pandas as pd
 
 from coartic import load_task
-from coartic.analysis.optima import KnownOptimum
 from coartic.analysis.study import Study
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan
+from coartic.tasks.optima import KnownOptimum
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},

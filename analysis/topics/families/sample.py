@@ -10,13 +10,14 @@ import pandas as pd
 
 from coartic import Task
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
-from coartic.analysis.optima import KnownOptimum, gap_share, locks_base
+from coartic.analysis.optima import gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
+from coartic.tasks.optima import KnownOptimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,22 +42,9 @@ class Sample:
 
     @cached_property
     def references(self) -> dict[str, KnownOptimum]:
-        """What the solutions of each instance are measured by, where there is any.
-
-        The highest reward of any run of the folder, or of the search for the optimum.
-        """
-        runs = self.study.runs
-        solved = runs[(runs.status == "ok") & runs.task.isin(list(self.tasks))]
-        highest = solved.groupby("task").reward.max()
-        by_name = {}
-        for name in self.tasks:
-            optimum = self.study.optima.get(name)
-            rewards = [int(highest[name])] if name in highest.index else []
-            if optimum is not None:
-                rewards.append(optimum.reward)
-            if rewards and max(rewards) < 0:
-                by_name[name] = KnownOptimum(max(rewards), optimum.bound if optimum else None)
-        return by_name
+        """What the solutions of each instance are measured by, where there is any."""
+        known = self.study.best_known
+        return {name: known[name] for name in self.tasks if name in known}
 
     @cached_property
     def labels(self) -> tuple[str, ...]:

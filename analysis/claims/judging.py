@@ -1,0 +1,136 @@
+"""Claims of a study: tests of means, and one verdict each, corrected together.
+
+A claim is tested by one or more means, one value a task, of which each must lie beyond a bound
+(:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the claims of a study over
+each other (Holm).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from coartic.analysis.claims.register import Finding
+from coartic.analysis.statistics.estimates import FEWEST, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.words import capital, estimate
+
+RESAMPLES_OF_CLAIMS = 99_999
+"""Resamples of a test: p-values are corrected over many claims."""
+
+
+def mean_beyond(
+    sentence: str,
+    values: ArrayLike,
+    bound: float = 0.0,
+    side: Literal["greater", "less"] = "greater",
+) -> Finding:
+    """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
+
+    Parameters
+    ----------
+    sentence : str
+        What was seen, with ``{}`` where the mean and its interval are put in.
+    values : array_like, shape (tasks,)
+        One value a task; NaN for a task that has none, which does not count.
+    bound : float
+        In the unit of the values.
+    side : {"greater", "less"}
+        Side of the bound on which the mean is claimed to lie.
+
+    Returns
+    -------
+    Finding
+        Whether the mean lies there, the sentence, and the test; ``holds`` is None with fewer than
+        three tasks.
+
+    Examples
+    --------
+    >>> finding = mean_beyond("Planning saves {} ticks", [4.0, 5.0, 6.0, 7.0], 1.0)
+    >>> finding.holds, finding.evidence
+    (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
+    """
+    there = np.asarray(values, dtype=np.float64)
+    there = there[~np.isnan(there)]
+    if len(there) < FEWEST:
+        return Finding(None, f"fewer than {FEWEST} random tasks can be judged")
+    sign = 1.0 if side == "greater" else -1.0
+    test = bootstrap_test(sign * there, sign * bound, resamples=RESAMPLES_OF_CLAIMS)
+    evidence = f"{sentence.format(estimate(mean(there), 2))} ({len(there)} tasks)"
+    return Finding(test.value > 0, evidence, (test,))
+
+
+def all_of(*findings: Finding) -> Finding:
+    """Several findings that a claim needs together.
+
+    Parameters
+    ----------
+    *findings : Finding
+        As :func:`mean_beyond` returns them.
+
+    Returns
+    -------
+    Finding
+        It holds where all of them hold, and rests on all their tests; where one cannot be said,
+        it is that one.
+
+    Examples
+    --------
+    >>> few = mean_beyond("one {}", [1.0])
+    >>> all_of(mean_beyond("two {}", [1.0, 2.0, 3.0]), few).evidence
+    'fewer than 3 random tasks can be judged'
+    """
+    for finding in findings:
+        if finding.holds is None:
+            return finding
+    return Finding(
+        all(finding.holds for finding in findings),
+        "; ".join(finding.evidence for finding in findings),
+        tuple(test for finding in findings for test in finding.tests),
+    )
+
+
+def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
+    """Judge the claims of a study: their tests are corrected over each other (Holm).
+
+    Parameters
+    ----------
+    claims : mapping of str to (str, str, Finding)
+        By the claim's id what is claimed, how it is tested, and what was seen. A claim that cannot
+        be tested counts in the correction all the same.
+
+    Returns
+    -------
+    DataFrame
+        A row a claim, by its id: ``statement``, ``verdict`` (``supported``, ``not supported`` or
+        ``undecided``), ``evidence``, ``test``, ``p_holm`` and ``opposite_p_holm``, of the test
+        that the opposite is true.
+
+    Examples
+    --------
+    >>> seen = mean_beyond("It saves {} ticks", [4.0, 5.0, 6.0, 7.0, 5.0, 6.0])
+    >>> judge({"saves": ("Planning saves ticks.", "bootstrap test", seen)}).verdict.to_dict()
+    {'saves': 'supported'}
+    """
+    findings = [finding for _, _, finding in claims.values()]
+    p = holm([finding.p for finding in findings], len(findings))
+    opposite = holm([finding.opposite_p for finding in findings], len(findings))
+    rows = {}
+    for (name, (statement, test, finding)), *adjusted in zip(
+        claims.items(), p, opposite, strict=True
+    ):
+        seen = finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
+        rows[name] = {
+            "statement": statement,
+            "verdict": finding.verdict(*adjusted),
+            "evidence": f"{capital(seen)}.",
+            "test": test,
+            "p_holm": adjusted[0],
+            "opposite_p_holm": adjusted[1] if finding.tests else math.nan,
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("claim")

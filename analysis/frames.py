@@ -1,0 +1,162 @@
+"""Gaps, rankings and running times of a plain frame of results, also of one that you made.
+
+The frame has a row for each run, with the columns ``method``, ``task``, ``reward`` (ticks, NaN for
+a run that failed) and ``best_known``, the best reward known of the task. ``load(folder).runs`` is
+such a frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis.statistics.instances import task_mean
+from coartic.errors import CoarticError
+
+
+def check_columns(frame: pd.DataFrame, *names: str) -> None:
+    """Raise CoarticError for a frame without one of some columns."""
+    missing = [name for name in names if name not in frame.columns]
+    if missing:
+        raise CoarticError(f"the frame has no column {', '.join(missing)}")
+
+
+def gaps(frame: pd.DataFrame) -> pd.Series:
+    """How far each run ends from the best known reward of its task.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        With columns ``reward`` and ``best_known``, ticks.
+
+    Returns
+    -------
+    Series
+        (best known - reward) / \\|best known\\| of each row: 0.01 is 1 % more ticks than the best
+        known. NaN for a run that failed, and where no reward is known.
+
+    Raises
+    ------
+    CoarticError
+        For a frame without these columns.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame({"reward": [-303, -292], "best_known": [-292, -292]})
+    >>> gaps(frame).round(3).tolist()
+    [0.038, 0.0]
+    """
+    check_columns(frame, "reward", "best_known")
+    reward, best = (frame[name].astype("Float64") for name in ("reward", "best_known"))
+    share = (best - reward) / best.abs()
+    return pd.Series(share.to_numpy(np.float64, na_value=np.nan), frame.index, name="gap")
+
+
+def ranking(frame: pd.DataFrame) -> pd.DataFrame:
+    """Rank methods by their mean gap over tasks.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        With columns ``method``, ``task``, ``reward`` and ``best_known``.
+
+    Returns
+    -------
+    DataFrame
+        A row for each method: ``gap``, the mean over tasks of the mean over solved runs, with its
+        95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks (stratified
+        bootstrap, NaN with fewer than three runs on a task); ``tasks`` that it solved, ``runs`` and
+        ``failed``. The nearest is first. A method that did not solve every task of the frame has
+        no gap and is last.
+
+    Raises
+    ------
+    CoarticError
+        For a frame without these columns.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame(
+    ...     {"method": ["mine", "mine", "yours"], "task": "ascending",
+    ...      "reward": [-300, -296, -310], "best_known": -292}
+    ... )
+    >>> ranking(frame)[["gap", "runs", "failed"]].round(3)
+              gap  runs  failed
+    method
+    mine    0.021     2       0
+    yours   0.062     1       0
+    """
+    check_columns(frame, "method", "task", "reward", "best_known")
+    frame = frame.assign(gap=gaps(frame))
+    every = set(frame.task[frame.best_known.notna()])
+    rows = {}
+    for method, of_method in frame.groupby("method", sort=False):
+        solved = of_method[of_method.gap.notna()]
+        by_task = {str(task): runs.gap.to_numpy() for task, runs in solved.groupby("task")}
+        mean = task_mean(by_task) if by_task and set(by_task) == every else None
+        rows[method] = {
+            "gap": np.nan if mean is None else mean.value,
+            "gap_low": np.nan if mean is None else mean.low,
+            "gap_high": np.nan if mean is None else mean.high,
+            "tasks": len(by_task),
+            "runs": len(of_method),
+            "failed": int(of_method.reward.isna().sum()),
+        }
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("method")
+    return table.sort_values("gap", kind="stable")
+
+
+def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
+    """Share of runs and targets that methods reach within a number of trials.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
+        ``best_known``: a row each time a run became better, or one for its end.
+    targets : sequence of float
+        Gaps to the best known that count as reached, such as ``[0.1, 0.05, 0.01]``.
+
+    Returns
+    -------
+    DataFrame
+        A row at each number of trials at which a method's share rises: ``method``, ``trials``,
+        ``share`` of all pairs of run and target (tasks count alike) that are reached within them.
+
+    Raises
+    ------
+    CoarticError
+        For a frame without these columns, and without targets.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame(
+    ...     {"method": "mine", "task": "ascending", "run": 0, "trials": [1, 40, 900],
+    ...      "reward": [-319, -305, -293], "best_known": -292}
+    ... )
+    >>> ecdf(frame, [0.05, 0.01])
+      method  trials  share
+    0   mine    40.0    0.5
+    1   mine   900.0    1.0
+    """
+    check_columns(frame, "method", "task", "run", "trials", "reward", "best_known")
+    if not len(targets):
+        raise CoarticError("targets are empty: name gaps, such as [0.1, 0.05, 0.01]")
+    frame = frame.assign(gap=gaps(frame))
+    rows = []
+    for method, of_method in frame.groupby("method", sort=False):
+        tasks = of_method.groupby("task")
+        reached = []  # trials, and the weight of the pair of run and target
+        for _, of_task in tasks:
+            runs = of_task.groupby("run")
+            for _, run in runs:
+                for target in targets:
+                    first = run.trials[run.gap <= target].min()
+                    if pd.notna(first):
+                        reached.append((first, 1 / (len(tasks) * len(runs) * len(targets))))
+        pairs = pd.DataFrame(reached, columns=["trials", "share"], dtype=np.float64)
+        steps = pairs.groupby("trials").share.sum().cumsum().reset_index()
+        rows.append(steps.assign(method=method)[["method", "trials", "share"]])
+    return pd.concat(rows, ignore_index=True)

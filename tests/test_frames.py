@@ -1,0 +1,112 @@
+"""Plain frames of results and claims of a study: against slow and obvious counts."""
+
+import doctest
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import coartic
+from coartic.analysis import frames, load
+from coartic.analysis.claims import judging
+from coartic.analysis.claims.judging import all_of, judge, mean_beyond
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.benchmarks import Selection, run_suite
+
+
+@pytest.mark.parametrize("module", [frames, judging])
+def test_examples(module):
+    options = doctest.NORMALIZE_WHITESPACE
+    assert doctest.testmod(module, optionflags=options) == (0, doctest.testmod(module).attempted)
+
+
+def random_frame(rng):
+    rows = []
+    for method in ("one", "two", "three"):
+        for task in ("left", "right"):
+            for run in range(3):
+                trials = np.sort(rng.choice(100, 4, replace=False)) + 1
+                for made, reward in zip(trials, np.sort(rng.integers(-200, -100, 4)), strict=True):
+                    rows.append((method, task, run, int(made), float(reward), -100))
+    columns = ["method", "task", "run", "trials", "reward", "best_known"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_the_ecdf_is_the_share_of_pairs_that_are_reached():
+    frame, targets = random_frame(np.random.default_rng(0)), [0.8, 0.4, 0.1]
+    curves = frames.ecdf(frame, targets)
+    for method, of_method in frame.groupby("method"):
+        curve = curves[curves.method == method]
+        for budget in range(1, 102, 10):
+            reached = total = 0
+            for _, run in of_method[of_method.trials <= budget].groupby(["task", "run"]):
+                reached += sum((run.reward.max() + 100) / -100 <= target for target in targets)
+            total = 6 * len(targets)
+            seen = curve.share[curve.trials <= budget]
+            assert (seen.iloc[-1] if len(seen) else 0) == pytest.approx(reached / total)
+
+
+def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
+    frame = random_frame(np.random.default_rng(1))
+    frame.loc[(frame.method == "one") & (frame.task == "left"), "reward"] = np.nan
+    table = frames.ranking(frame[(frame.method != "two") | (frame.task == "right")])
+    assert table.index[0] == "three"
+    assert table.gap.isna().tolist() == [False, True, True]
+    assert table.failed["one"] == 12
+    by_hand = (-100 - frame.reward[frame.method == "three"]) / 100
+    assert table.gap["three"] == pytest.approx(by_hand.mean())
+    with pytest.raises(coartic.CoarticError, match="no column best_known"):
+        frames.gaps(frame.drop(columns="best_known"))
+
+
+def test_verdicts_of_planted_means():
+    rng = np.random.default_rng(2)
+    above, below = 5 + rng.normal(size=30), -5 + rng.normal(size=30)
+    claims = {
+        "above": mean_beyond("{}", above, 1.0),
+        "not above": mean_beyond("{}", below, 1.0),
+        "below": mean_beyond("{}", below, 1.0, "less"),
+        "both": all_of(mean_beyond("{}", above, 1.0), mean_beyond("{}", below, 1.0, "less")),
+        "one not": all_of(mean_beyond("{}", above, 1.0), mean_beyond("{}", below, 1.0)),
+        "open": mean_beyond("{}", rng.normal(size=30)),
+        "few": mean_beyond("{}", [1.0, np.nan]),
+    }
+    judged = judge({name: ("", "", finding) for name, finding in claims.items()})
+    assert judged.verdict.to_dict() == {
+        "above": "supported", "not above": "not supported", "below": "supported",
+        "both": "supported", "one not": "not supported", "open": "undecided", "few": "undecided",
+    }  # fmt: skip
+    assert judged.evidence["few"] == "Not judged: fewer than 3 random tasks can be judged."
+    # Holm: the smallest p counts as often as there are claims.
+    alone = claims["above"].p
+    assert judged.p_holm["above"] == pytest.approx(min(1, alone * len(claims)))
+
+
+def test_runs_are_tidy(tmp_path):
+    """Columns of a folder's runs against its tasks; signs and postures against executions."""
+    chosen = Selection(tasks=["two-armed-1"], methods=["EC3", "corrective-alone/given"])
+    run_suite("paper", tmp_path / "runs", runs=3, trials=50, select=chosen)
+    study = load(tmp_path / "runs")
+    runs = study.runs
+    assert runs.family.isna().all()
+    assert runs.goals.tolist() == [4] * 4
+    assert runs.noise_sd.dropna().tolist() == [0.05] * 3
+    best = coartic.objective("two-armed-1").best_known
+    assert runs.best_known.tolist() == [-best] * 4
+    assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
+    postures = study.postures("two-armed-1", "dual-process/EC3")
+    assert postures.shape == (3, 4, 10)
+    robot = study.tasks["two-armed-1"].robot
+    for run, hands in zip(postures, runs.hands, strict=False):
+        for q, goal, hand in zip(run, study.tasks["two-armed-1"].goals, hands, strict=True):
+            name = {"L": "left", "R": "right"}[hand]
+            assert np.hypot(*(robot.forward_kinematics(q, name) - goal)) <= 0.1
+    for name, sign in SIGNS.items():
+        of_learner = study.sign(name, replay=True)[runs.method == "dual-process/EC3"].dropna()
+        assert (
+            of_learner.tolist()
+            == sign.of(study.replays("two-armed-1", "dual-process/EC3")).tolist()
+        )
+    assert study.sign("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
+    with pytest.raises(coartic.CoarticError, match="unknown sign 'frist'; did you mean 'first'"):
+        study.sign("frist")
