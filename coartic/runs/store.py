@@ -169,7 +169,12 @@ class _Environment(_Stored):
 
 
 GONE = frozenset(
-    {"objectives", "stops", "believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"}
+    {
+        *("objectives", "reconstructions", "stops"),
+        *("believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"),
+        *("cma-es/every", "nullspace-qp/preshaping", "nullspace-qp/velocity", "random-search/pure"),
+        *("optimum/dynamic-programming", "optimum/multistart"),
+    }
 )
 """Suites and methods of version 1 that are no longer here."""
 _ROWS = 2_000  # that are read at once
