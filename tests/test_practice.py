@@ -21,7 +21,7 @@ from coartic.model import PAPER
 from coartic.robot import Robot
 from coartic.tasks.families import RULES, draft, load_family
 from coartic.tasks.task import address_of
-from tests.support.made_up import row, study_of
+from tests.support.made_up import MadeUp, row, study_of
 
 ROBOT, RIGHT, TRIALS = Robot(), slice(6, 10), 40 * practice.BATCH
 
@@ -162,7 +162,7 @@ def planted(*, stream="i", planner=PLANNED, **agents):
             words = {"parameters": json.dumps(of), "variant": variant, "task": task.name}
             lost = round(100_000 * (1 + (0.9 + 0.2 * number / 7) * gap / 100))
             rows.append(row(method, -lost, run_id=f"{task.name} {method} {variant}", **words))
-    return study_of(pd.DataFrame(rows), tasks, suite="practice")
+    return MadeUp(study_of(pd.DataFrame(rows), tasks, suite="practice"), optima={})
 
 
 def verdicts(study):
