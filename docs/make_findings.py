@@ -36,7 +36,7 @@ KEPT = {
     "locus": ("signatures", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
     "horizon": ("horizon horizon-signs claims", "horizon"),
-    "fourteen": ("fourteen claims", "fourteen"),
+    "fourteen": ("fourteen gains claims", "fourteen"),
     "practice": ("practice claims", "practice"),
     "dose": ("dose claims", "dose"),
     "resist": ("resist claims", "resist"),

@@ -3,6 +3,7 @@
 import json
 from functools import cache
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -75,6 +76,16 @@ def test_gains_are_those_of_movements_with_a_full_window():
         100 * table.gap[["fourteen-one/v1 dual-process/EC1", "fourteen-two/v1 dual-process/EC4"]]
     )
     assert learner.tolist() == pytest.approx([60.0, 60.0], abs=0.1)
+
+
+def test_gains_are_told_by_task():
+    table = TABLES["gains"](planted())
+    rows = table[(table.family == "fourteen-two/v1") & (table.horizon == 2)]
+    factors = [0.8 + 0.4 * number / 7 for number in range(8)]
+    assert 100 * rows.gain.to_numpy() == pytest.approx(8 * np.array(factors), abs=0.02)
+    before = table[(table.family == "fourteen-two/v1") & (table.horizon == 1)]
+    shorter = before.ticks.to_numpy() - rows.ticks.to_numpy()
+    assert shorter == pytest.approx(12 * 0.01 * MOVEMENT * 8 * np.array(factors), abs=2)
 
 
 def test_a_horizon_that_was_left_out_is_shared_by_the_goals_since():
