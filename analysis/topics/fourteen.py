@@ -81,9 +81,10 @@ def fourteen(study: Study) -> Rows:
 @table("family, task, horizon, ticks, gain")
 def gains(study: Study) -> Rows:
     """What each goal ahead gains on each task, as a share of a mean movement."""
-    for row in gains_by_horizon(study).itertuples():
-        shown = {"family": row.family, "task": row.task, "horizon": row.h, "ticks": row.ticks}
-        yield f"{row.task} h={row.h}", {**shown, "gain": row.gain / 100, **runs_of(row.cell)}
+    for each in gains_by_horizon(study).to_dict("records"):
+        row: Row = {name: each[name] for name in ("family", "task", "ticks")}
+        row |= {"horizon": each["h"], "gain": each["gain"] / 100}
+        yield f"{each['task']} h={each['h']}", row | runs_of(each["cell"])
 
 
 @figure(
