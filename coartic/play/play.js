@@ -135,7 +135,7 @@ class Play {
       this.state.who = "learner";
       this.showControls();
     }
-    this.problems = this.tasks.map((task) => problem_of(task, this.data.model));
+    this.problems = this.tasks.map((task) => problem_of(task));
     this.alone = this.problems.map((problem) => corrective_trial(problem, initial_hands(problem)));
     this.stale = true;
     this.send();
