@@ -55,9 +55,8 @@ class Selection:
     As in :func:`coartic.benchmarks.suites.select_cells`: without names, all of it.
     """
 
-    tasks: Sequence[str] = ()
+    tasks: Sequence[str | Path] = ()
     methods: Sequence[str] = ()
-    task_files: Sequence[str | Path] = ()
     method_files: Sequence[str | Path] = ()
 
     def __post_init__(self) -> None:
@@ -106,9 +105,8 @@ def plan_suite(
         cells = select_cells(
             suite,
             registry(map(Path, select.method_files)),
-            tasks=select.tasks,
+            tasks=[str(name) for name in select.tasks],
             methods=select.methods,
-            task_files=[Path(path) for path in select.task_files],
         )
     trials = suite.trials if chosen.trials is None else chosen.trials
     tasks: dict[str, Task] = {}

@@ -143,7 +143,7 @@ def read_suite(path: Path) -> Suite:
     """A suite from its file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
     if "goals" in content and "cells" not in content:
-        raise CoarticError(f"{path} is a task, not a suite: run a suite with --task-file {path}")
+        raise CoarticError(f"{path} is a task, not a suite: run a suite with --tasks {path}")
     try:
         return Suite(**{"name": path.stem, **content})
     except ValidationError as error:
@@ -157,7 +157,6 @@ def select_cells(
     *,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
-    task_files: Sequence[Path] = (),
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
@@ -173,7 +172,7 @@ def select_cells(
     and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
-    user_tasks, wanted = resolve_tasks(suite, tasks, task_files)
+    user_tasks, wanted = resolve_tasks(suite, tasks)
     cells = cells_of_suite(suite, registered, user_tasks)
     extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
     cells = drop_repeats([*cells, *extra])
@@ -187,7 +186,7 @@ def select_cells(
     ]
     # A user's own task that nothing applies to is an error, not a silent gap.
     busy = {cell.task.name for cell in chosen}
-    idle = [name for name in user_tasks if name not in busy and (not wanted or name in wanted)]
+    idle = [name for name in user_tasks if name not in busy]
     if idle or not chosen:
         of_task = [cell.label for cell in cells if not wanted or cell.task.name in wanted]
         there = ", ".join(dict.fromkeys(of_task)) or "nothing there"
@@ -197,18 +196,15 @@ def select_cells(
     return chosen
 
 
-def resolve_tasks(
-    suite: Suite, names: Sequence[str], task_files: Sequence[Path]
-) -> tuple[dict[str, Task], list[str]]:
+def resolve_tasks(suite: Suite, names: Sequence[str]) -> tuple[dict[str, Task], list[str]]:
     """The user's tasks by name, and the names of all tasks that were asked for.
 
     The user's tasks are those of files, and the instances that ``names`` has and the suite has
     not.
     """
-    files = [Path(name) for name in names if name.endswith(".toml")]
-    user_tasks = read_tasks([*task_files, *files])
+    user_tasks = read_tasks(Path(name) for name in names if name.endswith(".toml"))
     wanted = [*itertools.chain(*(named_by(name) for name in names if not name.endswith(".toml")))]
-    wanted += list(user_tasks)[len(task_files) :]
+    wanted += user_tasks
     in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
     for name in wanted:
         if name not in in_suite and address_of(name):
@@ -233,7 +229,7 @@ def read_tasks(paths: Iterable[Path]) -> dict[str, Task]:
     """The tasks of files by name, which no other task may have."""
     files: dict[str, Path] = {}
     tasks: dict[str, Task] = {}
-    for path in map(Path, paths):
+    for path in paths:
         task = load_task(path)
         taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
         if taken == path:

@@ -144,11 +144,11 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
         ({"tasks": ["ascending"], "methods": ["EC4"]}, "no method to run on what was asked for"),
-        ({"task_files": ["ascending.toml"]}, "name 'ascending' is already taken"),
-        ({"task_files": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
-        ({"task_files": ["mine.toml", "mine.toml"]}, "the same task file is given twice"),
-        ({"tasks": "ascending"}, "tasks is a list: write tasks=['ascending']"),
-        ({"task_files": Path("a.toml")}, "task_files is a list: write task_files=['a.toml']"),
+        ({"tasks": ["ascending.toml"]}, "name 'ascending' is already taken"),
+        ({"tasks": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
+        ({"tasks": ["mine.toml", "mine.toml"]}, "the same task file is given twice"),
+        ({"tasks": ["absent.toml"]}, "absent.toml"),
+        ({"tasks": Path("a.toml")}, "tasks is a list: write tasks=['a.toml']"),
         ({"tasks": [3]}, "tasks is [3]; it must be a list of names or paths"),
         ({"runs": "3"}, "runs is '3'; it must be from 1 to "),
         ({"runs": True}, "runs is True; it must be from 1 to "),
@@ -164,7 +164,7 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
         if name == "left":
             text = 'hands = ["left"]' + text.replace("RR", "LL")
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
-    selection = {name: wrong[name] for name in ("tasks", "methods", "task_files") if name in wrong}
+    selection = {name: wrong[name] for name in ("tasks", "methods") if name in wrong}
     rest = {name: value for name, value in wrong.items() if name not in selection}
     with pytest.raises(CoarticError) as caught:
         run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**selection)} | rest)

@@ -68,7 +68,7 @@ def test_run_a_task_of_ones_own(coartic, tmp_path, monkeypatch):
     """By short names of conditions, into the suite's own folder."""
     monkeypatch.chdir(tmp_path)
     Path("mine.toml").write_text(GOOD, encoding="utf-8")
-    options = ("--task-file", "mine.toml", "--tasks", "mine", "--methods", "EC1,EC4")
+    options = ("--tasks", "mine.toml", "--methods", "EC1,EC4")
     assert coartic("run", "paper", *options, "--runs", 2, "--trials", 30)[0] == 0
     runs = load("results/paper").runs
     assert list(runs.method) == [f"dual-process/EC{k}" for k in (1, 1, 4, 4)]

@@ -253,7 +253,7 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
     once = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
     assert planned(once, runs=20).size == 1
-    task, select = tmp_path / "mine.toml", Selection(task_files=[tmp_path / "mine.toml"])
+    task, select = tmp_path / "mine.toml", Selection(tasks=[tmp_path / "mine.toml"])
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
     own = plan_suite(tmp_path / "own.toml", select=select)
@@ -370,15 +370,17 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     paper, path, other = load_suite("paper"), tmp_path / "mine.toml", tmp_path / "arm.toml"
     path.write_text(GOOD, encoding="utf-8")
     other.write_text('hands = ["right"]\n' + GOOD.replace("mine", "arm"), encoding="utf-8")
-    assert len(select_cells(paper, KNOWN, task_files=[path])) == 7 + 4
 
     def methods(path, **selection):
-        return [c.method.name for c in select_cells(paper, KNOWN, task_files=[path], **selection)]
+        cells = select_cells(paper, KNOWN, tasks=[str(path)], **selection)
+        return [cell.method.name for cell in cells]
 
     baseline = ["corrective-alone/every"]
-    assert methods(path, tasks=["mine"], methods=baseline) == baseline
-    assert methods(path, tasks=["mine"]) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
-    assert methods(other, tasks=["arm"]) == ["dual-process/EC1"]
+    assert methods(path, methods=baseline) == baseline
+    assert methods(path) == [f"dual-process/EC{k}" for k in (1, 2, 3, 4)]
+    assert methods(other) == ["dual-process/EC1"]
+    both = select_cells(paper, KNOWN, tasks=["ascending", str(path)])
+    assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
 
 
 def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):

@@ -54,8 +54,8 @@ def test_a_package_brings_a_method(coartic, tmp_path):
     assert "nearest-hand: 8 of 8 checks passed." in checked
     assert "nearest-hand" in coartic("list")[1]
     code, _, error = coartic(
-        "run", "paper", "--methods", "nearest-hand", "--tasks", "shelf",
-        "--task-file", EXAMPLE / "shelf.toml", "--out", tmp_path / "out",
+        "run", "paper", "--methods", "nearest-hand", "--tasks", EXAMPLE / "shelf.toml",
+        "--out", tmp_path / "out",
     )  # fmt: skip
     assert code == 0, error
     (run,) = load(tmp_path / "out").runs.to_dict("records")

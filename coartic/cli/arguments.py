@@ -86,7 +86,8 @@ Jobs = Annotated[
     typer.Option(parser=job_count, metavar="N", help="Processes; -1 is one for each core."),
 ]
 Tasks = Annotated[
-    str | None, typer.Option(metavar="A,B", help="Only these tasks, such as two-armed-1.")
+    str | None,
+    typer.Option(metavar="A,B", help="Only these tasks, such as two-armed-1, or files (TOML)."),
 ]
 Methods = Annotated[
     str | None,
@@ -95,10 +96,6 @@ Methods = Annotated[
 Subject = Annotated[
     str,
     typer.Argument(metavar="NAME", help="A method, EC4 or 'optimum/*', or a task file (.toml)."),
-]
-TaskFiles = Annotated[
-    list[Path] | None,
-    typer.Option("--task-file", readable=False, metavar="FILE", help="A task of your own (TOML)."),
 ]
 MethodFiles = Annotated[
     list[Path] | None,

@@ -29,7 +29,6 @@ def run(
     jobs: given.Jobs = -1,
     tasks: given.Tasks = None,
     methods: given.Methods = None,
-    task_file: given.TaskFiles = None,
     method_file: given.MethodFiles = None,
     seed: given.Seed = 0,
     time_limit: given.TimeLimit = None,
@@ -58,7 +57,7 @@ def run(
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
     wanted = given.tasks_meant(split_names(tasks, "--tasks"))
-    select = Selection(wanted, names, task_file or (), method_file or ())
+    select = Selection(wanted, names, method_file or ())
     plan = plan_suite(
         chosen,
         runs=runs,
