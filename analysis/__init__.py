@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
-    from coartic.analysis.frames import ecdf, gaps, ranking
+    from coartic.analysis.frames import ecdf, gaps, means, ranking
+    from coartic.analysis.pages import fill_page
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.study import Study, load
 
 __all__ = [
-    "SIGNS", "Study", "all_of", "ecdf", "gaps", "judge", "load", "mean", "mean_beyond", "ranking"
+    "SIGNS", "Study", "all_of", "ecdf", "fill_page", "gaps", "judge", "load", "mean",
+    "mean_beyond", "means", "ranking",
 ]  # fmt: skip
 
 _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
-    "frames": ("ecdf", "gaps", "ranking"),
+    "frames": ("ecdf", "gaps", "means", "ranking"),
+    "pages": ("fill_page",),
     "signatures.signs": ("SIGNS",),
     "statistics.estimates": ("mean",),
     "study": ("Study", "load"),

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from coartic.analysis.statistics.estimates import interval, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 
@@ -52,6 +53,50 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     reward, best = (frame[name].astype("Float64") for name in ("reward", "best_known"))
     share = (best - reward) / best.abs()
     return pd.Series(share.to_numpy(np.float64, na_value=np.nan), frame.index, name="gap")
+
+
+def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:
+    """Means of groups of rows with their 95 % intervals.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        A row for each task (or each run), with the columns of ``by`` and ``columns``.
+    by : sequence of str
+        Columns that make a group; NaN is a group of its own.
+    columns : sequence of str
+        Columns of numbers; NaN does not count.
+
+    Returns
+    -------
+    DataFrame
+        A row for each group in the order of first appearance: ``by``, ``rows``, the number of
+        rows, and of each column ``x`` the mean ``x`` with ``x_low`` and ``x_high`` (BCa bootstrap,
+        NaN with fewer than three values).
+
+    Raises
+    ------
+    CoarticError
+        For a frame without one of the columns.
+
+    Examples
+    --------
+    >>> frame = pd.DataFrame({"h": [0, 0, 0, 1, 1, 1], "gap": [0.3, 0.2, 0.4, 0.1, 0.1, 0.1]})
+    >>> means(frame, ["h"], ["gap"]).round(2)
+       h  rows  gap  gap_low  gap_high
+    0  0     3  0.3      0.2      0.37
+    1  1     3  0.1      0.1      0.10
+    """
+    check_columns(frame, *by, *columns)
+    rows = []
+    for key, group in frame.groupby([*by], sort=False, dropna=False):
+        row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
+        for name in columns:
+            there = group[name].dropna().to_numpy(dtype=np.float64)
+            row |= interval(name, mean(there)) if len(there) else {}
+        rows.append(row)
+    ends = [f"{name}{end}" for name in columns for end in ("", "_low", "_high")]
+    return pd.DataFrame(rows, columns=[*by, "rows", *ends])
 
 
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:

@@ -12,6 +12,7 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
 from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, brief_value
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
+from coartic.tasks.families import own_families
 from coartic.tasks.task import check_task
 
 LIMITS = {
@@ -58,6 +59,7 @@ class Selection:
     tasks: Sequence[str | Path] = ()
     methods: Sequence[str] = ()
     method_files: Sequence[str | Path] = ()
+    family_files: Sequence[str | Path] = ()
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -107,6 +109,7 @@ def plan_suite(
             registry(map(Path, select.method_files)),
             tasks=[str(name) for name in select.tasks],
             methods=select.methods,
+            families=own_families(map(Path, select.family_files)),
         )
     trials = suite.trials if chosen.trials is None else chosen.trials
     tasks: dict[str, Task] = {}

@@ -31,12 +31,13 @@ from coartic.learner.conditions import METHOD_PREFIX
 from coartic.robot import Finite
 from coartic.runs.plan import Cell
 from coartic.runs.store import RUNS_FILE
-from coartic.tasks.families import named_by
+from coartic.tasks.families import Family, instance_of, named_by
 from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN, address_of
 from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
+NO_FAMILIES: Mapping[str, Family] = {}
 Scalar = bool | int | float | str
 
 
@@ -157,6 +158,7 @@ def select_cells(
     *,
     tasks: Sequence[str] = (),
     methods: Sequence[str] = (),
+    families: Mapping[str, Family] = NO_FAMILIES,
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
@@ -166,14 +168,15 @@ def select_cells(
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
     ``methods``, or of all methods of the suite where none are named; so does an instance of a
-    family that ``tasks`` names, alone or in a range, and the suite does not. Raises CoarticError
+    family that ``tasks`` names, alone or in a range, and the suite does not. ``families`` are the
+    user's own, beside the shipped ones. Raises CoarticError
     for unknown names, for a task file whose name is taken, for parameters that a method does not
     take, for more than :data:`MOST_CELLS` cells, for different cells that would go by one name,
     and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
-    user_tasks, wanted = resolve_tasks(suite, tasks)
-    cells = cells_of_suite(suite, registered, user_tasks)
+    user_tasks, wanted = resolve_tasks(suite, tasks, families)
+    cells = cells_of_suite(suite, registered, user_tasks, families)
     extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
     cells = drop_repeats([*cells, *extra])
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
@@ -196,7 +199,9 @@ def select_cells(
     return chosen
 
 
-def resolve_tasks(suite: Suite, names: Sequence[str]) -> tuple[dict[str, Task], list[str]]:
+def resolve_tasks(
+    suite: Suite, names: Sequence[str], families: Mapping[str, Family]
+) -> tuple[dict[str, Task], list[str]]:
     """The user's tasks by name, and the names of all tasks that were asked for.
 
     The user's tasks are those of files, and the instances that ``names`` has and the suite has
@@ -208,8 +213,16 @@ def resolve_tasks(suite: Suite, names: Sequence[str]) -> tuple[dict[str, Task], 
     in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
     for name in wanted:
         if name not in in_suite and address_of(name):
-            user_tasks.setdefault(name, load_task(name))
+            user_tasks.setdefault(name, task_named(name, families))
     return user_tasks, wanted
+
+
+def task_named(name: str, families: Mapping[str, Family]) -> Task:
+    """A task by its name, which can be that of an instance of one's own family."""
+    address = address_of(name)
+    if address is not None and address.family in families:
+        return instance_of(families[address.family], address)
+    return load_task(name)
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
@@ -284,10 +297,15 @@ def drop_repeats(cells: Iterable[Cell]) -> list[Cell]:
 
 
 def cells_of_suite(
-    suite: Suite, registered: Registry, user_tasks: Mapping[str, Task]
+    suite: Suite,
+    registered: Registry,
+    user_tasks: Mapping[str, Task],
+    families: Mapping[str, Family],
 ) -> list[Cell]:
     """The cells of all blocks. Raises CoarticError for more than :data:`MOST_CELLS`."""
-    blocks = (cells_of_block(suite, block, registered, user_tasks) for block in suite.cells)
+    blocks = (
+        cells_of_block(suite, block, registered, user_tasks, families) for block in suite.cells
+    )
     cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
     if len(cells) > MOST_CELLS:
         raise CoarticError(
@@ -298,14 +316,18 @@ def cells_of_suite(
 
 
 def cells_of_block(
-    suite: Suite, block: Block, registered: Registry, user_tasks: Mapping[str, Task]
+    suite: Suite,
+    block: Block,
+    registered: Registry,
+    user_tasks: Mapping[str, Task],
+    families: Mapping[str, Family],
 ) -> Iterator[Cell]:
     """The cells of a block; goals are not moved in the user's tasks unless they are named."""
     methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
     for name in block.task_names(user_tasks):
         if block.move is not None and WILDCARD in block.tasks and name in user_tasks:
             continue
-        task = user_tasks.get(name) or load_task(name)
+        task = user_tasks.get(name) or task_named(name, families)
         if block.goals is not None and len(task.goals) not in block.goals:
             continue
         if block.free_base:

@@ -14,15 +14,14 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
-import jinja2
 import pandas as pd
 from scipy import stats
 
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
+from coartic.analysis.pages import fill_page
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES
-from coartic.analysis.words import in_brackets, listed, number, p_value
 
 DOCS = Path(__file__).parent
 STORED = DOCS / "stored"
@@ -105,12 +104,6 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
     return str(re.findall(re.escape(words) + estimate, evidence)[which])
 
 
-def interval(values: Row, column: str, digits: int = 1, scale: float = 1.0) -> str:
-    """A number with its interval, as ``7.8 [7.3, 8.1]``."""
-    value, low, high = (scale * float(values[f"{column}{end}"]) for end in ("", "_low", "_high"))
-    return f"{number(value, digits)} {in_brackets(low, high, digits)}".strip()
-
-
 def p_of_shares(values: Row, printed_runs: int) -> float:
     """p of Fisher's exact test that runs learn a hand sequence as often as printed ones."""
     counts = (values.published_runs, printed_runs), (values.runs, values.of_runs)
@@ -122,39 +115,23 @@ def p_above(values: pd.Series, bound: float) -> float:
     return bootstrap_test(values, bound, resamples=RESAMPLES_OF_STUDIES).p
 
 
-def expect(holds: bool, what: str) -> str:
-    """Nothing, where a sentence holds. Raises ValueError where the results no longer bear it."""
-    if not holds:
-        raise ValueError(f"this no longer holds: {what}")
-    return ""
-
-
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its file name.
 
     A page that has the name of a suite waits until something of that suite is stored.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(DOCS),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
     published = ANALYSIS / "topics" / "paper" / "published.toml"
-    environment.globals |= {
-        "table": table, "row": row, "claim": claim, "verdicts": verdicts, "interval": interval,
-        "seen": seen, "expect": expect, "name_of": name_of, "p_of_shares": p_of_shares,
-        "p_above": p_above,
+    values = {
+        "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
+        "name_of": name_of, "p_of_shares": p_of_shares, "p_above": p_above,
         "printed": tomllib.loads(published.read_text("utf-8"))["general"],
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
     }  # fmt: skip
-    environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
     waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
     return {
-        path.stem: environment.get_template(path.name).render()
+        path.stem: fill_page(path, **values)
         for path in sorted(DOCS.glob("*.md.jinja"))
         if path.stem not in waiting
     }

@@ -1,22 +1,40 @@
-"""The figures of the report, each a function of a study: ``FIGURES["ranking"](study)``.
+"""Figures: those of the report, and what a figure of your own needs.
 
-``save`` writes one as files. Topics draw them; what they share is in this package: looks, files,
-and films of the robot.
+``FIGURES["ranking"](study)`` draws one of the report, ``save`` writes it as files. The others are
+for figures of your own, which then look like these: :func:`panels` and :func:`means` draw,
+:func:`picture` gives the file. Draw within ``styled``, a decorator.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.analysis.figures.plot import FIGURES, Plot, save
+    from coartic.analysis.figures.plot import FIGURES, Plot, picture, save
+    from coartic.analysis.figures.style import (
+        COVERAGE,
+        GREY,
+        ONE,
+        PALETTE,
+        TWO,
+        legend,
+        letters,
+        means,
+        panels,
+        styled,
+    )  # fmt: skip
 
-__all__ = ["FIGURES", "Plot", "save"]
+__all__ = [
+    "COVERAGE", "FIGURES", "GREY", "ONE", "PALETTE", "TWO", "Plot", "legend", "letters", "means",
+    "panels", "picture", "save", "styled",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """What is asked for, once every topic has named its figures."""
+    """What is asked for; the report's figures once every topic has named its own."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    import_module("coartic.analysis.report.contents")
-    return getattr(import_module("coartic.analysis.figures.plot"), name)
+    if name == "FIGURES":
+        import_module("coartic.analysis.report.contents")
+    plot = ("FIGURES", "Plot", "picture", "save")
+    home = "plot" if name in plot else "style"
+    return getattr(import_module(f"coartic.analysis.figures.{home}"), name)

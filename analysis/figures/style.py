@@ -106,18 +106,33 @@ def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
     return -(-panels // columns), columns
 
 
-def figure_of(
+def panels(
     shape: tuple[int, int], size: tuple[float, float], used: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with so many rows and columns of panels, in inches, and its panels row by row.
+    """Make a figure with panels.
 
-    ``used``: the first so many panels, the others being empty.
+    Parameters
+    ----------
+    shape : (int, int)
+        Rows and columns of panels.
+    size : (float, float)
+        Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
+        journal.
+    used : int, optional
+        The first so many panels are used, the others left empty; all without it.
+    **subplots
+        As Matplotlib's ``Figure.subplots`` takes them, such as ``sharey=True``.
+
+    Returns
+    -------
+    (Figure, list of Axes)
+        The figure, and its panels row by row.
     """
     figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
-    for axes in panels[used or len(panels) :]:
+    every = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
+    for axes in every[used or len(every) :]:
         axes.set_axis_off()
-    return figure, panels[:used]
+    return figure, every[:used]
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
@@ -134,18 +149,56 @@ def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any)
 
 def means(
     axes: Axes,
-    places: ArrayLike,
-    rows: pd.DataFrame,
-    column: str,
+    frame: pd.DataFrame,
     *,
+    x: str,
+    y: str,
+    by: str = "",
     scale: float = 1.0,
+    shift: float = 0.0,
     bars: float | None = 0.8,
     **line: Any,
 ) -> None:
-    """Means of a table (``column``) at some places, with their intervals where it has them.
+    """Draw means with their intervals, a line for each group.
 
-    ``bars``: width of the intervals' lines, points. ``line``: looks of the line through the means.
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where they are drawn.
+    frame : DataFrame
+        A row for each mean, as :func:`coartic.analysis.means` returns them: columns ``x``, ``y``,
+        and for intervals those of ``y`` with ``_low`` and ``_high``.
+    x, y : str
+        Columns of the places and of the means.
+    by : str
+        Column whose values have a line, a colour and a label each; one line without it.
+    scale : float
+        Factor of means and intervals: 100 for per cent.
+    shift : float
+        By how much each line is moved to the right of the one before, in units of ``x``.
+    bars : float, optional
+        Width of the intervals, points.
+    **line
+        Looks of the line and its marks, as Matplotlib's ``plot`` takes them.
     """
+    groups = frame.groupby(by, sort=False) if by else [("", frame)]
+    for number, (color, (name, rows)) in enumerate(
+        zip(itertools.cycle(PALETTE), groups, strict=False)
+    ):
+        looks: Look = {"color": color, "marker": "o", "markersize": 3, "linewidth": 1.2}
+        looks |= ({"label": str(name)} if by else {}) | line
+        places = rows[x] + number * shift
+        if f"{y}_low" in rows:
+            ends = scale * rows[f"{y}_low"], scale * rows[f"{y}_high"]
+            axes.vlines(places, *ends, looks["color"], linewidth=bars)
+        axes.plot(places, scale * rows[y], **looks)
+
+
+def means_at(
+    axes: Axes, places: ArrayLike, rows: pd.DataFrame, column: str, *, scale: float = 1.0,
+    bars: float | None = 0.8, **line: Any,
+) -> None:  # fmt: skip
+    """Means of a table at some places, with their intervals."""
     if f"{column}_low" in rows:
         ends = scale * rows[f"{column}_low"], scale * rows[f"{column}_high"]
         axes.vlines(places, *ends, line["color"], linewidth=bars)

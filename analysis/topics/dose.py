@@ -159,7 +159,7 @@ def draw_dose(study: Study) -> Parts:
     data = dose(study)
     if not len(data):
         raise missing(study, "no runs of the learner that differ in the discount")
-    drawing, panels = style.figure_of((2, 2), (style.TWO, 4.6))
+    drawing, panels = style.panels((2, 2), (style.TWO, 4.6))
     random, shared = data[data.group == RANDOM], data[data.apart.notna()]
     panels_of = dict(zip((*MEASURES, "apart"), panels, strict=True))
     for name, axes in panels_of.items():
@@ -170,7 +170,7 @@ def draw_dose(study: Study) -> Parts:
                 continue
             places = rows.dose + 0.01 * (counted == "later")
             line: Any = {"color": color, "linestyle": dash, "markersize": 3.5, "label": words}
-            style.means(axes, places, rows, name, **line)
+            style.means_at(axes, places, rows, name, **line)
         axes.set_ylabel(MEASURES.get(name, "postures apart"))
         axes.set_xlabel("γ")
     style.letters(panels)

@@ -102,14 +102,14 @@ def draw_fourteen(study: Study) -> Parts:
     data = fourteen(study)
     if not data.family.isin(MANY).any():
         raise missing(study, "no runs of the planner on tasks of families with fourteen goals")
-    drawing, panels = style.figure_of((1, 3), (style.TWO, 2.8))
+    drawing, panels = style.panels((1, 3), (style.TWO, 2.8))
     for color, name, *families in zip(style.PALETTE, ARMS, MANY, HALF, strict=False):
         rows, seven = (data[data.family == family] for family in families)
         line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
         for axes, column in zip(panels, ("gap", "gain", "together"), strict=True):
-            style.means(axes, rows.h, rows, column, **line, label=name)
+            style.means_at(axes, rows.h, rows, column, **line, label=name)
         empty = line | {"label": f"{name}, seven", "markerfacecolor": style.BACKGROUND}
-        style.means(panels[2], seven.h, seven, "together", **empty)
+        style.means_at(panels[2], seven.h, seven, "together", **empty)
         for method, dash in (("dual-process", "dotted"), ("cma-es", "dashdot")):
             for gap in rows.gap[rows.method.str.startswith(method)]:
                 panels[0].axhline(100 * gap, color=color, linestyle=dash, linewidth=1)

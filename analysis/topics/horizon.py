@@ -170,7 +170,7 @@ def draw_horizon(study: Study) -> Parts:
     data = horizon(study)
     if not len(data):
         raise missing(study, "no runs of the planner on instances of a family of tasks")
-    drawing, (axes,) = style.figure_of((1, 1), (style.ONE, 2.6))
+    drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.6))
     parts = data[data.group == "goals"].groupby("value", sort=False)
     for number, (color, (name, rows)) in enumerate(zip(style.PALETTE, parts, strict=False)):
         if BEYOND not in set(rows.h):
@@ -178,7 +178,7 @@ def draw_horizon(study: Study) -> Parts:
         rows = rows[rows.h.isin(PLACES) & (rows.tasks == rows.tasks.max())]
         at = rows.h.map(PLACES.index) + 0.08 * number
         line: Any = {"color": color, "linewidth": 1.2, "bars": 0.9, "scale": 100}
-        style.means(axes, at, rows, "gap", **line, label=str(name))
+        style.means_at(axes, at, rows, "gap", **line, label=str(name))
     axes.set_xticks(range(len(PLACES)), PLACES)
     axes.set_xlabel("goals ahead")
     axes.legend(title="goals of the task", loc="upper right")

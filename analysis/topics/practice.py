@@ -134,20 +134,20 @@ def draw_practice(study: Study) -> Parts:
     agents, planner = (data[data.who == who] for who in (AGENTS, PLANNER))
     if not len(agents):
         raise missing(study, "no agents that have practised")
-    drawing, (left, right) = style.figure_of((1, 2), (style.TWO, 2.8), sharey=True)
+    drawing, (left, right) = style.panels((1, 2), (style.TWO, 2.8), sharey=True)
     counts, views = [0, *sorted(agents.practice.unique())], [*map(str, AHEAD), "all"]
     line: Any = {"scale": 100, "bars": 0.9}
     for color, ahead in zip(style.PALETTE, AHEAD, strict=False):
         rows = agents[agents.h == str(ahead)].sort_values("practice")
         rows = pd.concat([data[data.who == UNPRACTISED], rows])
         places = [counts.index(n) + 0.06 * ahead for n in rows.practice]
-        style.means(left, places, rows, "gap", color=color, label=str(ahead), **line)
+        style.means_at(left, places, rows, "gap", color=color, label=str(ahead), **line)
         single = of(practice_values(study), AGENTS, counts[-1], ahead).mean()
         right.plot([ahead + 0.15] * len(single), single, ".", color=style.BLUE, markersize=3)
     last = agents[agents.practice == counts[-1]]
     for rows, color, name in ((last, style.BLUE, "agents"), (planner, style.VERMILLION, "planner")):
         places = list(map(views.index, rows.h))
-        style.means(right, places, rows, "gap", color=color, label=name, **line)
+        style.means_at(right, places, rows, "gap", color=color, label=name, **line)
     left.set_xticks(range(len(counts)), [f"{n:,}".replace(",", " ") for n in counts])
     left.set_xlabel("trials of practice")
     left.set_ylabel("gap (%)")

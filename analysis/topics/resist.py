@@ -160,7 +160,7 @@ def draw_resist(study: Study) -> Parts:
     data = resist(study)
     if not len(data):
         raise missing(study, "no runs on tasks each of whose goals is moved")
-    drawing, panels = style.figure_of((1, 2), (style.TWO, 2.8), sharey=True)
+    drawing, panels = style.panels((1, 2), (style.TWO, 2.8), sharey=True)
     labels = list(data.method[data.group == "all"])
     colors = dict(zip(labels, itertools.cycle(style.PALETTE), strict=False))
     sizes = [group for group in dict.fromkeys(data.group) if group.endswith("links")]
@@ -169,7 +169,7 @@ def draw_resist(study: Study) -> Parts:
             rows = data[(data.method == label) & data.group.isin(groups)].set_index("group")
             places = [groups.index(g) + 0.11 * (number - len(labels) / 2) for g in rows.index]
             dots: Any = {"color": colors[label], "linestyle": "", "markersize": 4, "bars": None}
-            style.means(axes, places, rows, "beyond", **dots, label=name_of(label))
+            style.means_at(axes, places, rows, "beyond", **dots, label=name_of(label))
         axes.axhline(0, color=style.GREY, linewidth=0.8)
         axes.set_xlim(-0.5, len(groups) - 0.5)
         axes.set_xticks(range(len(groups)), [group.replace("all", "all tasks") for group in groups])

@@ -88,7 +88,7 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    drawing, panels = style.figure_of(
+    drawing, panels = style.panels(
         (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
     )
     drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge

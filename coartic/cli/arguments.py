@@ -103,6 +103,12 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
+FamilyFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--family-file", readable=False, metavar="FILE", help="A family of your own (TOML)."
+    ),
+]
 Seed = Annotated[
     int, typer.Option(parser=whole("--seed", 0), metavar="N", help="Seed of the suite.")
 ]

@@ -30,6 +30,7 @@ def run(
     tasks: given.Tasks = None,
     methods: given.Methods = None,
     method_file: given.MethodFiles = None,
+    family_file: given.FamilyFiles = None,
     seed: given.Seed = 0,
     time_limit: given.TimeLimit = None,
     trial_budget: given.TrialBudget = None,
@@ -57,7 +58,7 @@ def run(
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
     wanted = given.tasks_meant(split_names(tasks, "--tasks"))
-    select = Selection(wanted, names, method_file or ())
+    select = Selection(wanted, names, method_file or (), family_file or ())
     plan = plan_suite(
         chosen,
         runs=runs,

@@ -20,7 +20,7 @@ import itertools
 import json
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -337,10 +337,17 @@ def first_good(
 
 @lru_cache(maxsize=4096)
 def instance_at(address: Address) -> Task:
-    """The instance at an address, with its initial hands. Raises TaskError where there is none."""
+    """The instance of a shipped family at an address. Raises TaskError where there is none."""
+    return instance_of(load_family(address.family), address)
+
+
+def instance_of(family: Family, address: Address) -> Task:
+    """The instance of a family at an address, with its initial hands.
+
+    Raises TaskError where no draw is good.
+    """
     from coartic.motion.initial import initial_hands
 
-    family = load_family(address.family)
     task, _ = first_good(family, address)
     name = str(address)
     short = name.rpartition("/")[2]
@@ -420,8 +427,22 @@ def family_name(path: Path) -> str:
     return "/".join(path.stem.rsplit(".", 1))
 
 
+def own_families(paths: Iterable[Path]) -> dict[str, Family]:
+    """The families of one's own files by name.
+
+    Raises TaskError for a file that cannot be used, and for a name that is taken.
+    """
+    families: dict[str, Family] = {}
+    for path in paths:
+        family = read_family(path)
+        if family.name in families or family.name in shipped_families():
+            raise TaskError(f"{path}: there is a family {family.name!r} already; rename the file")
+        families[family.name] = family
+    return families
+
+
 def load_family(name: str) -> Family:
-    """A family by name with version, as ``two-armed/v1``. Raises TaskError."""
+    """A shipped family by name with version, as ``two-armed/v1``. Raises TaskError."""
     shipped = shipped_families()
     if name not in shipped:
         raise TaskError(unknown("family", name, shipped))

@@ -32,7 +32,7 @@ def one_goal_two_postures(study: Study) -> Parts:
     shared = shared_goal(study)
     if shared is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
-    drawing, (axes,) = style.figure_of((1, 1), (style.ONE, 2.0))
+    drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
     draw_postures(axes, shared)
     parts = []
     for task, runs in zip(shared.tasks, shared.postures, strict=True):

@@ -51,7 +51,7 @@ def gaps_to_optimum(study: Study) -> Parts:
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]
     heights = [len(of_group) + 0.8 for _, of_group in groups]
     size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
-    drawing, panels = style.figure_of((len(groups), 1), size, sharex=True, height_ratios=heights)
+    drawing, panels = style.panels((len(groups), 1), size, sharex=True, height_ratios=heights)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
         draw_group(axes, study, group, of_group, looks_in(study, rows.method))
     farthest = float(np.nanmax(percent[["gap", "high"]]))
@@ -105,7 +105,7 @@ def ecdf_of_runtimes(study: Study) -> Parts:
         raise missing(study, "no method that reaches a target on a task with a known optimum")
     looks = looks_in(study, data.method.unique())
     size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
-    drawing, panels = style.figure_of((1, len(spends)), size)
+    drawing, panels = style.panels((1, len(spends)), size)
     for axes, spend in zip(panels, spends, strict=True):
         of_spend = data[data.spend == spend]
         draw_shares(axes, study, of_spend, looks)
@@ -179,7 +179,7 @@ def reward_by_trial(study: Study) -> Parts:
     labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
-    drawing, panels = style.figure_of((rows, columns), size, len(tasks))
+    drawing, panels = style.panels((rows, columns), size, len(tasks))
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         draw_curves(axes, study, task, data[data.task == task.name], labels)
         axes.set_title(marked(task))

@@ -36,7 +36,7 @@ def gaps_by_family(study: Study) -> Parts:
     looks = looks_in(study, order)
     families = list(dict.fromkeys(data.family))
     size = style.TWO, 0.9 + 0.19 * len(order)
-    drawing, panels = style.figure_of((1, len(families)), size, sharey=True)
+    drawing, panels = style.panels((1, len(families)), size, sharey=True)
     for axes, family in zip(panels, families, strict=True):
         for place, label in enumerate(order):
             rows = data[(data.method == label) & (data.family == family)]

@@ -221,7 +221,7 @@ def draw_human(study: Study) -> Parts:
     cells = verdicts(study).drop_duplicates(["finding", "model"])
     if not len(cells):
         raise missing(study, f"only suite {SUITE!r} is put to findings about people")
-    drawing, (axes,) = style.figure_of((1, 1), (style.TWO, 4.6))
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 4.6))
     findings, models = list(FINDINGS), list(MODELS)
     effects = human(study)
     for row in cells.itertuples():

@@ -124,7 +124,7 @@ def draw_recruitment(study: Study) -> Parts:
     shape = style.grid(len(tasks), 2)
     bars = data.drop_duplicates(["task", "method", "source"]).task.value_counts().max()
     size = style.TWO, (0.8 + 0.17 * bars) * shape[0]
-    drawing, panels = style.figure_of(shape, size, len(tasks))
+    drawing, panels = style.panels(shape, size, len(tasks))
     for axes, task in zip(panels, tasks, strict=True):
         draw_bars(axes, task, data[data.task == task.name], order, colors)
     style.letters(panels)

@@ -1,0 +1,153 @@
+"""How far ahead must a planner look?
+
+    coartic run studies/horizon/suite.toml
+    python studies/horizon/study.py results/horizon
+
+writes results.csv, signs.csv, claims.csv, figure.svg and the page, README.md; without a folder the
+page alone, from the tables that are there.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis import SIGNS, all_of, figures, fill_page, judge, load, mean_beyond, means
+
+HERE = Path(__file__).parent
+PLANNER = "receding-horizon"
+STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
+"""Goals ahead. ``5+`` are all beyond the fourth together; ``all`` is over all tasks."""
+GAIN = 1.0
+"""Per cent that count as a gain, set before the runs."""
+
+
+def measure_plans(study):
+    """Plans on random tasks, a row for each task and step, with their gaps as shares.
+
+    ``gain``: of the last goal in view. ``ahead``: goals ahead at the first movement.
+    """
+    plans = study.runs[(study.runs.method == PLANNER) & study.runs.family.notna()]
+    plans = plans.assign(ahead=plans.goals - 1, h=np.minimum(plans.horizon, plans.goals - 1))
+    gaps = plans.pivot_table("gap", "task", "h")
+    before = [gaps.loc[task, min(h - 1, 4)] if h else np.nan
+              for task, h in zip(plans.task, plans.h, strict=True)]  # fmt: skip
+    plans = plans.assign(step=plans.h.map(lambda h: STEPS[min(int(h), 5)]), gain=before - plans.gap)
+    every = plans[plans.h == plans.ahead].assign(step="all", gain=np.nan)
+    return pd.concat([plans, every]).sort_values("step", kind="stable")
+
+
+def tabulate(study, plans):
+    """Gap by goals ahead and what the last of them gains, over kinds of tasks."""
+    tasks = plans.task.map(study.tasks)
+    kinds = {
+        "all": "all",
+        "family": plans.family.str.partition("/")[0],
+        "goals": plans.goals.map(lambda count: str(count) if count <= 5 else "6 or more"),
+        "arms": tasks.map(lambda task: ["one", "two"][len(task.hands) - 1]),
+        "links": tasks.map(lambda task: str(len(task.robot.right_links))),
+        "base": tasks.map(lambda task: ["free", "on a rail", "fixed"][len(task.locked_base)]),
+    }
+    parts = [plans.assign(group=group, value=value).sort_values("value", kind="stable")
+             for group, value in kinds.items()]  # fmt: skip
+    table = means(pd.concat(parts), ["group", "value", "step"], ["gap", "gain", "cpu_s"])
+    table = table.rename(columns={"step": "h", "rows": "tasks", "cpu_s": "seconds"})
+    table.index = (table.group + " " + table.value + " h=" + table.h).rename("row")
+    return table.drop(columns=["cpu_s_low", "cpu_s_high"])
+
+
+def tabulate_signs(study, plans):
+    """Signs of coarticulation by goals ahead where more follow, and what all goals add."""
+    plans, rows = plans[plans.step != "5+"], []
+    for name, sign in SIGNS.items():
+        plans = plans.assign(sign=name, words=sign.words, here=study.sign(name))
+        full = plans[plans.step == "all"].set_index("task").here
+        plans["to_come"] = plans.task.map(full) - plans.here
+        more = plans[(plans.ahead > plans.h) | ((plans.step == "all") & (plans.ahead > 0))]
+        rows.append(more.dropna(subset=["here", "to_come"]))
+    every = pd.concat(rows)
+    every["to_come"] = every.to_come.where(every.step != "all")
+    table = means(every, ["sign", "words", "step"], ["here", "to_come"])
+    table.columns = table.columns.str.replace("here", "mean")
+    table = table.rename(columns={"step": "h", "rows": "tasks"})
+    return table.set_index((table.sign + " h=" + table.h).rename("row"))
+
+
+def judge_claims(study, plans):
+    """The claims, as they were registered; the second and third before the runs."""
+    gaps = 100 * plans.pivot_table("gap", "task", "step").loc[plans.task.unique()]
+    ahead = plans.groupby("task").ahead.first()[gaps.index]
+    first = (gaps["0"] - gaps["1"]) - (gaps["1"] - gaps["all"])
+    learner = study.runs[study.runs.method.str.startswith("dual-process")]
+    behind = 100 * learner.groupby("task").gap.mean().reindex(gaps.index) - gaps["1"]
+    return judge({
+        "first-of-several-goals-ahead-gains-most": (
+            "Where there are further goals, the first goal ahead gains more than all of them "
+            "together.",
+            "one-tailed bootstrap test over random tasks with three goals or more: the gap of the "
+            "planner falls by more from no goal ahead to one than from one to all",
+            mean_beyond("The first goal ahead gains {} points more than all others together",
+                        first[ahead > 1]),
+        ),
+        "further-goals-gain-little-where-they-are": (
+            "On tasks that have them, the second goal ahead gains more than 1 %, and the fourth "
+            "less.",
+            "one-tailed bootstrap tests over random tasks: from one goal ahead to two the gap of "
+            "the planner falls by more than 1 % on tasks with three goals or more, and from three "
+            "to four by less on those with five or more",
+            all_of(
+                mean_beyond("The second goal ahead gains {} points", gaps["1"] - gaps["2"], GAIN),
+                mean_beyond("the fourth gains {} points", gaps["3"] - gaps["4"], GAIN, "less"),
+            ),
+        ),
+        "learner-behind-one-goal-ahead": (
+            "The paper's learner, which explores most, loses more than the planner with one goal "
+            "ahead.",
+            "one-tailed bootstrap test over random tasks: the learner's gap is higher by more than "
+            "1 %",
+            mean_beyond("The learner loses {} points more than the planner with one goal ahead",
+                        behind, GAIN),
+        ),
+    })  # fmt: skip
+
+
+@figures.styled
+def draw(table):
+    """Gap by goals ahead, a line for each number of goals."""
+    figure, (axes,) = figures.panels((1, 1), (figures.ONE, 2.6))
+    rows = table[(table.group == "goals") & (table.h != "5+")]
+    rows = rows[(rows.h != "all") | (rows.value == "6 or more")]
+    rows = rows.assign(place=rows.h.map([*STEPS[:5], "all"].index))
+    figures.means(axes, rows, x="place", y="gap", by="value", scale=100, shift=0.08, bars=0.9)
+    axes.set_xticks(range(6), [*STEPS[:5], "all"])
+    axes.set_xlabel("goals ahead")
+    axes.set_yscale("symlog", linthresh=1, linscale=0.6)
+    axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
+    axes.set_ylim(bottom=-0.1)
+    axes.set_ylabel("gap (%)")
+    axes.legend(title="goals of the task", loc="upper right")
+    return figure
+
+
+def measure(study):
+    """The tables, each of which becomes a CSV file of its name."""
+    plans = measure_plans(study)
+    makers = {"results": tabulate, "signs": tabulate_signs, "claims": judge_claims}
+    return {name: make(study, plans) for name, make in makers.items()}
+
+
+def main():
+    """Measure a folder, if one is given, and write the page."""
+    if len(sys.argv) > 1:
+        tables = measure(load(sys.argv[1]))
+        for name, table in tables.items():
+            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
+        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
+    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
+    page = fill_page(HERE / "README.md.jinja", **tables)
+    (HERE / "README.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

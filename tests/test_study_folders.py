@@ -1,0 +1,84 @@
+"""Our studies: each measures a small stored folder as version 1.1.0 did, and its page is current.
+
+``tests/studies/NAME`` has a results folder of a small version of the study's suite, and the tables
+that the report of version 1.1.0 (commit f7064014, before studies left the package) made of it.
+"""
+
+import importlib.util
+import lzma
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from coartic.analysis import figures, fill_page, load
+from coartic.benchmarks.suites import load_suite
+
+ROOT = Path(__file__).parents[1]
+STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
+SMALL = ROOT / "tests" / "studies"
+
+
+def program(folder):
+    spec = importlib.util.spec_from_file_location(f"study_{folder.name}", folder / "study.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def read(path):
+    return pd.read_csv(path, index_col=0)
+
+
+def comparable(table, path):
+    """A table as it is read from its file, without what a tie of resamples decides."""
+    table.to_csv(path, float_format="%.6g")
+    table = read(path)
+    ends = [name for name in table if name.endswith(("_low", "_high"))]
+    return table.drop(columns=[*ends, *({"evidence", "p_holm", "opposite_p_holm"} & {*table})])
+
+
+@pytest.fixture(scope="module", params=STUDIES, ids=lambda folder: folder.name)
+def measured(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    content = lzma.decompress((SMALL / request.param.name / "runs.sqlite.xz").read_bytes())
+    (folder / "runs.sqlite").write_bytes(content)
+    study = program(request.param)
+    return request.param, study, study.measure(load(folder))
+
+
+def test_tables_are_those_of_version_1(measured, tmp_path):
+    folder, _, tables = measured
+    expected = {path.stem: read(path) for path in (SMALL / folder.name).glob("*.csv")}
+    assert expected.keys() == tables.keys()
+    for name, table in tables.items():
+        ours = comparable(table, tmp_path / "ours.csv")
+        theirs = comparable(expected[name], tmp_path / "theirs.csv")
+        pd.testing.assert_frame_equal(ours, theirs, rtol=1e-4, atol=1e-9, check_dtype=False)
+
+
+def test_p_values_are_those_of_version_1(measured):
+    folder, _, tables = measured
+    theirs = read(SMALL / folder.name / "claims.csv")
+    for column in ("p_holm", "opposite_p_holm"):
+        assert tables["claims"][column].to_numpy() == pytest.approx(
+            theirs[column].to_numpy(), abs=0.03, nan_ok=True
+        )
+
+
+def test_draws_its_results(measured):
+    _, study, tables = measured
+    drawing = figures.picture(study.draw(tables["results"]), ".svg")
+    assert drawing.count(b"<path") > 20
+
+
+@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
+def test_page_says_what_the_tables_say(folder):
+    tables = {path.stem: read(path) for path in folder.glob("*.csv")}
+    page = fill_page(folder / "README.md.jinja", **tables)
+    assert page == (folder / "README.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
+def test_suite_has_the_name_of_its_folder(folder):
+    assert load_suite(str(folder / "suite.toml")).name == folder.name
