@@ -112,14 +112,12 @@ def perform(
     *,
     executor: Executor | None = None,
     retry_failed: bool = False,
-    redo: bool = False,
     watch: Watcher = lambda progress, what: None,
 ) -> RunReport:
     """Perform what a results folder lacks of a plan.
 
-    ``executor`` is this machine, a process for every core, by default; ``retry_failed`` and
-    ``redo`` perform anew what timed out or crashed, or everything; ``watch`` is called before
-    the first run and after each.
+    ``executor`` is this machine, a process for every core, by default; ``retry_failed`` performs
+    anew what timed out or crashed; ``watch`` is called before the first run and after each.
 
     A KeyboardInterrupt ends it and keeps what is done; so does whatever else. Called again,
     it goes on from there. Raises CoarticError where something else is in the way in the
@@ -130,7 +128,7 @@ def perform(
     with writing(folder) as store:
         store.ask(plan, current_environment(), command(), now())
         progress = Progress(plan.size, stale=store.stale())
-        missing = missing_runs(plan, store, progress, retry_failed=retry_failed, redo=redo)
+        missing = missing_runs(plan, store, progress, retry_failed=retry_failed)
         for batch in missing:
             progress.waiting[plan.cells[batch.position].method.name] += len(batch.keys)
         progress.workers = executor.workers
@@ -165,7 +163,7 @@ class Batch(NamedTuple):
 
 
 def missing_runs(
-    plan: Plan, store: Store, progress: Progress, *, retry_failed: bool, redo: bool
+    plan: Plan, store: Store, progress: Progress, *, retry_failed: bool
 ) -> list[Batch]:
     """The runs to perform, a batch for each cell; those that are there are counted. Runs of a
     method whose code is not here stay as they are."""
@@ -173,7 +171,7 @@ def missing_runs(
     for position, number, status, had_s in store.present():
         longer = had_s is not None and (plan.time_limit_s is None or plan.time_limit_s > had_s)
         failed = status in _RETRIED and (retry_failed or (status == "timeout" and longer))
-        if not (plan.cells[position].method.where and (redo or failed)):
+        if not (plan.cells[position].method.where and failed):
             there.add((position, number))
             progress.present += 1
             progress.count(status)

@@ -224,7 +224,8 @@ def show_commands(*, is_long: bool) -> None:
         ]
         for name, command, repeats in [
             ("first check, compiling", ["check", "EC4"], 1),
-            ("run quick", ["run", "quick", "--redo", "--out", results], 3),
+            ("run quick, compiling", ["run", "quick", "--out", f"{folder}/first"], 1),
+            ("run quick", ["run", "quick", "--out", results], 1),
             ("report", ["report", results], 3),
             ("verify", ["verify", results], 3),
             ("trace", ["trace", "claims", "--in", results], 5),

@@ -161,16 +161,16 @@ def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
 
 
 def test_a_stranger_beside_others(parts, tmp_path):
-    """Only the stranger's runs are made, also when all are to be made anew. Fewer runs of others
-    are said."""
+    """Only the stranger's runs are made, and none when it is repeated. Fewer runs of others are
+    said."""
     select = Selection(methods=["NAME"], method_files=[OWN])
     plan = plan_suite("paper", select=select, runs=2, trials=20)
     assert {cell.method.name for cell in plan.cells} == {"NAME"}
     out = tmp_path / "out"
-    for redo in (False, True):
+    for present, done in ((4, plan.size), (4 + plan.size, 0)):
         whole = put_beside(plan, parts[1:], out)
-        report = perform(whole, out, executor=InProcess(), redo=redo)
-        assert (report.progress.present, report.progress.done) == (4, plan.size)
+        report = perform(whole, out, executor=InProcess())
+        assert (report.progress.present, report.progress.done) == (present, done)
     study = load(out)
     theirs = study.runs[study.runs.method != "NAME"]
     assert set(theirs.result) == set(load(parts[1]).runs.result)

@@ -311,8 +311,6 @@ def test_what_is_performed_again(undisturbed, tmp_path):
     assert counts(time_limit_s=3.0) == (9, 0, 1, 1)
     assert counts(retry_failed=True) == (8, 1, 0, 0)
     assert load(tmp_path).runs.result.tolist() == undisturbed.runs.result.tolist()
-    assert counts(redo=True, time_limit_s=300.0) == (0, 9, 0, 0)
-    same_results(load(tmp_path), undisturbed)
 
 
 def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):

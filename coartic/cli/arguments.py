@@ -129,7 +129,6 @@ Scheduler = Annotated[
 RetryFailed = Annotated[
     bool, typer.Option("--retry-failed", help="Repeat runs that crashed or took too long.")
 ]
-Redo = Annotated[bool, typer.Option("--redo", help="Repeat every run.")]
 Beside = Annotated[
     list[str] | None,
     typer.Option(

@@ -36,7 +36,6 @@ def run(
     trial_budget: given.TrialBudget = None,
     scheduler: given.Scheduler = None,
     retry_failed: given.RetryFailed = False,
-    redo: given.Redo = False,
     beside: given.Beside = None,
 ) -> None:
     """Run the missing part of a suite and say what came out.
@@ -80,7 +79,7 @@ def run(
             plan = put_beside(plan, beside, out)
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = perform(
-            plan, out, executor=executor, retry_failed=retry_failed, redo=redo, watch=display.update
+            plan, out, executor=executor, retry_failed=retry_failed, watch=display.update
         )
     say(str(report))
     import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
