@@ -17,7 +17,7 @@ from coartic.method import Meter
 from coartic.motion.ticks import Trajectory, trajectory
 from coartic.runs.run import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
-from coartic.text import unknown
+from coartic.text import plain, unknown
 
 
 def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
@@ -69,10 +69,21 @@ def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:
 
 
 def perform_again(run: Run, registered: Registry) -> Run:
-    """A stored run, performed anew by the code that is here now."""
+    """A stored run, performed anew by the code that is here now.
+
+    Raises CoarticError where its method is not here, or no longer takes its parameters.
+    """
     if run.setting.method not in registered:
         raise CoarticError(unknown("method", run.setting.method, registered))
     method = registered[run.setting.method]
+    try:
+        method.complete(run.setting.parameters)
+    except CoarticError as error:
+        version = plain(str(run.environment.get("coartic")), 20)
+        raise CoarticError(
+            f"run {run.key.id} cannot be performed here: {error}. Version {version} of coartic "
+            "made it."
+        ) from None
     setting = replace(run.setting, code=method.code, told=method.told)
     return next(perform_in_order([Job(setting, method, (run.key,), run.time_limit_s)]))
 

@@ -14,6 +14,8 @@ from coartic.analysis.verify import check_runs
 from coartic.benchmarks import template
 from coartic.benchmarks.beside import put_beside
 from coartic.benchmarks.planning import Selection, plan_suite
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.reproduce import perform_again
 from coartic.learner.method import DualProcessParameters
 from coartic.runs.plan import Setting
 from coartic.runs.store import RUNS_FILE, open_store
@@ -66,6 +68,21 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     put_beside(plan, [then], tmp_path / "out")
     with open_store(tmp_path / "out") as store:
         assert {*store.ids("")} == {*load(now).runs.run_id}
+
+
+def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
+    then = edited(
+        now,
+        tmp_path / "then",
+        *("environments SET content = json_set(content, '$.coartic', '1.1.0')", *OF_1_1),
+        "settings SET parameters = json_set(parameters, '$.timing', 'fixed')",
+    )
+    with open_store(then) as store:
+        run = store.run(store.ids("")[0])
+    with pytest.raises(
+        CoarticError, match=r"timing is an unknown key.* Version 1\.1\.0 of coartic"
+    ):
+        perform_again(run, built_in())
 
 
 def test_ids_begin_as_in_1_1():
