@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from coartic.analysis import fill_page
+
 DOCS = Path(__file__).parent.parent / "docs"
 _SPEC = importlib.util.spec_from_file_location("make_findings", DOCS / "make_findings.py")
 make_findings = importlib.util.module_from_spec(_SPEC)
@@ -18,6 +20,9 @@ def test_pages_are_their_templates_filled_from_the_stored_tables():
         assert text == (DOCS / page).read_text(encoding="utf-8"), page
 
 
-def test_a_sentence_that_no_longer_holds_is_refused():
+def test_a_sentence_that_no_longer_holds_is_refused(tmp_path):
+    template = tmp_path / "page.md.jinja"
+    template.write_text('{{ expect(gap < 1, "CMA-ES is nearer") }}It is nearer.')
+    assert fill_page(template, gap=0.5) == "It is nearer."
     with pytest.raises(ValueError, match="CMA-ES is nearer"):
-        make_findings.expect(1 > 2, "CMA-ES is nearer")
+        fill_page(template, gap=2)
