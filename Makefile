@@ -1,19 +1,20 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
 #   make benchmark   the paper's experiments, all methods beside them, and the report
 #   make test        the test suite
-# make benchmark FULL=1 adds the ablations, the moved goals and the search for the optima.
-# make docs builds the site; make findings makes the numbers in it anew; make paper prints the
-# two articles.
+# make benchmark FULL=1 adds the ablations and the search for the optima. make docs builds the
+# site; make findings and make studies make the numbers in it anew; make paper prints the two
+# articles.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
 FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
-SUITES := comparison $(if $(FULL),ablations locus optimum)
-STORED := comparison ablations locus families horizon fourteen practice dose resist human
+SUITES := comparison $(if $(FULL),ablations optimum)
+STORED := comparison ablations families
+STUDIES ?= $(notdir $(wildcard studies/[a-z]*))
 
-.PHONY: benchmark test check format docs findings paper speed release-check setup clean
+.PHONY: benchmark test check format docs findings studies paper speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -51,14 +52,25 @@ speed: $(READY)
 release-check: $(READY)
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest tests/test_packages.py
 
-# The suites behind docs/findings.md, their reports, and the pages made from them: over three
-# hours.
+# The suites behind docs/findings.md, their reports, and the pages made from them.
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
 	$(BIN)/python docs/make_findings.py --from $(OUT)
+
+# Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families and
+# methods, then its tables, figure and page. All of them take over two hours.
+studies: $(READY)
+	@for study in $(STUDIES); do \
+	  files=""; \
+	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
+	  for file in studies/$$study/policy.py; do [ -e $$file ] && files="$$files --method-file $$file"; done; \
+	  $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files && \
+	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
+	done
+	$(BIN)/python docs/make_findings.py
 
 # The two articles, docs/paper.md and docs/ahead.md, as PDF; it needs Chromium.
 paper: $(READY)

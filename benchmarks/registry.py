@@ -42,7 +42,6 @@ MODULES = (
     "coartic.baselines.posture_based",
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
-    "coartic.baselines.practice",
     "coartic.baselines.optimum",
 )
 """Where this project's methods are, each in its module's ``METHODS``."""

@@ -1,8 +1,9 @@
 """Writes the pages whose numbers come from stored results: ``python docs/make_findings.py``.
 
-``docs/stored`` keeps tables and figures of reports, a folder for each suite. ``*.md.jinja`` beside
-this file are filled in from them and from nothing else. ``make findings`` runs the suites and
-their reports, copies the tables with ``--from results``, and fills in the pages.
+``docs/stored`` keeps tables and figures of reports, a folder for each suite; ``studies`` has those
+of studies. ``*.md.jinja`` beside this file are filled in from them and from nothing else.
+``make findings`` runs the suites and their reports, copies the tables with ``--from results``, and
+fills in the pages.
 """
 
 from __future__ import annotations
@@ -17,13 +18,12 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
+from coartic.analysis import fill_page, mean_beyond
 from coartic.analysis.claims.register import CLAIMS, Verdict
 from coartic.analysis.methods import name_of
-from coartic.analysis.pages import fill_page
-from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.topics.random_tasks import RESAMPLES_OF_STUDIES
 
 DOCS = Path(__file__).parent
+STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
 ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
@@ -32,14 +32,7 @@ KEPT = {
         "postures published ranking runtimes recruitment learning-curves",
     ),
     "ablations": ("methods signatures claims", ""),
-    "locus": ("signatures", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
-    "horizon": ("horizon horizon-signs claims", "horizon"),
-    "fourteen": ("fourteen gains claims", "fourteen"),
-    "practice": ("practice claims", "practice"),
-    "dose": ("dose claims", "dose"),
-    "resist": ("resist claims", "resist"),
-    "human": ("human human-effects", "human"),
 }
 """Tables and figures that are kept of each suite's report."""
 
@@ -58,8 +51,9 @@ class Row:
 
 
 def table(suite: str, name: str) -> pd.DataFrame:
-    """A stored table, with its rows by name."""
-    return pd.read_csv(STORED / suite / f"{name}.csv", index_col="row")
+    """A stored table of a suite or a study, with its rows by name."""
+    folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
+    return pd.read_csv(folder / f"{name}.csv", index_col=0)
 
 
 def row(suite: str, name: str, which: str) -> Row:
@@ -112,7 +106,7 @@ def p_of_shares(values: Row, printed_runs: int) -> float:
 
 def p_above(values: pd.Series, bound: float) -> float:
     """One-tailed p that a mean over tasks is above a bound, as claims test it, uncorrected."""
-    return bootstrap_test(values, bound, resamples=RESAMPLES_OF_STUDIES).p
+    return mean_beyond("{}", values, bound).p
 
 
 def filled_pages() -> dict[str, str]:

@@ -162,7 +162,6 @@ def signatures() -> Iterator[str]:
     kinds = {
         "One method's runs on one task": of_kind("runs"),
         "One goal before two different successors": of_kind("contexts"),
-        "A goal beside one that differs between tasks": of_kind("moved goals"),
     }
     for title, kind in kinds.items():
         yield from (f"**{title}**", "")
@@ -176,12 +175,12 @@ def claims() -> Iterator[str]:
     from coartic.analysis.claims.register import CLAIMS
 
     def goals(claim: Any) -> str:
-        if claim.on_random_tasks:
+        if claim.families:
             return "random tasks"
         return "reconstructed †" if claim.fitted else "printed"
 
     def source(claim: Any) -> str:
-        return f"{claim.place}: “{claim.quote}”" if claim.place else "nothing: it is our claim"
+        return f"{claim.place}: “{claim.quote}”"
 
     def rule(claim: Any) -> str:
         text = words_of_test(claim)

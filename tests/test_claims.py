@@ -57,7 +57,8 @@ def judged(monkeypatch):
         claims = []
         for number, (finding, fields) in enumerate(planted):
             given = {"id": f"planted-{number}", "place": "p"} | fields
-            claims.append(Claim(section="s", statement="It is so.", **given))
+            words = {"section": "s", "statement": "It is so.", "place": "Results", "quote": "so"}
+            claims.append(Claim(**(words | given)))
 
             def decide(data, finding=finding):
                 if finding is None:
@@ -168,13 +169,12 @@ def test_groups_are_corrected_apart(judged):
     groups = {
         "beside": {"beside": True},
         "families": {"families": True, "beside": True},
-        "ours": {"place": ""},
     }
     others = [(found(True, 0.0001), fields) for fields in groups.values() for _ in range(4)]
     entries = judged(*papers, *others)
     adjusted = [entry.adjusted_p for entry in entries]
     assert adjusted[:2] == pytest.approx([0.04, 0.003])
-    assert adjusted[3:] == pytest.approx([0.0004] * 12)
+    assert adjusted[3:] == pytest.approx([0.0004] * 8)
     assert [entry.claim.group for entry in entries[3::4]] == list(groups)
 
 
@@ -731,7 +731,7 @@ def study(tmp_path_factory):
 
 def test_the_register_on_runs(study):
     entries = {entry.claim.id: entry for entry in judge.judgements(study)}
-    assert list(entries) == [claim.id for claim in CLAIMS.values() if not claim.on_random_tasks]
+    assert list(entries) == [claim.id for claim in CLAIMS.values() if not claim.families]
     sacrificed = entries["first-movement-sacrificed"]
     assert "(random guesses)" in sacrificed.finding.evidence
     assert len(sacrificed.run_ids) == 24

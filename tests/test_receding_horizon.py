@@ -12,7 +12,7 @@ from coartic.baselines.optimum import Optimum
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.strategies import solve, tiny_task
-from tests.support.suites import KNOWN
+from tests.support.suites import KNOWN, ROOT
 
 FEW = {"graphs": 1, "chains": 1}
 # With four links, for which kernels are compiled anyway, and at most three goals.
@@ -118,7 +118,7 @@ def test_the_shortest_starts_are_polished():
 
 
 def test_the_suite_has_test_instances_of_all_families():
-    cells = select_cells(load_suite("horizon"), KNOWN)
+    cells = select_cells(load_suite(str(ROOT / "studies" / "horizon" / "suite.toml")), KNOWN)
     tasks = {cell.task.name: cell.task for cell in cells}
     assert len(tasks) >= 200
     assert {task.split for task in tasks.values()} == {"test"}

@@ -14,7 +14,6 @@ from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context, subtasks
 from coartic.analysis.signatures.between import NOWHERE, TwoContexts
 from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
-from coartic.analysis.signatures.locus import locus_slopes, moved_goals, slope_length
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.register import REGISTER
 from coartic.analysis.signatures.signs import SIGNS
@@ -150,24 +149,6 @@ def test_dependence_below_a_bound_by_brute_force():
     assert p == pytest.approx(np.mean(reached), abs=0.02)
 
 
-def test_slopes_count_where_they_exceed_the_placebos():
-    """Three places of a goal: the contrast of their means is the slope, and what is tested."""
-    x = np.array([-1.0, 0.0, 1.0])
-    contrast = x / (x**2).sum()
-    noise = rng(8).standard_normal((6, 12, 2)) * 0.1
-
-    def follows(slope, samples):
-        return [q + slope * place for q, place in zip(samples, x, strict=True)]
-
-    steep, flat = follows(0.5, noise[:3]), follows(0.2, noise[3:])
-    assert context.beyond_p(steep, flat, rng(), contrast=contrast) < 0.001
-    assert context.beyond_p(flat, steep, rng(), contrast=contrast) == 1.0
-    assert context.beyond_p(follows(0.2, noise[:3]), flat, rng(), contrast=contrast) > 0.05
-    # What is common to all places is no slope.
-    moved = [q + 3.0 for q in flat]
-    assert context.beyond_p(moved, flat, rng(), contrast=contrast) > 0.05
-
-
 def test_pairs_of_contexts():
     tasks = {name: load_task(name) for name in ("ascending", "descending", "two-armed-1")}
     assert context_pairs(tasks) == [("ascending", "descending", 1)]
@@ -183,7 +164,7 @@ def test_pairs_of_contexts():
 
 
 def test_permutations_by_brute_force():
-    """Every division of seven runs, and every order of four means, counted one by one."""
+    """Every division of seven runs, counted one by one."""
     draw = rng(11)
     first, second = draw.standard_normal((3, 2)), draw.standard_normal((4, 2)) + 0.8
     pool = np.concatenate([first, second])
@@ -196,14 +177,6 @@ def test_permutations_by_brute_force():
     drawn = permutation_p(first, second, rng(), resamples=34)
     assert drawn == pytest.approx(count / 35, abs=0.25)
     assert drawn * 35 == pytest.approx(round(drawn * 35))  # the observed one counts
-    x, q = np.array([0.0, 1.0, 3.0, 4.0]), draw.standard_normal((4, 2))
-    norms = [
-        math.hypot(*(np.polyfit(x, q[list(order), k], 1)[0] for k in range(2)))
-        for order in itertools.permutations(range(4))
-    ]
-    norm = slope_length(q, x, rng())
-    assert norm.value == pytest.approx(norms[0])
-    assert norm.p == pytest.approx(np.mean(np.array(norms) >= norms[0] - 1e-12))
 
 
 # What the hand feels
@@ -378,52 +351,6 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     assert abs(without - now) > 0.05
 
 
-# Locus
-
-
-def family_of(positions, goal=2, coordinate=1):
-    tasks = {}
-    for k, position in enumerate(positions):
-        goals = [[5.0, 1.0], [5.0, 2.0], [5.0, 3.0]]
-        goals[goal - 1][coordinate] = position
-        tasks[f"v{k}"] = tiny_task(name=f"v{k}", goals=goals, initial_hands="RRR")
-    return tasks
-
-
-def test_families():
-    tasks = family_of([1.5, 2.0, 2.5, 3.5])
-    ((moving, positions),) = moved_goals({**tasks, "ascending": load_task("ascending")})
-    assert moving == 2
-    assert positions == pytest.approx({"v0": -0.875, "v1": -0.375, "v2": 0.125, "v3": 1.125})
-    assert moved_goals(family_of([1.5, 2.0])) == []
-    ((moving, across),) = moved_goals(family_of([4.0, 3.0, 5.0], goal=3, coordinate=0))
-    assert moving == 3
-    assert list(across.values()) == pytest.approx([0, -1, 1], abs=1e-12)
-
-
-def test_two_families_share_their_common_task():
-    tasks = family_of([1.5, 2.0, 2.5]) | {
-        f"w{k}": task for k, task in enumerate(family_of([3.5, 4.0], goal=3).values())
-    }
-    assert {(moving, tuple(positions)) for moving, positions in moved_goals(tasks)} == {
-        (2, ("v0", "v1", "v2")),
-        (3, ("v1", "w0", "w1")),
-    }
-
-
-def test_locus_slopes_by_hand():
-    """Means 0, 1, 5 at -1, 0, 1: slope 2.5, residuals ½, -1, ½, one degree of freedom."""
-    q = np.array([[-1.0], [1.0], [1.0], [5.0], [5.0]])
-    (slope,) = locus_slopes(q, [-1, -1, 0, 1, 1])
-    half = 12.7062047 * math.sqrt(1.5 / 2)
-    assert (slope.value, slope.low, slope.high) == pytest.approx((2.5, 2.5 - half, 2.5 + half))
-    # t = 2.5 / √(1.5 / 2), one degree of freedom: Cauchy's distribution, both tails.
-    assert slope.p == pytest.approx(1 - 2 * math.atan(2.5 / math.sqrt(0.75)) / math.pi)
-    # However many runs there are of each task, the evidence is that of three positions.
-    many = np.repeat(q, 50, axis=0), np.repeat([-1, -1, 0, 1, 1], 50)
-    assert repr(locus_slopes(*many)[0]) == repr(slope)
-
-
 # Studies
 
 
@@ -467,7 +394,7 @@ def test_frame_of_two_contexts():
     assert math.isnan(one("corrective", "total against the same hands").low)  # one run
     shown = frame.groupby("method", sort=False).signature.unique().map(list).to_dict()
     assert "failed" not in shown
-    assert shown[EC1] == [  # nothing of two hands, and no goal that moves
+    assert shown[EC1] == [  # nothing of two hands
         "first subtask against the same hands", "total against the same hands",
         "context distance", "context dependence", "motor-equivalent part",
         "non-motor-equivalent part",
@@ -490,39 +417,6 @@ def test_frame_of_two_contexts():
         ("other", "non-motor-equivalent part"),
     ):
         assert shown[column] == one(EC1, signature).value
-
-
-def test_frame_of_a_family():
-    """The base is lower at goals 1 and 3 by a tenth of goal 2's height: slopes are known."""
-    cells = []
-    for task in family_of([1.5, 2.0, 2.5]).values():
-        height = task.goals[1][1]
-        lower = 0.02 * (height - 2.0)
-        targets = [posture(0.5, 0.85 + lower), posture(0.5, height - 0.1), posture(0.5, 2.95)]
-        cells.append(cell_of(task, "planner", *[planned(*targets, hands="RRR")] * 2))
-    frame = signature_values(study_with(*cells))
-    slopes = frame[frame.signature == "locus slope"].set_index(["goal", "hand", "joint"])
-    assert set(slopes.moving) == {2}
-    norms = frame[frame.signature == "locus slope norm"].set_index(["goal", "hand"])
-    for goal in (1, 3):
-        reached = [cell.runs[0].execution.configurations[goal - 1, 1] for cell in cells]
-        of_base = slopes.loc[goal, "right", "base_y"]
-        assert of_base.value == pytest.approx(reached[2] - reached[0])  # over length 1
-        assert (of_base.n, of_base.unit) == (6, "1")
-        every = slopes.value.loc[goal, "right"]
-        assert norms.value[goal, "right"] == pytest.approx(np.linalg.norm(every))
-        assert norms.p[goal, "right"] in (pytest.approx(k / 3) for k in (1, 2, 3))  # of 6 orders
-    assert slopes.value[1, "right", "base_y"] > 0.001
-    assert slopes["where"].xs("base_y", level="joint").tolist() == [
-        "goal 1, anticipatory of goal 2, right hand, base_y",
-        "goal 3, carry-over of goal 2, right hand, base_y",
-    ]
-    assert "context distance" not in set(frame.signature)
-    steepest = tables.slopes(study_with(*cells))
-    assert steepest.kind.tolist() == ["anticipatory", "carry-over"]
-    for goal, joint, slope in zip(steepest.goal, steepest.joint, steepest.slope, strict=True):
-        of_joint = slopes.value.loc[goal, "right"]
-        assert (joint, slope) == (of_joint.abs().idxmax(), of_joint[joint])
 
 
 def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
@@ -583,26 +477,6 @@ def test_p_values_are_corrected_over_the_contexts_of_a_method():
     ]
     adjusted = {name: row["p_holm"] for name, row in tables.adjust_p(rows)}
     assert adjusted == pytest.approx({"a1": 0.02, "b1": 0.04, "a2": 0.03})
-
-
-def test_slopes_beside_the_placebo():
-    """The learner follows a moved goal by 0.9 of its way, the placebo by 0.2."""
-    tasks, cells = family_of([1.5, 2.0, 2.5]), []
-    for label, slope in ((EC1, 0.9), (PLACEBO, 0.2)):
-        for number, task in enumerate(tasks.values()):
-            noise = 0.02 * rng(number).standard_normal(9)
-            at = slope * (task.goals[1][1] - 2.0)
-            cells.append(posed(task, label, [posture(each) for each in noise + at]))
-
-    def p_of(label, cells):
-        return placebo.slope_beyond_p(study_with(*cells), label, "v0", 1, 2, "right")
-
-    assert p_of(EC1, cells) < 0.01
-    exchanged = [replace(cell, method={EC1: PLACEBO, PLACEBO: EC1}[cell.method]) for cell in cells]
-    assert p_of(EC1, exchanged) == 1.0
-    assert math.isnan(p_of(PLACEBO, cells))
-    assert math.isnan(p_of(EC1, [*cells[:-1], replace(cells[-1], runs=cells[-1].runs[:1])]))
-    assert math.isnan(p_of(EC1, cells[:3]))
 
 
 def test_signs_beside_the_placebo():

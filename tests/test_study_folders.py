@@ -4,6 +4,7 @@
 that the report of version 1.1.0 (commit f7064014, before studies left the package) made of it.
 """
 
+import hashlib
 import importlib.util
 import lzma
 from pathlib import Path
@@ -13,10 +14,25 @@ import pytest
 
 from coartic.analysis import figures, fill_page, load
 from coartic.benchmarks.suites import load_suite
+from coartic.tasks.families import instance_of, own_families, task_text
+from coartic.tasks.task import address_of
 
 ROOT = Path(__file__).parents[1]
 STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
 SMALL = ROOT / "tests" / "studies"
+INSTANCES = {
+    "fourteen-one/v1/i017": "bad507514407bc5c",
+    "fourteen-two/v1/i017": "b39b17fca94fc804",
+    "eight/v1/i017": "7dd1266a67c6c0ae",
+    "eight/v1/d003": "fe32db1ce229687c",
+    "eight/v1/2027-041": "301760ae38388046",
+    "neighbours/v1/i017": "0e79b9c21b5c13a5",
+    "neighbours/v1/d003": "743e924318e9ee41",
+    "neighbours/v1/2027-041": "18c65bdef8d0a624",
+    "seven-one/v1/i017": "a5e8d899533de3da",
+    "seven-two/v1/i017": "66b839fbe0b33d6d",
+}
+"""Hashes of instances of the studies' own families, as version 1.1.0 drew them."""
 
 
 def program(folder):
@@ -77,6 +93,16 @@ def test_page_says_what_the_tables_say(folder):
     tables = {path.stem: read(path) for path in folder.glob("*.csv")}
     page = fill_page(folder / "README.md.jinja", **tables)
     assert page == (folder / "README.md").read_text("utf-8")
+
+
+def test_families_of_studies_are_what_they_were():
+    families = own_families(sorted((ROOT / "studies").glob("*/*.v[0-9]*.toml")))
+    drawn = {name: instance_of(families[address_of(name).family], address_of(name))
+             for name in INSTANCES}  # fmt: skip
+    texts = {name: task_text(task).encode() for name, task in drawn.items()}
+    assert {
+        name: hashlib.sha256(text).hexdigest()[:16] for name, text in texts.items()
+    } == INSTANCES
 
 
 @pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)

@@ -10,7 +10,7 @@
 
 What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
 groups of claims: those on the paper's own seven cells, those that take other runs beside them,
-those on families of random tasks, and our own on one suite. A claim that a folder cannot test
+and those on families of random tasks. A claim that a folder cannot test
 counts in its group all the same, so that what is decided stays decided whatever else is run.
 """
 
@@ -23,14 +23,9 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 # These register the claims that they judge.
-import coartic.analysis.topics.dose
 import coartic.analysis.topics.families.claims
-import coartic.analysis.topics.fourteen
-import coartic.analysis.topics.horizon
 import coartic.analysis.topics.paper.claims
-import coartic.analysis.topics.paper.coarticulation
-import coartic.analysis.topics.practice
-import coartic.analysis.topics.resist  # noqa: F401
+import coartic.analysis.topics.paper.coarticulation  # noqa: F401
 from coartic.analysis.claims.data import JUDGES, TESTS, Data, MissingError
 from coartic.analysis.claims.register import CLAIMS, MARGINS, Claim, Finding, Group, Verdict
 from coartic.analysis.statistics.hypotheses import holm
@@ -66,11 +61,9 @@ def words_of_test(claim: Claim) -> str:
 
 @cached
 def judgements(study: Study) -> list[Judgement]:
-    """The claims on the folder's suite, judged and corrected; without any, those on its tasks."""
-    of_suite = [claim for claim in CLAIMS.values() if claim.suite == study.suite]
+    """The claims on the folder's tasks, the paper's or random ones, judged and corrected."""
     drawn = {task.family is not None for task in study.tasks.values()} or {False}
-    of_tasks = [c for c in CLAIMS.values() if not c.suite and c.on_random_tasks in drawn]
-    return judge_claims(study, of_suite or of_tasks)
+    return judge_claims(study, [claim for claim in CLAIMS.values() if claim.families in drawn])
 
 
 def judge_claims(study: Study, claims: Iterable[Claim]) -> list[Judgement]:

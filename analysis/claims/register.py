@@ -17,9 +17,9 @@ HISTORY: dict[str, dict[str, Any]] = _REGISTER.pop("margins")
 MARGINS: dict[str, float] = {name: float(row["value"]) for name, row in HISTORY.items()}
 
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
-Group = Literal["paper", "beside", "families", "ours"]
+Group = Literal["paper", "beside", "families"]
 """Which claims are corrected together: the paper's on its own cells, with runs beside them, on
-families of random tasks; claims of our own, those on one suite."""
+families of random tasks."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Finding:
 
 
 class Claim(FileData):
-    """One statement, of the paper where it has a place."""
+    """One statement of the paper."""
 
     id: str
     section: str
@@ -81,23 +81,15 @@ class Claim(FileData):
     families: bool = False
     short: str = ""
     """In a few words, for the three claims that carry the paper's point."""
-    suite: str = ""
-    place: str = ""
-    quote: str = ""
+    place: str
+    quote: str
     figure: str = ""
-
-    @property
-    def on_random_tasks(self) -> bool:
-        """Whether it is about families of random tasks rather than the paper's tasks."""
-        return self.families or bool(self.suite)
 
     @property
     def group(self) -> Group | None:
         """Which claims it is corrected with; None for what is counted exactly."""
         if self.exact:
             return None
-        if not self.place:
-            return "ours"
         if self.families:
             return "families"
         return "beside" if self.beside else "paper"

@@ -19,7 +19,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
-from numpy.typing import ArrayLike
 
 from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, is_built_in, look_alike
 from coartic.analysis.statistics import estimates
@@ -192,17 +191,6 @@ def means(
             ends = scale * rows[f"{y}_low"], scale * rows[f"{y}_high"]
             axes.vlines(places, *ends, looks["color"], linewidth=bars)
         axes.plot(places, scale * rows[y], **looks)
-
-
-def means_at(
-    axes: Axes, places: ArrayLike, rows: pd.DataFrame, column: str, *, scale: float = 1.0,
-    bars: float | None = 0.8, **line: Any,
-) -> None:  # fmt: skip
-    """Means of a table at some places, with their intervals."""
-    if f"{column}_low" in rows:
-        ends = scale * rows[f"{column}_low"], scale * rows[f"{column}_high"]
-        axes.vlines(places, *ends, line["color"], linewidth=bars)
-    axes.plot(places, scale * rows[column], **{"marker": "o", "markersize": 3, **line})
 
 
 def tip(artist: Artist, text: str) -> None:

@@ -26,7 +26,7 @@ from coartic.analysis.report.render import TONES, csv_table, html_table, latex_t
 from coartic.analysis.report.text import answers, templates
 from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.topics.paper.sentences import claims_shown, mostly_undecided
+from coartic.analysis.topics.paper.sentences import mostly_undecided, papers_claims
 from coartic.analysis.words import NONE, number
 from coartic.files import check_folder, check_inside, publish
 from coartic.play.page import text_of
@@ -202,7 +202,7 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them, by verdict."""
     order = get_args(Verdict)
     rows = TABLES["claims"](study).reset_index(names="id")
-    entries = claims_shown(study)
+    entries = papers_claims(study)
     if entries and mostly_undecided(entries):  # they lack their runs
         rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]
     return [

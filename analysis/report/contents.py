@@ -13,18 +13,12 @@ from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.section import Section
 from coartic.analysis.table import TABLES
 from coartic.analysis.topics import (
-    dose,
-    fourteen,
-    horizon,
-    practice,
-    resist,
     settings,
     tasks,
 )
 from coartic.analysis.topics.coarticulation import sentences as coarticulation
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.families import sentences as families
-from coartic.analysis.topics.human import findings as human
 from coartic.analysis.topics.paper import sentences as paper
 
 for _module in walk_packages(topics.__path__, f"{topics.__name__}."):
@@ -35,7 +29,6 @@ __all__ = ["FIGURES", "SECTIONS", "TABLES"]
 SECTIONS: tuple[Section, ...] = (
     settings.SETTINGS,
     coarticulation.COARTICULATION,
-    human.HUMAN,
     paper.PUBLISHED,
     paper.CLAIMS,
     comparison.NEAREST,
@@ -43,14 +36,8 @@ SECTIONS: tuple[Section, ...] = (
     paper.HANDS,
     comparison.LEARNING,
     coarticulation.SIGNATURES,
-    coarticulation.SLOPES,
     families.FAMILIES,
     families.EXPLORATION,
-    horizon.HORIZON,
-    fourteen.FOURTEEN,
-    practice.PRACTICE,
-    dose.DOSE,
-    resist.RESIST,
     families.SIGNS,
     tasks.TASKS,
     comparison.METHODS,

@@ -23,7 +23,6 @@ ANSWERS: tuple[tuple[str, str, dict[str, Callable[[Study], str]]], ...] = (
         "Coarticulation",
         {
             "coarticulation": coarticulation.answer_contexts,
-            "slopes": coarticulation.answer_slopes,
             "learning": comparison.answer_gain,
         },
     ),

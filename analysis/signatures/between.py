@@ -1,13 +1,11 @@
-"""What signatures between tasks are of: one goal in two contexts, or beside a goal that moves."""
+"""What signatures between tasks are of: one goal in two contexts."""
 
 from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +17,6 @@ from coartic.analysis.signatures.context import (
     distance_of_means,
     permutation_p,
 )
-from coartic.analysis.signatures.locus import MovedGoal
 from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence
 from coartic.analysis.statistics.estimates import SEED, Estimate
 from coartic.analysis.trajectories import Trajectories, postures
@@ -35,20 +32,12 @@ class Place(NamedTuple):
     hand: str = ""
     against: str = ""
     """Task that is the other context."""
-    moving: int | None = None
-    """Number of the goal that moves between tasks."""
-    joint: str = ""
 
     def __str__(self) -> str:
         """In words: ``goal 1, right hand, against descending``."""
         parts = [] if self.goal is None else [f"goal {self.goal}"]
-        if self.moving is not None:
-            anticipatory = self.goal is None or self.goal < self.moving
-            kind = "anticipatory" if anticipatory else "carry-over"
-            parts.append(f"{kind} of goal {self.moving}")
         parts += [f"{self.hand} hand"] if self.hand else []
         parts += [f"against {self.against}"] if self.against else []
-        parts += [self.joint] if self.joint else []
         return ", ".join(parts)
 
 
@@ -168,30 +157,3 @@ class TwoContexts:
     def value(self, value: float, p: float = math.nan) -> Value:
         """A value of these contexts with its test."""
         return Value(self.place, Estimate(value, p=p), self.n)
-
-
-@dataclass(frozen=True)
-class BesideMovedGoal:
-    """Postures of one method's runs at a goal beside one that differs between tasks."""
-
-    task: Task
-    """Any of the tasks."""
-    place: Place
-    """The goal, the hand and the goal that moves."""
-    configurations: Array
-    """Postures, a row a run, ``(n, dof)``, length unit and rad."""
-    positions: tuple[float, ...]
-    """Position of the moving goal in each run's task, length unit."""
-
-    @classmethod
-    def of(
-        cls, moved: MovedGoal, cells: Mapping[str, Trajectories], goal: int, hand: Hand
-    ) -> BesideMovedGoal | None:
-        """What one method did at a goal with a hand, by task; None where no run hits it so."""
-        runs = {name: cell.with_hand(hand, goal) for name, cell in cells.items()}
-        positions = tuple(moved.positions[name] for name, of_task in runs.items() for _ in of_task)
-        if not positions:
-            return None
-        configurations = postures(tuple(chain.from_iterable(runs.values())), goal)
-        task = next(iter(cells.values())).task
-        return cls(task, Place(goal, hand, moving=moved.goal), configurations, positions)

@@ -5,8 +5,7 @@ documentation then have it. By its kind it is of
 
 - ``runs`` of one method on one task, and returns a value for each run, ``(n,)``, or for each run
   and goal, ``(n, G)``; NaN where a run has none, booleans for shares of runs;
-- ``contexts``: one goal before two different successors, and returns a :class:`~.between.Value`;
-- ``moved goals``: a goal beside one that differs between tasks, and returns a list of values.
+- ``contexts``: one goal before two different successors, and returns a :class:`~.between.Value`.
 
 Rows of the tables have the order of this file. In formulas, run i hits goal g at configuration
 q(i, g) after t(i, g) ticks since the goal before; q(i, 0) is the start; c(i, g) are the ticks of
@@ -22,13 +21,12 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from coartic.analysis.signatures import subtasks
-from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts, Value, rng_of
-from coartic.analysis.signatures.locus import locus_slopes, slope_length
+from coartic.analysis.signatures.between import TwoContexts, Value
 from coartic.analysis.signatures.manifold import subspaces
 from coartic.analysis.trajectories import Trajectories
 from coartic.robot import Array
 
-Scope = Literal["runs", "contexts", "moved goals"]
+Scope = Literal["runs", "contexts"]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -265,44 +263,3 @@ def motor_equivalent_part(contexts: TwoContexts) -> Value:
 def other_part(contexts: TwoContexts) -> Value:
     """‖Mᵀ(mean q₁ - mean q₂)‖ / √d, M (k, d) an orthonormal basis of the Jacobian's row space."""
     return part_of_the_difference(contexts, "non-motor-equivalent part", 1)
-
-
-# A goal beside one that differs between tasks
-
-
-@signature(
-    "locus slope",
-    "moved goals",
-    unit="rad per length unit",
-    extent="rad or length unit per length unit, by joint",
-    meaning="Slope of the mean posture at a goal against the position of a neighbouring goal that "
-    "differs between tasks: the next goal (anticipatory) or the previous one (carry-over). The "
-    "name is that of locus equations in speech (Lindblom 1963; Sussman, McCaffrey & Matthews "
-    "1991). Whether such slopes measure coarticulation is disputed there: no articulatory measure "
-    "supported it (Löfqvist 1999), and they are said to encode resistance to it directly "
-    "(Iskarous, Fowler & Whalen 2010). Those are of frequencies; these are of postures.",
-    sources=("sussman1991", "lofqvist1999", "iskarous2010", "recasens2016"),
-)
-def slope_by_joint(beside: BesideMovedGoal) -> list[Value]:
-    """b = Σ (x - mean x)(m(x) - mean m) / Σ (x - mean x)², m(x) the mean posture at position x."""
-    slopes = locus_slopes(beside.configurations, beside.positions)
-    place, n = beside.place, len(beside.positions)
-    return [
-        Value(place._replace(joint=joint), slope, n, unit="1" if joint[:4] == "base" else None)
-        for joint, slope in zip(beside.task.robot.joint_names, slopes, strict=True)
-    ]
-
-
-@signature(
-    "locus slope norm",
-    "moved goals",
-    unit="length unit, rad, per length unit",
-    extent="mixed, per length unit, ≥ 0",
-    meaning="Length of the vector of all joints' slopes, with a permutation test over positions. "
-    "With k positions (up to seven) p is at least 2/k!: 0.0028 with six.",
-)
-def norm_of_slopes(beside: BesideMovedGoal) -> list[Value]:
-    """‖b‖ over all joints."""
-    rng = rng_of("locus slope norm", beside.place)
-    norm = slope_length(beside.configurations, beside.positions, rng)
-    return [Value(beside.place, norm, len(beside.positions))]

@@ -23,6 +23,7 @@ from coartic.analysis.study import Study, load
 from coartic.files import write_atomically
 from coartic.runs.plan import SEARCH
 from coartic.runs.store import open_store
+from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import BASE, BEST_KNOWN, essence
 from coartic.tasks.task import address_of
 from coartic.text import one_line
@@ -86,7 +87,9 @@ def better(study: Study, rows: dict[str, dict[str, Any]], solutions: dict[str, A
     with open_store(study.folder) as store:
         for name, runs in solved.groupby("task"):
             address = address_of(str(name))
-            if address is None or address.split != "test" or address.number >= MOST:
+            if address is None or address.family not in shipped_families():
+                continue
+            if address.split != "test" or address.number >= MOST:
                 continue
             task, best = study.tasks[str(name)], runs.loc[runs.reward.astype(int).idxmax()]
             of_search = searches[searches.task == name]

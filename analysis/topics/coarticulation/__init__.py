@@ -1,1 +1,1 @@
-"""How movements depend on the goals around them: contexts, moved goals, signatures."""
+"""How movements depend on the goals around them: contexts, signatures."""

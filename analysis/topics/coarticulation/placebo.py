@@ -9,19 +9,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from coartic.analysis.methods import PLACEBO
-from coartic.analysis.signatures.between import BesideMovedGoal, TwoContexts
-from coartic.analysis.signatures.context import beyond_p, smallest_p
-from coartic.analysis.signatures.locus import moved_goals
+from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.context import smallest_p
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import LEVEL, SEED
+from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.values import shared_goal
 from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
-from coartic.robot import Hand
 
 
 def selects(study: Study, label: str) -> bool:
@@ -53,33 +49,6 @@ def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
         return math.nan
     placebo = placebo_of(study, contexts)
     return math.nan if placebo is None else contexts.p_beyond(placebo)
-
-
-def slope_beyond_p(
-    study: Study, label: str, task: str, goal: int, moving: int, hand: Hand
-) -> float:
-    """P of the test that postures at a goal follow a moving one more than the placebo's do.
-
-    ``task``: one of those that differ in goal ``moving``. NaN for a method that selects nothing,
-    and without runs of the placebo at all places.
-    """
-    if not selects(study, label):
-        return math.nan
-    (moved,) = (
-        each for each in moved_goals(study.tasks) if each.goal == moving and task in each.positions
-    )
-    places, groups = np.unique(list(moved.positions.values())), []
-    for method in (label, PLACEBO):
-        names = [name for name in moved.positions if (name, method) in study.cells]
-        cells = {name: study.trajectories(name, method) for name in names}
-        beside = BesideMovedGoal.of(moved, cells, goal, hand)
-        if beside is None:
-            return math.nan
-        at = np.array(beside.positions)
-        groups.append([beside.configurations[at == place] for place in places])
-    x = places - places.mean()
-    rng = np.random.default_rng([SEED, goal, moving])
-    return beyond_p(groups[0], groups[1], rng, contrast=x / (x**2).sum())
 
 
 def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-import numpy as np
-
-from coartic.analysis.methods import LEARNERS, is_variant, main_methods, name_of
+from coartic.analysis.methods import is_variant, name_of
 from coartic.analysis.section import Section
 from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.statistics.estimates import LEVEL, Estimate
-from coartic.analysis.study import Study, cached
+from coartic.analysis.study import Study
 from coartic.analysis.topics.coarticulation import tables
-from coartic.analysis.topics.coarticulation.placebo import difference, selects
+from coartic.analysis.topics.coarticulation.placebo import difference
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import estimate, number, p_value, plural
+from coartic.analysis.words import number, p_value, plural
 
 
 def answer_contexts(study: Study) -> str:
@@ -103,82 +99,6 @@ def finding_of_contexts(study: Study) -> str:
     return f"{text}."
 
 
-@cached
-def steepest_slope(study: Study) -> Any:
-    """The row of table *slopes* with the posture that follows a moved goal most, at a goal before
-    it: of the learner if it ran. None without one.
-
-    ``seen``: whether the whole posture surely follows; places where it does come first. ``size``:
-    the slope without its sign.
-    """
-    rows = tables.slopes(study)
-    rows = rows[(rows.kind == "anticipatory") & rows.slope.notna()]
-    # A method that selects its solution from trials has to exceed the placebo as well.
-    chosen = [selects(study, str(label)) for label in rows.method]
-    beyond = (rows.p_placebo < LEVEL) | ~np.array(chosen, dtype=bool)
-    rows = rows.assign(seen=(rows.p_holm < LEVEL) & beyond, size=rows.slope.abs())
-    for label in (*LEARNERS, *main_methods(rows.method)):
-        of_method = rows[rows.method == label].sort_values(["seen", "size"])
-        if len(of_method):
-            return of_method.iloc[-1]
-    return None
-
-
-def tests_of(slope: Any) -> str:
-    """P-values of the slope of a whole posture: corrected, and beyond the placebo's."""
-    p = p_value(slope.p_placebo)
-    return p_value(slope.p_holm) + (f"; beyond random guesses {p}" if p else "")
-
-
-def answer_slopes(study: Study) -> str:
-    """Whether postures follow the next goal when that moves, in short."""
-    slope = steepest_slope(study)
-    if slope is None:
-        return ""
-    goal, moving = slope.goal, slope.moving
-    if slope.seen:
-        joint = slope.joint.replace("_", " ")
-        text = (
-            f"Yes: for each unit that goal {moving} moves, {joint} at goal {goal} moves by "
-            f"{number(slope.slope, 2)}."
-        )
-    elif slope["size"]:
-        text = (
-            f"Undecided: postures at goal {goal} do not surely follow goal {moving} "
-            f"({tests_of(slope)}); more positions could tell."
-        )
-    else:
-        text = f"Not seen: postures at goal {goal} do not follow goal {moving}."
-    cells = (cell for cell in study.cells if cell[1] == slope.method)
-    return text + failed_runs(study, cells, " and are not counted")
-
-
-def finding_of_slopes(study: Study) -> str:
-    """The joint that follows a moved goal most, at the goal before it."""
-    slope = steepest_slope(study)
-    if slope is None:
-        return ""
-    goal, moving, method = slope.goal, slope.moving, name_of(slope.method)
-    by = estimate(Estimate(slope.slope, slope.slope_low, slope.slope_high), 2)
-    follows = f"{slope.joint.replace('_', ' ')} at goal {goal} moves by {by}"
-    each = f"for each length unit that goal {moving} moves"
-    if slope.seen:
-        return (
-            f"The {method} prepares for the next goal: {each}, {follows} "
-            f"({p_value(slope.p_holm)} for the whole posture)."
-        )
-    if slope["size"]:
-        return (
-            f"Whether the {method} prepares for the next goal is undecided: {follows} {each}, but "
-            f"the test of the whole posture is not significant ({tests_of(slope)}). More positions "
-            "could tell."
-        )
-    return (
-        f"The postures in which the {method} hits goal {goal} do not follow goal {moving} when "
-        "that moves."
-    )
-
-
 def finding_of_signatures(study: Study) -> str:
     """In how many methods the next goal changes more of what leaves the hand in place."""
     rows = tables.contexts(study)
@@ -224,16 +144,5 @@ SIGNATURES = Section(
         "hand nearer: share of the way to its next goal that a hand covers while waiting. The CSV "
         "file has tests against random guesses."
     ),
-    single=True,
-)
-
-SLOPES = Section(
-    "slopes",
-    short="Moved goals",
-    title="How does the posture follow a goal that moves?",
-    caption="Slopes of postures at the goal beside the one that moves",
-    finding=finding_of_slopes,
-    table="slopes",
-    note=("Slopes are in length units and rad of the posture per length unit that the goal moves."),
     single=True,
 )

@@ -6,13 +6,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import pandas as pd
-
 from coartic.analysis.methods import in_order, is_search
 from coartic.analysis.settings import shown_methods
 from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.locus import joined_tasks, moved_goals
-from coartic.analysis.statistics.estimates import Estimate, interval
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -33,7 +29,7 @@ COLUMN_OF = {
 def contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors."""
     frame = signature_values(study)
-    frame = frame[frame.against.ne("") & frame.moving.isna()]
+    frame = frame[frame.against.ne("")]
     rows = []
     at: Any
     for at, group in frame.groupby(["task", "label", "goal", "hand", "against"], sort=False):
@@ -67,40 +63,6 @@ def adjust_p(rows: list[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
         yield name, row | {"p_holm": next(adjusted[row["method"]])}
 
 
-@table("method, place, kind, hand, runs, norm, p_holm, p_placebo, joint, slope[], goal, moving")
-def slopes(study: Study) -> Rows:
-    """How the posture at a goal follows a neighbouring goal that moves."""
-    frame = signature_values(study)
-    frame = frame[frame.moving.notna()]
-    rows = []
-    at: Any
-    for at, group in frame.groupby(["task", "label", "goal", "moving", "hand"], sort=False):
-        task, label, goal, moving, hand = at
-        base = task.partition(".")[0]
-        of_task = [key for key in study.cells if key[1] == label]
-        of_task = [key for key in of_task if key[0].partition(".")[0] == base]
-        norm = group[group.signature == "locus slope norm"].iloc[0]
-        by_joint = group[group.signature == "locus slope"]
-        steepest = by_joint.sort_values("value", key=abs).iloc[-1]
-        row: Row = {
-            "method": label,
-            "place": f"goal {goal} of {study.tasks[task].label}, goal {moving} moves",
-            "goal": goal,
-            "moving": moving,
-            "kind": "anticipatory" if goal < moving else "carry-over",
-            "hand": hand,
-            "runs": int(group.n.max()),
-            "norm": norm.value,
-            "p_holm": norm.p,
-            "p_placebo": placebo.slope_beyond_p(study, label, task, goal, moving, hand),
-            "joint": steepest.joint,
-            **interval("slope", Estimate(steepest.value, steepest.low, steepest.high)),
-            **runs_of(*(study.cells[key] for key in of_task)),
-        }
-        rows.append((f"{base} {label} goal {goal} of {moving} {hand}", row))
-    yield from adjust_p(rows)
-
-
 @table("task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p")
 def signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals.
@@ -132,14 +94,9 @@ def signatures(study: Study) -> Rows:
 @table("task, label, signature, where, value[], p, n, unit")
 def all_signatures(study: Study) -> Rows:
     """Every value of every signature, one a row, with its place, interval and test."""
-    joined = joined_tasks(moved_goals(study.tasks))
     frame = signature_values(study).rename(columns={"low": "value_low", "high": "value_high"})
     for values in frame.to_dict("records"):
         row: Row = {str(name): value for name, value in values.items()}
         task, label = row["task"], row["label"]
-        others = {row["against"]}
-        if pd.notna(row["moving"]):
-            others = set[str]().union(*(group for group in joined if task in group))
-        names = [task, *sorted(others - {task, ""})]
-        cells = [study.cells[name, label] for name in names if (name, label) in study.cells]
+        cells = [study.cells[name, label] for name in (task, row["against"]) if name]
         yield f"{task} {label}, {row['signature']} {row['where']}".strip(), row | runs_of(*cells)

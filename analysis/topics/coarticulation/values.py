@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import chain, product
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,11 @@ import pandas as pd
 from coartic.analysis.methods import LEARNERS, main_methods
 from coartic.analysis.signatures.between import (
     NOWHERE,
-    BesideMovedGoal,
     Place,
     TwoContexts,
     Value,
 )
 from coartic.analysis.signatures.context import context_pairs
-from coartic.analysis.signatures.locus import LEAST, MovedGoal, joined_tasks, moved_goals
 from coartic.analysis.signatures.register import Signature, of_kind
 from coartic.analysis.statistics.estimates import Estimate, student_mean, wilson
 from coartic.analysis.study import Study, cached, one_by_one
@@ -37,23 +35,21 @@ def signature_values(study: Study) -> pd.DataFrame:
     ``value`` with ``low`` and ``high`` of its interval at 95 %, ``p`` without correction, ``n``
     runs behind it, ``unit``; those of :class:`~coartic.analysis.signatures.between.Place`;
     ``label``. Signatures of runs are means with Student's interval, shares of runs have Wilson's.
-    Differences between contexts stand with the first task of the pair and name the other; tasks
-    that moved goals join are no pairs, their slopes say how each depends on the others.
+    Differences between contexts stand with the first task of the pair and name the other.
     """
     identity = ["task", "method", "variant"]
     columns = ["signature", "where", "value", "low", "high", "p", "n", "unit"]
     frame = pd.DataFrame(rows(study), columns=[*identity, *columns, *Place._fields, "label"])
-    return frame.astype(dict.fromkeys(("goal", "moving"), "Int64"))
+    return frame.astype({"goal": "Int64"})
 
 
 def rows(study: Study) -> Iterator[dict[str, Any]]:
     """Rows of :func:`signature_values`, cell by cell."""
     alone = one_by_one(study)
     trajectories = {key: study.trajectories(*key) for key in study.cells if key[0] in alone}
-    moved, pairs = moved_goals(study.tasks), pairs_of_contexts(study)
+    pairs = context_pairs(study.tasks)
     for (task, label), cell in trajectories.items():
         of_method = {name: its for (name, whose), its in trajectories.items() if whose == label}
-        here = [each for each in moved if task in each.positions]
         partners = [p for p in pairs if task in p[:2] and {*p[:2]} <= of_method.keys()]
         values = [of_runs(cell)]
         values += [
@@ -61,10 +57,6 @@ def rows(study: Study) -> Iterator[dict[str, Any]]:
             for first, second, shared in partners
             if first == task
         ]
-        for each in here:
-            cells = {name: of_method[name] for name in each.positions if name in of_method}
-            if task == next(iter(cells)):
-                values.append(of_moved_goal(each, cells))
         for signature, value in chain(*values):
             estimate = value.estimate
             if math.isnan(estimate.value):
@@ -120,31 +112,6 @@ def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[Tw
     return [contexts for contexts in by_hand if all(contexts.runs)]
 
 
-def of_moved_goal(moved: MovedGoal, cells: dict[str, Trajectories]) -> SignatureValues:
-    """Values at the goals before (anticipatory) and after (carry-over) a moving one, by hand.
-
-    ``cells``: what one method did on the tasks. A goal needs runs at enough positions.
-    """
-    task = next(iter(cells.values())).task
-    numbers = (n for n in (moved.goal - 1, moved.goal + 1) if 1 <= n <= len(task.goals))
-    for goal, hand in product(numbers, HANDS):
-        beside = BesideMovedGoal.of(moved, cells, goal, hand)
-        if beside is not None and len(set(beside.positions)) >= LEAST:
-            for signature in of_kind("moved goals"):
-                for value in signature.measure(beside):
-                    yield signature, value
-
-
-def pairs_of_contexts(study: Study) -> list[tuple[str, str, int]]:
-    """Pairs of tasks that differ only after their first goals, and how many they share.
-
-    Tasks that differ in one moved goal only are left out: slopes say how postures follow it.
-    """
-    joined = joined_tasks(moved_goals(study.tasks))
-    pairs = context_pairs(study.tasks)
-    return [pair for pair in pairs if not any({*pair[:2]} <= names for names in joined)]
-
-
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
     """The first goal that two tasks share before they differ, by the paper's learner if it ran.
@@ -153,7 +120,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     """
     labels = [label for _, label in study.cells]
     for label in dict.fromkeys([*LEARNERS, *main_methods(labels), *labels]):
-        for *names, _ in pairs_of_contexts(study):
+        for *names, _ in context_pairs(study.tasks):
             keys = [(name, label) for name in names]
             if all(key in study.cells and len(study.cells[key].good) for key in keys):
                 first, second = (study.trajectories(*key) for key in keys)

@@ -22,14 +22,8 @@ MOST_CHANGES = 4
 
 def papers_claims(study: Study) -> list[Judgement]:
     """Claims of the paper; none where the folder has no runs for any of them or its rewards."""
-    entries = [entry for entry in judgements(study) if entry.claim.place]
-    return entries if beside_paper(study) or any(entry.run_ids for entry in entries) else []
-
-
-def claims_shown(study: Study) -> list[Judgement]:
-    """The paper's claims, or ours where the folder is one of our studies."""
     entries = judgements(study)
-    return entries if entries and entries[0].claim.suite else papers_claims(study)
+    return entries if beside_paper(study) or any(entry.run_ids for entry in entries) else []
 
 
 def mostly_undecided(entries: Iterable[Judgement]) -> bool:
@@ -78,7 +72,7 @@ def finding_of_rewards(study: Study) -> str:
 
 def finding_of_claims(study: Study) -> str:
     """Which verdicts there are: on the claims that carry the paper's point, and on the others."""
-    entries = claims_shown(study)
+    entries = papers_claims(study)
     if not entries:
         return ""
     by_verdict = counts(entries)

@@ -114,7 +114,7 @@ def named(study: Study, cell: CellRuns) -> Row:
     "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote, section",
 )
 def claims(study: Study) -> Rows:
-    """Claims with their verdicts: the paper's, and others, which say so."""
+    """The paper's claims with their verdicts."""
     for entry in judgements(study):
         claim = entry.claim
         row: Row = {
@@ -125,7 +125,7 @@ def claims(study: Study) -> Rows:
             "p_holm": entry.adjusted_p,
             "opposite_p_holm": entry.adjusted_opposite_p,
             "sets": claim.sets or "not counted" * claim.fitted,
-            "place": claim.place or "not the paper's",
+            "place": claim.place,
             "quote": claim.quote,
             "section": claim.section,
             "run_ids": " ".join(entry.run_ids),

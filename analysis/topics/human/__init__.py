@@ -1,1 +1,0 @@
-"""Findings about people, put to the models."""
