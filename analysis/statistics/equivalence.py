@@ -14,8 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import Estimate, centred, samples_of, student, vector
-from coartic.robot import Array
+from coartic.analysis.statistics.estimates import Estimate, centred, student, vector
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -38,40 +37,21 @@ def verdict(estimate: Estimate, margin: float) -> Equivalence:
 def difference_to_printed(
     ours: ArrayLike, published: float, sd: float | None, runs: int
 ) -> Estimate:
-    """Our mean less the published mean, by the printed SD and number of runs.
+    """Our mean less the published mean, with Welch's interval by the printed SD and number of runs.
 
-    Where no SD is printed (None) the published mean is taken as exact.
+    Where no SD is printed (None) the published mean is taken as exact, and the interval is
+    Student's. No interval for a single run; a point where no sample has any spread.
     """
     values = vector(ours)
-    theirs = [] if sd is None or runs < 2 else [(sd**2, runs)]
-    return _welch(float(values.mean()) - published, [_variance(values), *theirs])
-
-
-def welch(first: ArrayLike, second: ArrayLike | float) -> Estimate:
-    """Mean of ``first`` less mean of ``second``: independent samples, or a sample and a number."""
-    samples = samples_of(first, second)
-    means = [float(values.mean()) for values in samples]
-    return _welch(means[0] - sum(means[1:]), list(map(_variance, samples)))
-
-
-def _variance(values: Array) -> tuple[float, int]:
-    """Variance of a sample (n - 1 degrees of freedom), and the number of its values."""
-    count = len(values)
-    return float(np.var(centred(values), ddof=1)) if count > 1 else math.nan, count
-
-
-def _welch(value: float, variances: list[tuple[float, int]]) -> Estimate:
-    """A difference with Welch's interval, or with Student's for one sample.
-
-    No interval for a sample of one value; a point where no sample has any spread.
-    """
-    n = tuple(count for _, count in variances)
-    if min(n) < 2:
-        return Estimate(value, n=n)
-    parts = [variance / count for variance, count in variances]
-    total = sum(parts)
+    n, value = len(values), float(values.mean()) - published
+    if n < 2:
+        return Estimate(value, n=(n,))
+    parts = [(float(np.var(centred(values), ddof=1)) / n, n - 1)]
+    if sd is not None and runs > 1:
+        parts.append((sd**2 / runs, runs - 1))
+    total = sum(part for part, _ in parts)
+    sizes = tuple(free + 1 for _, free in parts)
     if total == 0.0:
-        return Estimate(value, value, value, n=n)
-    free = [count - 1 for count in n]
-    freedom = total**2 / sum(part**2 / k for part, k in zip(parts, free, strict=True))
-    return replace(student(value, math.sqrt(total), freedom), n=n)
+        return Estimate(value, value, value, n=sizes)
+    freedom = total**2 / sum(part**2 / free for part, free in parts)
+    return replace(student(value, math.sqrt(total), freedom), n=sizes)
