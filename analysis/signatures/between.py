@@ -62,7 +62,22 @@ def rng_of(signature: str, place: Place) -> np.random.Generator:
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of one method that hit the same goal with the same hand before other successors."""
+    """Runs of one method that hit the same goal with the same hand before other successors.
+
+    Parameters
+    ----------
+    first, second : Trajectories
+        Runs on two tasks that share the goal, as ``study.trajectories(task, method)`` gives them,
+        or ``study.replays(task, method)`` without noise.
+    goal : int
+        Number of the goal, from 1.
+    hand : {"left", "right"}
+        Runs that hit the goal with the other hand do not count.
+
+    Examples
+    --------
+    In the page *Use it from Python*.
+    """
 
     first: Trajectories
     second: Trajectories

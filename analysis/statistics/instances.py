@@ -48,11 +48,37 @@ def value(runs: Runs) -> float:
 def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
+    Parameters
+    ----------
+    scores : mapping of str to sequence of tuples of arrays
+        By family, for each instance the scores of its runs in a tuple of one array ``(runs,)``; of
+        two arrays where the difference of two methods counts, first less second.
+    resamples : int
+        Of the bootstrap.
+
+    Returns
+    -------
+    Estimate
+        ``value``, ``low`` and ``high`` in the unit of the scores; ``n`` instances of each family.
+
+    Raises
+    ------
+    ValueError
+        A family has no instance, or there is no family.
+
+    Examples
+    --------
+    >>> gaps = [(np.array([0.1, 0.2]),), (np.array([0.3]),), (np.array([0.2, 0.4]),)]
+    >>> gap = other_tasks({"field": gaps})
+    >>> round(gap.value, 3), gap.n
+    (0.25, (3,))
+
+    Notes
+    -----
     The percentile interval, wider by √(k / (k − 1)) for the k instances of a family: by so much
     k draws of k fall short of the spread of its mean. It is a little too wide where few runs
     vary much (their noise is in the instances' means already), and ends at what the runs can
-    make at all. No interval where a family has fewer than three instances. Raises ValueError
-    without any.
+    make at all. No interval where a family has fewer than three instances.
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")

@@ -1,0 +1,227 @@
+"""How much of the whole task's reward does it take?
+
+    coartic run studies/dose/suite.toml
+    python studies/dose/study.py results/dose
+
+writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder the page alone,
+from the tables that are there.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis import (
+    TwoContexts,
+    all_of,
+    figures,
+    fill_page,
+    judge,
+    load,
+    mean_beyond,
+    means,
+)  # fmt: skip
+
+HERE = Path(__file__).parent
+GUESSES = "placebo/guesses"
+"""The best of random guesses, which selects its solution and learns nothing."""
+KEYS = ["group", "counted", "dose"]
+MEASURES = {
+    "nearer": "next goal nearer (ticks)",
+    "first": "first movement slower (ticks)",
+    "saved": "ticks saved (%)",
+}
+"""What is measured of each run, with the words of its axis."""
+SHARED = ("ascending", "descending")
+"""Tasks of the paper that have the first goal in common, and no others."""
+TICK = 1.0
+"""What a movement can lose to rounding alone: claims about its ticks have to show more."""
+GAIN = 1.0
+"""Per cent of the ticks of the initial solution that count as a gain, set before the runs."""
+
+
+def measure_runs(study):
+    """Solved runs with what they learned, a row a run; those of guesses with what they selected.
+
+    ``group``: the family, or the task of the paper. ``counted``: the movements whose rewards count.
+    ``dose``: the factor γ. ``kind``: both in words. What was learned is judged by the noiseless
+    replay.
+    """
+    guesses = study.runs.method == GUESSES
+    runs = study.runs.assign(
+        group=study.runs.family.str.partition("/")[0].fillna(study.runs.task),
+        counted=study.runs.counted.fillna("guesses"),
+        dose=study.runs.discount,
+        nearer=study.sign("arm", replay=True).where(~guesses, study.sign("arm")),
+        first=study.sign("first", replay=True).where(~guesses, study.sign("first")),
+    )
+    reward = runs.replay_reward.where(~guesses, runs.reward)
+    initial = runs.groupby("task").initial_reward.transform("first")  # guesses have none
+    runs["saved"] = (100 * (initial - reward) / initial).astype("Float64")
+    of_dose = runs.dose.map(lambda dose: "" if np.isnan(dose) else f" {dose:g}")
+    runs["kind"] = runs.counted + of_dose
+    return runs[runs.status == "ok"].sort_values("method", kind="stable")
+
+
+def tabulate(study, runs):
+    """What is learned by γ: means over random tasks, or over the runs on one of the paper's."""
+    every = pd.concat([runs[runs.family.notna()].assign(group="random"), runs])
+    every["row"] = every.group + " " + every.kind
+    unit = every.run.where(every.family.isna(), 0)  # random tasks count alike, whatever their runs
+    by = ["row", *KEYS, "task", unit]
+    units = every.groupby(by, sort=False, dropna=False)[[*MEASURES]].mean().reset_index()
+    table = means(units, ["row", *KEYS], [*MEASURES]).set_index("row").drop(columns="rows")
+    table.insert(3, "tasks", every.groupby("row").task.nunique())
+    table.insert(4, "runs", every.groupby("row").size())
+    return table.join(tabulate_apart(study, runs))
+
+
+def tabulate_apart(study, runs):
+    """How far mean postures lie apart at the goal that two tasks of the paper share, by γ.
+
+    ``apart``: the distance, length unit and rad mixed. ``apart_p``: of the permutation test that
+    there is none. ``beyond_p``: of that that it is no larger than that of guesses.
+    """
+    guesses = TwoContexts(*(study.trajectories(task, GUESSES) for task in SHARED), 1, "right")
+    rows = {}
+    for kind, label in runs[runs.task == SHARED[0]].groupby("kind").label.first().items():
+        learned = [study.replays(task, label) for task in SHARED]
+        ours = guesses if label == GUESSES else TwoContexts(*learned, 1, "right")
+        beyond = np.nan if label == GUESSES else ours.p_beyond(guesses)
+        apart = {"apart": ours.apart, "apart_p": ours.p, "beyond_p": beyond}
+        rows[f"{SHARED[0]} {kind}"] = apart
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def judge_claims(study, runs):
+    """The claims, as they were registered before the random tasks were run."""
+    drawn = runs[runs.family.notna()]
+    nearer, first, saved = (
+        drawn.pivot_table(name, "task", "kind").loc[drawn.task.unique()] for name in MEASURES
+    )
+
+    def saves(more, less, bound=GAIN):
+        sentence = f"With γ = {words[more]} learning saves {{}} points more than with γ = "
+        return mean_beyond(f"{sentence}{words[less]}", saved[more] - saved[less], bound)
+
+    words = {"all 0": "0", "all 0.5": "0.5", "all 0.75": "0.75", "all 1": "1"}
+    words["later 1"] = "1, later movements"
+    of_saved = (
+        "one-tailed bootstrap test over random tasks, of ticks that noiseless replays save, in per "
+        "cent of the initial solution's: "
+    )
+    return judge({
+        "dose-moves-postures": (
+            "The reward of the whole task moves postures: where it counts in full, what is learned "
+            "leaves the next goal nearer than where each movement counts by itself, and nearer "
+            "than random guesses do.",
+            "one-tailed bootstrap tests over random tasks, of noiseless replays: with γ = 1 "
+            "postures of base and chosen arm leave the next goal nearer by more than 1 tick more "
+            "than with γ = 0, and nearer than those of the best of random guesses",
+            all_of(
+                mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
+                            "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
+                mean_beyond("than those of random guesses by {} ticks",
+                            nearer["all 1"] - nearer["guesses"]),
+            ),
+        ),
+        "dose-slows-first-movements": (
+            "The reward of the whole task slows the first movement: it takes longer where it "
+            "counts in full than where each movement counts by itself.",
+            "one-tailed bootstrap test over random tasks, of noiseless replays: with γ = 1 the "
+            "first movement takes more than 1 tick longer than with γ = 0, each against the "
+            "corrective process with the same hands",
+            mean_beyond("With γ = 1 the first movement takes {} ticks longer than with γ = 0",
+                        first["all 1"] - first["all 0"], TICK),
+        ),
+        "dose-saves": (
+            "The reward of the whole task pays: where it counts in full, what is learned saves "
+            "more ticks than where each movement counts by itself.",
+            f"{of_saved}with γ = 1 more than 1 point more than with γ = 0",
+            saves("all 1", "all 0"),
+        ),
+        "no-step-at-a-small-dose": (
+            "A little of the other movements' rewards does not do what the whole does: with γ = "
+            "0.1 learning saves less, and slows the first movement less, than half-way from each "
+            "by itself to the whole.",
+            "one-tailed bootstrap tests over random tasks, of noiseless replays: the mean of γ = 0 "
+            "and γ = 1 less that of γ = 0.1 is above 0, of the ticks that are saved and of those "
+            "by which the first movement is longer",
+            all_of(
+                mean_beyond("with γ = 0.1 {} points saved are missing to half of the way",
+                            (saved["all 0"] + saved["all 1"]) / 2 - saved["all 0.1"]),
+                mean_beyond("with γ = 0.1 {} ticks of the first movement are missing to half of "
+                            "the way", (first["all 0"] + first["all 1"]) / 2 - first["all 0.1"]),
+            ),
+        ),
+        "half-a-dose-saves-less": (
+            "Half of the other movements' rewards (γ = 0.5) saves less than the whole.",
+            f"{of_saved}with γ = 1 more than 1 point more than 0.5",
+            saves("all 1", "all 0.5"),
+        ),
+        "three-quarters-suffice": (
+            "The whole is more than it takes: with γ = 0.75 learning saves as much, to a point of "
+            "the initial solution's ticks. This is against the paper, which calls the reward of "
+            "the whole crucial.",
+            f"{of_saved}with γ = 0.75 less than 1 point less than with γ = 1",
+            saves("all 0.75", "all 1", -GAIN),
+        ),
+        "earlier-movements-count": (
+            "Earlier movements' rewards count as well: where each movement is credited with later "
+            "ones alone, in full, learning saves less than with the whole.",
+            f"{of_saved}with γ = 1 more than 1 point more where all movements count than where "
+            "later ones alone do",
+            saves("all 1", "later 1"),
+        ),
+    })  # fmt: skip
+
+
+LOOKS = {
+    "all": {"label": "all movements count", "color": figures.PALETTE[0]},
+    "later": {"label": "later ones alone", "color": figures.PALETTE[1], "linestyle": "--"},
+    "guesses": {"label": "random guesses", "color": figures.GREY, "linestyle": ":"},
+}
+"""How a line is called and drawn, by what counts."""
+
+
+@figures.styled
+def draw(table):
+    """The measures by γ on random tasks, and how far postures lie apart on the paper's."""
+    figure, panels = figures.panels((2, 2), (figures.TWO, 4.6))
+    for axes, name in zip(panels, [*MEASURES, "apart"], strict=True):
+        rows = table[table.apart.notna() if name == "apart" else table.group == "random"]
+        for counted, of_kind in rows.groupby("counted", sort=False):
+            if counted == "guesses":
+                axes.axhline(of_kind[name].iloc[0], **LOOKS[counted])
+            else:
+                places = of_kind.assign(dose=of_kind.dose + 0.01 * (counted == "later"))
+                figures.means(axes, places, x="dose", y=name, **LOOKS[counted])
+        axes.set_ylabel(MEASURES.get(name, "postures apart"))
+        axes.set_xlabel("γ")
+    figures.letters(panels)
+    figures.legend(figure, panels[0].get_legend_handles_labels()[0], 3)
+    return figure
+
+
+def measure(study):
+    """The tables, each of which becomes a CSV file of its name."""
+    runs = measure_runs(study)
+    return {"results": tabulate(study, runs), "claims": judge_claims(study, runs)}
+
+
+def main():
+    """Measure a folder, if one is given, and write the page."""
+    if len(sys.argv) > 1:
+        tables = measure(load(sys.argv[1]))
+        for name, table in tables.items():
+            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
+        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
+    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
+    page = fill_page(HERE / "README.md.jinja", **tables)
+    (HERE / "README.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
