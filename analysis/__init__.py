@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
-    from coartic.analysis.pages import fill_page
+    from coartic.analysis.pages import fill_page, interval
     from coartic.analysis.signatures.between import TwoContexts
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.statistics.estimates import mean
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from coartic.analysis.study import Study, load
 
 __all__ = [
-    "SIGNS", "Study", "TwoContexts", "all_of", "ecdf", "fill_page", "gaps", "judge", "load",
-    "mean", "mean_beyond", "means", "other_tasks", "ranking",
+    "SIGNS", "Study", "TwoContexts", "all_of", "ecdf", "fill_page", "gaps", "interval",
+    "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking",
 ]  # fmt: skip
 
 _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
-    "pages": ("fill_page",),
+    "pages": ("fill_page", "interval"),
     "signatures.between": ("TwoContexts",),
     "signatures.signs": ("SIGNS",),
     "statistics.estimates": ("mean",),

@@ -48,7 +48,29 @@ def fill_page(template: Path, **values: Any) -> str:
 
 
 def interval(row: Mapping[Any, Any], column: str, digits: int = 1, scale: float = 1.0) -> str:
-    """A number of a table with its interval, as ``7.8 [7.3, 8.1]``."""
+    """Write a number of a table with its interval.
+
+    Parameters
+    ----------
+    row : mapping
+        Has ``column``, ``column_low`` and ``column_high``, as a row of what ``means`` returns.
+    column : str
+        Name of the number.
+    digits : int
+        Decimals.
+    scale : float
+        Factor, such as 100 for a share in per cent.
+
+    Returns
+    -------
+    str
+        Such as ``7.8 [7.3, 8.1]``; the number alone where the ends are missing.
+
+    Examples
+    --------
+    >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100)
+    '7.8 [7.3, 8.1]'
+    """
     return interval_in_words(row, column, digits=digits, scale=scale)
 
 

@@ -7,6 +7,7 @@ that the report of version 1.1.0 (commit f7064014, before studies left the packa
 import hashlib
 import importlib.util
 import lzma
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -36,6 +37,7 @@ INSTANCES = {
 
 
 def program(folder):
+    sys.path.insert(0, str(folder))  # as where it is run
     spec = importlib.util.spec_from_file_location(f"study_{folder.name}", folder / "study.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -75,6 +77,8 @@ def test_tables_are_those_of_version_1(measured, tmp_path):
 
 def test_p_values_are_those_of_version_1(measured):
     folder, _, tables = measured
+    if "claims" not in tables:
+        pytest.skip("the study has findings of others in place of claims")
     theirs = read(SMALL / folder.name / "claims.csv")
     for column in ("p_holm", "opposite_p_holm"):
         assert tables["claims"][column].to_numpy() == pytest.approx(

@@ -1,0 +1,178 @@
+"""Do the models behave like people?
+
+    coartic run studies/human/suite.toml
+    python studies/human/study.py results/human
+
+writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder the page
+alone, from the tables that are there. human.toml has the findings, the models and how verdicts are
+made, measures.py what is measured. There are no claims beside the findings.
+"""
+
+import sys
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from measures import MEASURES, MODELS, tidy
+
+from coartic.analysis import figures, fill_page, interval, load
+
+HERE = Path(__file__).parent
+FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
+GROUPS, _ = FINDINGS.pop("groups"), FINDINGS.pop("models")
+"""The findings by id, in the order of the table, and groups of models by name."""
+LEVEL, RESAMPLES = 0.05, 9_999
+FEWEST_TASKS = 10
+MARKS = {
+    "agrees": ("+", figures.PALETTE[0]), "disagrees": ("−", figures.PALETTE[3]),
+    "undecided": ("?", figures.GREY), "silent": ("·", figures.GREY), "no cases": ("", figures.GREY),
+}  # fmt: skip
+
+
+def measure_effects(study):
+    """A row for each finding, model and test, in their order.
+
+    ``value`` with its interval, of ``tasks``; ``over_guesses``: by how much it exceeds that of
+    random guesses, where solutions are picked from trials; ``of_test``, the verdict of the test,
+    and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
+    ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
+    """
+    runs, rows = tidy(study), []
+    measured = cache(lambda measure, model: MEASURES[measure][0](runs, model))
+    for name, finding in FINDINGS.items():
+        silent, built_in = (by_model(finding.get(words, {})) for words in ("silent", "built_in"))
+        level = LEVEL / len(finding["tests"])
+        for model in MODELS:
+            tests = [judge_test(measured, model, test, level, silent.get(model, ""))
+                     for test in finding["tests"]]  # fmt: skip
+            verdict = verdict_of([test["of_test"] for test in tests])
+            whole = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
+            rows += [{"finding": name, "model": model, **test, **whole} for test in tests]
+    effects = pd.DataFrame(rows)
+    effects["because"] = effects.pop("because")  # the last column
+    bounds = effects.bound.where(effects.duplicated(["finding", "model", "measure"]), "")
+    names = effects.finding + " " + effects.model + " " + effects.measure + " " + bounds
+    return effects.set_index(names.str.strip().rename("row"))
+
+
+def by_model(words):
+    """Words on models by model, where some are on a group of them."""
+    return {model: text for name, text in words.items() for model in GROUPS.get(name, [name])}
+
+
+def judge_test(measured, model, test, level, silent):
+    """One test of a finding put to a model; ``silent``: why nothing follows for the model."""
+    name, (side, word) = test["measure"], (1, "above") if "above" in test else (-1, "below")
+    bound, statistic = test[word], MEASURES[name][1]
+    values = pd.Series() if silent else measured(name, model)
+    value, low, high, tasks = bootstrap([values], statistic, level)
+    near, far = sorted([side * low, side * high])
+    agrees, disagrees = near > side * bound, far < side * test.get("disagree", bound)
+    verdict, because, over = "undecided", silent, [np.nan] * 3
+    if not tasks:
+        verdict = "silent" if silent else "no cases"
+    elif tasks >= FEWEST_TASKS and agrees != disagrees:
+        verdict = "agrees" if agrees else "disagrees"
+    if tasks and model in GROUPS["picked from trials"]:
+        both = [values, measured(name, "random guesses")]
+        *over, common = bootstrap(both, statistic, level)
+        exceeds = min(side * over[1], side * over[2]) > 0 and common >= FEWEST_TASKS
+        if verdict == "agrees" and not exceeds:
+            verdict, because = "undecided", "it is not shown to exceed random guesses"
+    return {
+        "measure": name, "bound": f"{word} {bound:g}",
+        "value": value, "value_low": low, "value_high": high, "tasks": tasks,
+        "over_guesses": over[0], "over_guesses_low": over[1], "over_guesses_high": over[2],
+        "of_test": verdict, "because": because,
+    }  # fmt: skip
+
+
+def bootstrap(sides, statistic, level):
+    """A statistic of all tasks, the ends of its interval over tasks, and their number.
+
+    ``sides``: values by task; of two, the statistic of the first less that of the second, on the
+    tasks that both have. Percentiles, wider by √(k / (k − 1)) for k tasks, by which resamples fall
+    short of the spread. NaN without tasks, and without an interval of one.
+    """
+    tasks = [task for task in sides[0].index.unique() if all(task in side.index for side in sides)]
+    rows = [[pd.DataFrame(side).loc[[task]].to_numpy() for task in tasks] for side in sides]
+    count = len(tasks)
+
+    def difference(drawn):
+        first, *second = (statistic(np.concatenate([side[k] for k in drawn])) for side in rows)
+        return first - sum(second)
+
+    value = difference(range(count)) if count else np.nan
+    if count < 2:
+        return value, np.nan, np.nan, count
+    drawn = np.random.default_rng(0).integers(count, size=(RESAMPLES, count))
+    away = (np.array([*map(difference, drawn)]) - value) * np.sqrt(count / (count - 1))
+    return value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), count
+
+
+def verdict_of(tests):
+    """The verdict of a finding, from those of its tests: one on the wrong side disagrees."""
+    if len(set(tests)) == 1:
+        return tests[0]
+    return next((kind for kind in ("disagrees", "no cases") if kind in tests), "undecided")
+
+
+def tabulate(effects):
+    """Verdicts of models on findings, with the effect of each measure; a star: it is built so."""
+    pairs = ["finding", "model"]
+    there = effects[effects.tasks > 0].drop_duplicates([*pairs, "measure"])
+    sizes = [interval(row, "value", digits=2) for row in there.to_dict("records")]
+    sizes = there.assign(sizes=sizes).groupby(pairs).sizes.agg("; ".join)
+    cells = effects.drop_duplicates(pairs).set_index(pairs)
+    words = cells.verdict + cells.built_in.map({True: " *", False: ""})
+    words += (": " + sizes).reindex(words.index, fill_value="")
+    table = pd.DataFrame({name: words[:, name] for name in MODELS}).add_prefix("of ")
+    table.insert(0, "finding", [finding["statement"] for finding in FINDINGS.values()])
+    return table.rename_axis("row")
+
+
+@figures.styled
+def draw(table):
+    """A grid with a mark for each verdict; in a circle where it follows from how it is built."""
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.6))
+    models = table.drop(columns="finding").rename(columns=lambda name: name.removeprefix("of "))
+    for (y, x), words in np.ndenumerate(models):
+        verdict = words.partition(":")[0]
+        mark, color = MARKS[verdict.removesuffix(" *")]
+        axes.text(x, y, mark, color=color, ha="center", va="center", fontsize=10)
+        if verdict.endswith("*"):
+            axes.plot(x, y, "o", markersize=11, markerfacecolor="none", markeredgecolor=color,
+                      markeredgewidth=0.6)  # fmt: skip
+    axes.set_yticks(range(len(models)), models.index.str.replace("-", " "))
+    axes.set_ylim(len(models) - 0.4, -0.6)
+    axes.set_xticks(range(models.shape[1]), models, rotation=50, ha="left", rotation_mode="anchor")
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    axes.set_xlim(-0.6, models.shape[1] - 0.4)
+    axes.grid(visible=True, linewidth=0.3)
+    axes.spines[:].set_visible(False)
+    return figure
+
+
+def measure(study):
+    """The tables, each of which becomes a CSV file of its name."""
+    effects = measure_effects(study)
+    return {"results": tabulate(effects), "effects": effects}
+
+
+def main():
+    """Measure a folder, if one is given, and write the page."""
+    if len(sys.argv) > 1:
+        tables = measure(load(sys.argv[1]))
+        for name, table in tables.items():
+            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
+        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
+    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
+    page = fill_page(HERE / "README.md.jinja", **tables)
+    (HERE / "README.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
