@@ -11,13 +11,14 @@ if TYPE_CHECKING:
     from coartic.analysis.frames import ecdf, gaps, means, ranking
     from coartic.analysis.pages import fill_page, interval
     from coartic.analysis.signatures.between import TwoContexts
+    from coartic.analysis.signatures.context import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
     from coartic.analysis.study import Study, load
 
 __all__ = [
-    "SIGNS", "Study", "TwoContexts", "all_of", "ecdf", "fill_page", "gaps", "interval",
+    "SIGNS", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps", "interval",
     "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking",
 ]  # fmt: skip
 
@@ -26,6 +27,7 @@ _HOMES = {
     "frames": ("ecdf", "gaps", "means", "ranking"),
     "pages": ("fill_page", "interval"),
     "signatures.between": ("TwoContexts",),
+    "signatures.context": ("beyond_p",),
     "signatures.signs": ("SIGNS",),
     "statistics.estimates": ("mean",),
     "statistics.instances": ("other_tasks",),

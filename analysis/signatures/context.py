@@ -165,14 +165,35 @@ def beyond_p(
     contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
-    """P of the test that a method's contexts lie further apart than a placebo's.
+    """Test whether a method's contexts lie further apart than a placebo's, by permutation.
 
-    ``method`` and ``placebo`` each have configurations ``(runs, dof)`` for every context. How far
-    contexts lie apart is the length of the sum of their mean configurations, each times its number
-    in ``contrast``: their distance for two, the slope for several positions. Permutation test:
-    within each context the runs of both are divided anew at random, and the statistic is the
-    method's length less the placebo's. Twice the upper tail, as wherever two methods are compared.
-    0 < p ≤ 1. NaN where a method has one run in a context.
+    How far contexts lie apart is the length of the sum of their mean configurations, each times its
+    number in ``contrast``: their distance for two, the slope for several positions. Within each
+    context the runs of both are divided anew at random, and the statistic is the method's length
+    less the placebo's.
+
+    Parameters
+    ----------
+    method, placebo : sequence of arrays, shape (runs, dof)
+        Configurations in every context, length unit and rad.
+    rng : numpy.random.Generator
+        Divides the runs.
+    contrast : sequence of float, or array, shape (contexts,)
+    resamples : int
+
+    Returns
+    -------
+    float
+        Twice the upper tail, as wherever two methods are compared: 0 < p ≤ 1. NaN where a method
+        has one run in a context.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> still = [rng.normal(size=(20, 10)), rng.normal(size=(20, 10))]
+    >>> moved = [rng.normal(size=(20, 10)), rng.normal(size=(20, 10)) + 2]
+    >>> beyond_p(moved, still, rng) < 0.001 < beyond_p(still, still, rng)
+    True
     """
     if min(map(len, (*method, *placebo))) < 2:
         return math.nan
