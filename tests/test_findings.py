@@ -15,7 +15,7 @@ _SPEC.loader.exec_module(make_findings)
 
 def test_pages_are_their_templates_filled_from_the_stored_tables():
     pages = make_findings.filled_pages()
-    assert len(pages) > 5
+    assert "findings.md" in pages
     for page, text in pages.items():
         assert text == (DOCS / page).read_text(encoding="utf-8"), page
 
