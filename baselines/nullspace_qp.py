@@ -54,13 +54,13 @@ from __future__ import annotations
 import heapq
 import itertools
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.cascade import solve_cascade, state_cascade
+from coartic.baselines.cascade import solve_cascade
 from coartic.baselines.posture_graph import HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.initial import changes_of_hand
@@ -116,8 +116,6 @@ class Controller:
     task: Task
     period: int
     """Ticks from one control step to the next."""
-    modelling: Literal["none", "cvxpy"] = "none"
-    """Whether cvxpy states the programmes, or their matrices go to the solver as they are."""
     solves: int = 0
     """Quadratic programmes solved so far."""
 
@@ -242,8 +240,7 @@ class Controller:
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
         """The cascade's changes of the joints; the session counts the iterations."""
-        solve = solve_cascade if self.modelling == "none" else state_cascade
-        changes, iterations = solve(rows, least, preferred)
+        changes, iterations = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=iterations)
         return changes
@@ -272,8 +269,6 @@ class NullspaceParameters(Parameters):
 
     period: Annotated[int, Field(ge=1, le=20)] = 5
     """Ticks from one control step to the next."""
-    modelling: Literal["none", "cvxpy"] = "none"
-    """``cvxpy``: the programmes as cvxpy states them, for readers; the same, and slower."""
 
 
 class NullspaceQP(Method):
@@ -309,7 +304,7 @@ class NullspaceQP(Method):
     def solve(self, session: Session) -> Result:
         """Simulate the hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
-        controller = Controller(session, task, self.parameters.period, self.parameters.modelling)
+        controller = Controller(session, task, self.parameters.period)
         with session.solving():
             ordered = [hand for hand in HANDS if hand in task.hands]
             candidates = list(itertools.product(ordered, repeat=len(task.goals)))

@@ -85,11 +85,17 @@ def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
         perform_again(run, built_in())
 
 
-def test_ids_begin_as_in_1_1():
-    """This one is of suite quick with 60 trials; its end is the hash of the code."""
-    parameters = {"trials": 60, "epsilon": 0.2, "noise_sd": 0.05}
-    setting = Setting(load_task("ascending"), "dual-process/EC1", "", (), parameters, None)
-    assert setting.key(0, 0).id == "eb4e4adffc4d3218-"
+@pytest.mark.parametrize(
+    ("method", "parameters", "begins"),
+    [
+        ("dual-process/EC1", {"trials": 60, "epsilon": 0.2, "noise_sd": 0.05}, "eb4e4adffc4d3218-"),
+        ("nullspace-qp/none", {"period": 5}, "5bd50b47a216d22c-"),
+    ],
+)
+def test_ids_begin_as_in_1_1(method, parameters, begins):
+    """Those of suites quick, with 60 trials, and comparison; an id ends with the hash of code."""
+    setting = Setting(load_task("ascending"), method, "", (), parameters, None)
+    assert setting.key(0, 0).id == begins
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
-"""How runs of versions 1.0 and 1.1 read the paper, which could then be read in several ways.
+"""What runs of versions 1.0 and 1.1 stored beside.
 
-Runs that read it as this version does count as its own. What they stored beside is dropped when
-they are read, and it is still a part of the hash with which the id of a run begins.
+That is how they read the paper, which could then be read in several ways, and how null-space
+control stated its programmes. Runs that did as this version does count as its own. What they stored
+beside is dropped when they are read, and it is still a part of the hash with which the id of a run
+begins.
 """
 
 from __future__ import annotations
@@ -53,4 +55,6 @@ def other_reading(method: str, model: Mapping[str, Any], parameters: Mapping[str
 
 
 def _fixed(method: str) -> dict[str, Any]:
+    if method.startswith("nullspace-qp/"):
+        return {"modelling": "none"}
     return _OF_LEARNER if method.startswith(METHOD_PREFIX) else {}
