@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coartic import MotionModel, Task
-from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation
+from coartic.baselines.relaxation import Lagrangian, PartialSequence, Relaxation, Relaxed, split
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import too_many_sequences
 from coartic.robot import HANDS, Array, Hand
@@ -123,8 +123,7 @@ class Node:
     length: float = field(compare=False)
     """Bound on the path."""
     problem: Subproblem = field(compare=False)
-    point: Array = field(compare=False)
-    """The relaxation's minimiser."""
+    relaxed: Relaxed = field(compare=False)
     lagrangian: Lagrangian = field(compare=False)
 
 
@@ -199,8 +198,7 @@ class ProofSearch:
                 merged = (*problem.merged, first)
                 self.add(problem._replace(merged=merged, open=problem.open[i + 1 :]), node.length)
         else:
-            root = self.relaxation(problem.hands, problem.merged)
-            for box in root.split(problem.box, node.point):
+            for box in split(problem.box, node.relaxed):
                 # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
@@ -210,20 +208,16 @@ class ProofSearch:
         unknown = [g for g, hand in enumerate(node.problem.hands) if hand is None]
         if not unknown:
             return None
-        root, robot = (
-            self.relaxation(node.problem.hands, node.problem.merged),
-            self._task.robot,
-        )
-        q = root.configurations(node.point)
+        q = node.relaxed.q
         far = {
             g: min(
-                math.dist(robot.forward_kinematics(q[g], hand), self._task.goals[g])
+                math.dist(self._task.robot.forward_kinematics(q[g], hand), self._task.goals[g])
                 for hand in self._robot_hands
             )
             for g in unknown
         }
         goal = max(unknown, key=lambda g: far[g])
-        wrong = root.wrong(node.point).max(initial=0.0)
+        wrong = node.relaxed.wrong.max(initial=0.0)
         if bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3):
             return goal
         return None
@@ -247,10 +241,10 @@ class ProofSearch:
         if problem.moves >= self._ticks:
             return
         root = self.relaxation(problem.hands, problem.merged)
-        multipliers, point, count = root.solve(problem.box)
+        relaxed = root.solve(problem.box)
         self.solved += 1
-        self.iterations += count
-        lagrangian = root.lagrangian(multipliers, self.longest(0))
+        self.iterations += relaxed.iterations
+        lagrangian = root.lagrangian(relaxed.pulls, relaxed.forces, self.longest(0))
         slack = self.shortfall(lagrangian, problem.box, problem.moves)
         length = max(parent, self.longest(problem.moves) - slack)
         if slack < 0.0 or length > self.longest(problem.moves):
@@ -261,7 +255,7 @@ class ProofSearch:
         problem = problem._replace(box=box)
         ticks = length / self._step + problem.moves
         heapq.heappush(
-            self.heap, Node(ticks, next(self._numbers), length, problem, point, lagrangian)
+            self.heap, Node(ticks, next(self._numbers), length, problem, relaxed, lagrangian)
         )
 
     def shortfall(self, lagrangian: Lagrangian, box: Array, moves: int) -> float:

@@ -46,7 +46,7 @@ class OptimumParameters(Parameters):
     """Starts, over all graphs and hand sequences, each with the other arm spread out, too. With
     three, the best path known was missed on 9 of 40 random tasks for one arm."""
     most_nodes: Annotated[int, Field(ge=0)] = 20_000
-    """Cone programmes that may be solved for the proof, some 500 a second with five goals. It ends
+    """Cone programmes that may be solved for the proof, some 300 a second with five goals. It ends
     with the bound that it has then, and says how many ticks that leaves. 0: no proof."""
 
 

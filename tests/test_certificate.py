@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import Multipliers, Relaxation, disc_of, stiff_joints, support_of
+from coartic.baselines.relaxation import Relaxation, disc_of, split, stiff_joints, support_of
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement
@@ -75,8 +75,8 @@ def angles_of(task, hands, q):
     return np.concatenate([*angles, np.empty(0)])
 
 
-def bound(root, box, multipliers, longest):
-    lagrangian = root.lagrangian(multipliers, longest)
+def bound(root, box, pulls, forces, longest):
+    lagrangian = root.lagrangian(pulls, forces, longest)
     return lagrangian.constant + lagrangian.least(box).sum()
 
 
@@ -94,16 +94,17 @@ def test_a_relaxation_never_exceeds_a_true_path(name):
             box, angles = root.first_box(length), angles_of(task, chosen, q)
             assert np.all((box[:, 0] <= angles) & (angles <= box[:, 1]))
             for _ in range(5):
-                multipliers, minimum, _ = root.solve(box)
-                least = bound(root, box, multipliers, length)
+                relaxed = root.solve(box)
+                multipliers = relaxed.pulls, relaxed.forces
+                least = bound(root, box, *multipliers, length)
                 assert least <= length + 1e-9
-                left = root.lagrangian(multipliers, length).within(box, length - least + 1e-9)
+                left = root.lagrangian(*multipliers, length).within(box, length - least + 1e-9)
                 assert np.all((left[:, 0] <= angles) & (angles <= left[:, 1]))
                 cut += int(np.any(left != box))
                 checked += 1
                 if not len(box):
                     break
-                below, above = root.split(box, minimum)
+                below, above = split(box, relaxed)
                 inside = np.all((below[:, 0] <= angles) & (angles <= below[:, 1]))
                 tighter = below if inside else above
                 assert (tighter[:, 1] - tighter[:, 0]).sum() < (box[:, 1] - box[:, 0]).sum()
@@ -124,12 +125,12 @@ def test_any_multipliers_give_a_bound(name):
         for moves_of_goal, hand in zip(moves, chosen, strict=True):
             moves_of_goal[stiff_joints(task, hand, still=True)] = 0.0
         box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
-        best, _, _ = root.solve(box)
+        best = root.solve(box)
         for size in (0.0, 1e-3, 0.1, 1.0):
             pulls = best.pulls + size * rng.standard_normal(best.pulls.shape)
             pulls /= np.maximum(np.linalg.norm(pulls * moves, axis=1, keepdims=True), 1.0)
             forces = best.forces + size * rng.standard_normal(best.forces.shape)
-            assert bound(root, box, Multipliers(pulls, forces), length) <= length + 1e-9
+            assert bound(root, box, pulls, forces, length) <= length + 1e-9
 
 
 def test_where_the_relaxation_begins():
@@ -154,8 +155,8 @@ def test_the_least_of_a_term_is_exact():
     for _ in range(12):
         low = rng.uniform(-8, 8, 16)
         box = np.stack([low, low + rng.uniform(0, 9, 16)], 1)
-        multipliers = Multipliers(rng.standard_normal((4, 10)), rng.standard_normal((4, 2)))
-        lagrangian = root.lagrangian(multipliers, 1.0)
+        pulls, forces = rng.standard_normal((4, 10)), rng.standard_normal((4, 2))
+        lagrangian = root.lagrangian(pulls, forces, 1.0)
         sampled = np.linspace(*box.T, 1001)
         values = np.array([lagrangian.at(angles) for angles in sampled])
         true = values.min(axis=0)
@@ -174,14 +175,13 @@ def test_a_box_around_one_path_bounds_it_tightly():
     root = Relaxation(task, ("right",) * 3, (), True)
     angles = angles_of(task, ("right",) * 3, q)
     box = np.stack([angles - 1e-4, angles + 1e-4], axis=1)
-    multipliers, point, _ = root.solve(box)
+    relaxed = root.solve(box)
     # What is left free: the base, and the hand within its disc.
-    relaxed = root.configurations(point)
-    hand = task.robot.forward_kinematics(relaxed, "right")
+    hand = task.robot.forward_kinematics(relaxed.q, "right")
     assert np.hypot(*(hand - task.goal_array).T).max() <= task.radius + 1e-3
-    steps = np.diff(np.vstack([task.q0, relaxed]), axis=0)
+    steps = np.diff(np.vstack([task.q0, relaxed.q]), axis=0)
     length = np.linalg.norm(steps, axis=1).sum()
-    assert length == pytest.approx(bound(root, box, multipliers, 5.0), abs=1e-3)
+    assert length == pytest.approx(bound(root, box, relaxed.pulls, relaxed.forces, 5.0), abs=1e-3)
 
 
 SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
@@ -319,5 +319,5 @@ def test_a_goal_out_of_reach_leaves_no_path():
     task = changed("ascending", goals=[[6, 90]], locked_base=["y"], initial_hands="R")
     root = Relaxation(task, ("right",), (), True)
     box = root.first_box(5.0)
-    multipliers, _, _ = root.solve(box)
-    assert bound(root, box, multipliers, 5.0) > 5.0
+    relaxed = root.solve(box)
+    assert bound(root, box, relaxed.pulls, relaxed.forces, 5.0) > 5.0
