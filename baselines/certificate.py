@@ -29,7 +29,6 @@ import heapq
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -83,8 +82,8 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
     """
     speed = {hand: step * fastest_hand(task, hand) for hand in task.hands}
     start = {hand: task.robot.forward_kinematics(task.q0, hand) for hand in task.hands}
-    least = None
-    for sequence in hands:
+
+    def least(sequence: Sequence[Hand]) -> int:
         where, when = {hand: (start[hand], 0.0, 0) for hand in task.hands}, 0
         for hand, goal in zip(sequence, task.goals, strict=True):
             place, radius, ticks = where[hand]
@@ -92,8 +91,9 @@ def ticks_for_distance(task: Task, step: float, hands: Iterable[Sequence[Hand]])
             if way > 0.0:
                 when = max(when, ticks + math.ceil(way / speed[hand]) + 1)
             where[hand] = np.array(goal), task.radius, when
-        least = when if least is None else min(least, when)
-    return least or 0
+        return when
+
+    return min(map(least, hands))
 
 
 class Subproblem(NamedTuple):
@@ -113,18 +113,18 @@ class Subproblem(NamedTuple):
         return len(self.hands) - len(self.merged) - len(self.open)
 
 
-@dataclass(order=True)
-class Node:
-    """A subproblem with its bound, in the order of bounds."""
+class Node(NamedTuple):
+    """A subproblem with its bound, in the order of bounds, then of numbers."""
 
     ticks: float
     """Bound, before it is rounded up."""
     number: int
-    length: float = field(compare=False)
+    """No other node has it."""
+    length: float
     """Bound on the path."""
-    problem: Subproblem = field(compare=False)
-    relaxed: Relaxed = field(compare=False)
-    lagrangian: Lagrangian = field(compare=False)
+    problem: Subproblem
+    relaxed: Relaxed
+    lagrangian: Lagrangian
 
 
 def certify(

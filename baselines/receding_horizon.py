@@ -30,6 +30,7 @@ from coartic.baselines.posture_graph import Chain, cheapest_chains
 from coartic.baselines.shortest_paths import (
     KNOWS_REWARD,
     PlanInTicks,
+    ShortestPlans,
     fewest_ticks,
     shortest_plans,
 )
@@ -74,25 +75,25 @@ class RecedingHorizon(Method):
         """Plan, make a movement, and plan again, until the last goal is in view."""
         task, parameters = session.hand_over(*self.told), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds
-        windows: list[PlanInTicks] = []
+        windows: list[ShortestPlans] = []
         solution: list[Movement] = []
         length, q = 0.0, np.array(task.q0)
         while (goal := len(solution)) < len(task.goals):
             end = min(goal + parameters.horizon + 1, len(task.goals))
-            window = plan_window(session, remaining(task, q, goal, end), parameters, rng)
-            windows.append(window)
+            plans, best = plan_window(session, remaining(task, q, goal, end), parameters, rng)
+            windows.append(plans)
             followed = 1 if end < len(task.goals) else end - goal
             solution += [
                 replace(movement, goal=goal + movement.goal)
-                for movement in window.movements[:followed]
+                for movement in best.movements[:followed]
             ]
-            length += float(window.plan.lengths(q)[:followed].sum())
-            q = window.execution.configurations[followed - 1]
+            length += float(best.plan.lengths(q)[:followed].sum())
+            q = best.execution.configurations[followed - 1]
         details = {
             "path_length": length,
             "windows": len(windows),
-            "solves": sum(window.solves for window in windows),
-            "failed_solves": sum(window.failed for window in windows),
+            "solves": sum(plans.solves for plans in windows),
+            "failed_solves": sum(plans.failed for plans in windows),
         }
         return Result(tuple(solution), details)
 
@@ -102,8 +103,8 @@ METHODS = (RecedingHorizon,)
 
 def plan_window(
     session: Session, task: Task, parameters: RecedingHorizonParameters, rng: np.random.Generator
-) -> PlanInTicks:
-    """The shortest movements through all goals of a task, or through those that remain of one."""
+) -> tuple[ShortestPlans, PlanInTicks]:
+    """The shortest plans through all goals of a task, or those that remain, and the best one."""
     with session.building():
         problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
     with session.solving():
@@ -122,7 +123,7 @@ def plan_window(
 
         ranked = sorted(starts, key=length)[: parameters.starts]
         plans = shortest_plans(session, task, problem, ranked, still=False)
-        return fewest_ticks(session, task, problem, plans)
+        return plans, fewest_ticks(session, task, problem, plans)
 
 
 def remaining(task: Task, q: Array, first: int, end: int) -> Task:

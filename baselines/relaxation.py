@@ -40,7 +40,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import Task
-from coartic.robot import BASE_DOF, HANDS, Arm, Array, Hand, directions
+from coartic.baselines.trajectory_problem import held_joints
+from coartic.robot import BASE_DOF, Arm, Array, Hand, directions
 
 PartialSequence = tuple[Hand | None, ...]
 """A hand per goal, None where it is undecided."""
@@ -90,10 +91,8 @@ class Relaxation:
         self._radii = np.array([radius for _, radius in discs])
         self._offsets = np.array([shoulder for shoulder, _ in discs]) - task.goal_array
         self._q0 = q0
-        self._stiff = np.zeros((goals, dof), dtype=np.bool_)
-        for g, hand in enumerate(hands):
-            self._stiff[g, stiff_joints(task, hand, still)] = True
-        self._stiff[list(merged)] = True
+        self._held = held_joints(task, hands, still=still)
+        self._held[list(merged)] = True
 
         links = [(g, arm, k) for g, arm in enumerate(arms) if arm for k in range(len(arm.links))]
         self.goal_of = np.array([g for g, _, _ in links], dtype=np.intp)
@@ -116,11 +115,11 @@ class Relaxation:
         a, b, k, most = (self._half_spaces[i] for i in range(4))
         self._movements = cp.SOC(lengths, changes, axis=1)
         self._hits = cp.SOC(self._radii, misses, axis=1)
-        self._held = changes[self._stiff] == 0.0
+        self._holds = changes[self._held] == 0.0
         constraints = [
             self._movements,
             self._hits,
-            self._held,
+            self._holds,
             cp.SOC(np.ones(len(links)), self._u, axis=1),
             cp.multiply(a, self._u[:, 0]) + cp.multiply(b, self._u[:, 1]) + cp.multiply(k, angles)
             <= most,
@@ -152,14 +151,14 @@ class Relaxation:
         q, u = found(self._q), found(self._u)
         angles = self._sums @ q.ravel()
         pulls = -found(self._movements.dual_variables[1])
-        pulls[self._stiff] += found(self._held.dual_variables[0])
+        pulls[self._held] += found(self._holds.dual_variables[0])
         # Within the unit ball over the joints that may move; without limit over the others.
-        norms = np.linalg.norm(np.where(self._stiff, 0.0, pulls), axis=1, keepdims=True)
+        norms = np.linalg.norm(np.where(self._held, 0.0, pulls), axis=1, keepdims=True)
         return Relaxed(
             q=q,
             angles=angles,
             wrong=np.linalg.norm(u - directions(angles), axis=1) * self._lengths,
-            pulls=np.where(self._stiff, pulls, pulls / np.maximum(norms, 1.0)),
+            pulls=np.where(self._held, pulls, pulls / np.maximum(norms, 1.0)),
             forces=-found(self._hits.dual_variables[1]),
             iterations=iterations,
         )
@@ -264,15 +263,6 @@ def split(box: Array, relaxed: Relaxed) -> tuple[Array, Array]:
     below, above = box.copy(), box.copy()
     below[link, 1] = above[link, 0] = middle + _TOWARDS_POINT * (angle - middle)
     return below, above
-
-
-def stiff_joints(task: Task, hand: Hand | None, still: bool) -> list[int]:
-    """Joints that cannot move on the way to a goal of this hand, or of an undecided one."""
-    stiff = {"xy".index(axis) for axis in task.locked_base}
-    for other in HANDS:
-        if other not in task.hands or (still and hand is not None and other != hand):
-            stiff |= set(range(task.robot.dof)[task.robot.joints(other)])
-    return sorted(stiff)
 
 
 def found(variable: Any) -> Array:

@@ -42,8 +42,6 @@ class PlanInTicks(NamedTuple):
     execution: Execution
     plan: PathPlan
     """The plan that was rounded."""
-    solves: int
-    failed: int
 
 
 def shortest_plans(
@@ -104,7 +102,7 @@ def fewest_ticks(
                 execution = execute(task, planned, model=session.model)
                 session.spend(forward_kinematics=execution.evaluations)
                 if execution.completed and (fewest is None or fewer(execution, fewest.execution)):
-                    fewest = PlanInTicks(planned, execution, shortest, plans.solves, plans.failed)
+                    fewest = PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
     if fewest is None:

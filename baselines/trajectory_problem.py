@@ -95,13 +95,22 @@ class Instance:
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
         """The instance of a task; ``still`` holds the arm that is not chosen."""
-        held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
-        held[:, ["xy".index(axis) for axis in task.locked_base]] = True
-        for goal, hand in enumerate(hands):
-            for other in HANDS:
-                if other != hand and (still or other not in task.hands):
-                    held[goal, task.robot.joints(other)] = True
+        held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
+
+
+def held_joints(task: Task, hands: Sequence[Hand | None], *, still: bool) -> NDArray[np.bool_]:
+    """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``.
+
+    ``still`` holds the arm that is not chosen; of a hand that is undecided, None, neither.
+    """
+    held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
+    held[:, ["xy".index(axis) for axis in task.locked_base]] = True
+    for goal, hand in enumerate(hands):
+        for arm in HANDS:
+            if arm not in task.hands or (still and hand not in (arm, None)):
+                held[goal, task.robot.joints(arm)] = True
+    return held
 
 
 @dataclass(frozen=True)

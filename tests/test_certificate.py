@@ -11,7 +11,8 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import Relaxation, disc_of, split, stiff_joints, support_of
+from coartic.baselines.relaxation import Relaxation, disc_of, split, support_of
+from coartic.baselines.trajectory_problem import held_joints
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement
@@ -121,9 +122,7 @@ def test_any_multipliers_give_a_bound(name):
     for task, hands, q, length in paths(name):
         chosen = undecided(hands, rng)
         root, angles = Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
-        moves = np.ones(q.shape)
-        for moves_of_goal, hand in zip(moves, chosen, strict=True):
-            moves_of_goal[stiff_joints(task, hand, still=True)] = 0.0
+        moves = ~held_joints(task, chosen, still=True)
         box = np.stack([angles - rng.random(len(angles)), angles + rng.random(len(angles))], 1)
         best = root.solve(box)
         for size in (0.0, 1e-3, 0.1, 1.0):
