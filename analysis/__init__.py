@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
     from coartic.analysis.pages import fill_page, interval
-    from coartic.analysis.signatures.between import TwoContexts
-    from coartic.analysis.signatures.context import beyond_p
+    from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
+    from coartic.analysis.signatures.two_contexts import TwoContexts
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
     from coartic.analysis.study import Study, load
@@ -26,9 +26,9 @@ _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
     "pages": ("fill_page", "interval"),
-    "signatures.between": ("TwoContexts",),
-    "signatures.context": ("beyond_p",),
+    "signatures.context_tests": ("beyond_p",),
     "signatures.signs": ("SIGNS",),
+    "signatures.two_contexts": ("TwoContexts",),
     "statistics.estimates": ("mean",),
     "statistics.instances": ("other_tasks",),
     "study": ("Study", "load"),

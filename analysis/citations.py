@@ -73,14 +73,6 @@ def results_of_version(released: Mapping[str, str]) -> str:
     )
 
 
-def behind_analysis() -> tuple[str, ...]:
-    """Keys of the works behind signatures and statistics."""
-    from coartic.analysis.signatures.register import REGISTER  # with all that measures them
-
-    sources = dict.fromkeys(key for signature in REGISTER.values() for key in signature.sources)
-    return (*STATISTICS, *sources)
-
-
 def bibliography(
     methods: Mapping[str, MethodCard],
     *,
@@ -113,7 +105,7 @@ def bibliography(
                 hint = did_you_mean(key, works) or "; add it"
                 raise CoarticError(f"{name} in methods.toml: no {key!r} in references.bib{hint}")
             reasons.setdefault(key, []).append(name)
-    for key in behind_analysis() if analysis else ():
+    for key in STATISTICS if analysis else ():
         reasons.setdefault(key, []).append("the analysis")
     entries = [f"{comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
     slug = slugs(others)

@@ -19,7 +19,8 @@ import pandas as pd
 from scipy import stats
 
 from coartic.analysis import fill_page, mean_beyond
-from coartic.analysis.claims.register import CLAIMS, Verdict
+from coartic.analysis.claims.judgements import CLAIMS
+from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.methods import name_of
 
 DOCS = Path(__file__).parent

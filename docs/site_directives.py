@@ -155,39 +155,23 @@ def parameters() -> Iterator[str]:
         yield from table(heads, rows) if rows else ("None.", "")
 
 
-def signatures() -> Iterator[str]:
-    """The signatures of coarticulation, from their register."""
-    from coartic.analysis.signatures.register import of_kind
-
-    kinds = {
-        "One method's runs on one task": of_kind("runs"),
-        "One goal before two different successors": of_kind("contexts"),
-    }
-    for title, kind in kinds.items():
-        yield from (f"**{title}**", "")
-        rows = ((signature.name, signature.extent, signature.meaning) for signature in kind)
-        yield from table(("signature", "unit and range", "meaning"), rows)
-
-
 def claims() -> Iterator[str]:
-    """The register of the paper's claims; each claim has its id for an anchor."""
-    from coartic.analysis.claims.judge import words_of_test
-    from coartic.analysis.claims.register import CLAIMS
+    """The paper's claims; each has its id for an anchor."""
+    from coartic.analysis.claims.judgements import CLAIMS
+    from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
 
     def goals(claim: Any) -> str:
-        if claim.families:
+        if claim in CLAIMS_ON_FAMILIES:
             return "random tasks"
         return "reconstructed †" if claim.fitted else "printed"
 
-    def source(claim: Any) -> str:
-        return f"{claim.place}: “{claim.quote}”"
-
-    def rule(claim: Any) -> str:
-        text = words_of_test(claim)
-        return f"{text[0].upper()}{text[1:]}."
-
     rows = (
-        (f"[{c.statement}]{{#{c.id}}} <br>`{c.id}`", goals(c), source(c), rule(c))
+        (
+            f"[{c.text}]{{#{c.id}}} <br>`{c.id}`",
+            goals(c),
+            f"{c.place}: “{c.quote}”",
+            f"{c.test[0].upper()}{c.test[1:]}.",
+        )
         for c in CLAIMS.values()
     )
     yield from table(("claim", "goals", "the paper says", "how it is judged"), rows)
@@ -195,11 +179,12 @@ def claims() -> Iterator[str]:
 
 def margins() -> Iterator[str]:
     """The margins of the claims, with the reason for each and its history."""
-    from coartic.analysis.claims.register import HISTORY
+    from coartic.analysis.claims import margins
 
+    reasons = ModuleAnalyzer.for_module(margins.__name__).find_attr_docs()
     rows = (
-        (f"`{name}`", f"{row['value']:g}", f"{row['reason']} {row.get('history', '')}")
-        for name, row in HISTORY.items()
+        (f"`{name.lower()}`", f"{getattr(margins, name):g}", " ".join(reason))
+        for (_, name), reason in reasons.items()
     )
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
 

@@ -11,8 +11,8 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.citations import (
+    STATISTICS,
     THE_PAPER,
-    behind_analysis,
     bibliography,
     references,
     software,
@@ -36,7 +36,6 @@ def fields_of(entry):
 
 
 BIB = {key: fields_of(entry) for key, entry in references().items()}
-ANALYSIS = behind_analysis()
 BUILT_IN = list(built_in().values())
 
 
@@ -81,7 +80,7 @@ def test_every_method_has_a_row_and_every_entry_is_used():
     assert list(KNOWN_METHODS) == [method.name for method in BUILT_IN]
     behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
     text = (ROOT / "analysis" / "references.bib").read_text(encoding="utf-8")
-    assert {THE_PAPER, *ANALYSIS} | behind_methods == set(BIB) == set(keys_in(text))
+    assert {THE_PAPER, *STATISTICS} | behind_methods == set(BIB) == set(keys_in(text))
 
 
 def test_the_software_is_cited_by_the_facts_of_citation_cff():
@@ -105,10 +104,10 @@ def test_each_work_once_with_the_methods_that_rest_on_it():
     text = bibliography({m.name: declared(m.title, m.citation) for m in BUILT_IN})
     keys = keys_in(text)
     assert len(keys) == len(set(keys))
-    assert set(keys) == {"coartic", *BIB} - set(ANALYSIS)
+    assert set(keys) == {"coartic", *BIB} - set(STATISTICS)
     assert keys[:2] == ["coartic", THE_PAPER]
     assert f"% cma-es/bandit\n{references()['hansen2016']}\n" in text
-    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *ANALYSIS}
+    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *STATISTICS}
 
 
 def test_methods_of_others_cite_themselves():

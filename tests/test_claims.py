@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,16 +11,19 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task, trajectory
-from coartic.analysis.claims import judge
-from coartic.analysis.claims.data import JUDGES, Data, Measurement, MissingError
-from coartic.analysis.claims.register import CLAIMS, HISTORY, MARGINS, Claim, Finding
-from coartic.analysis.claims.rules import all_of, higher, in_every_family, some_of
+from coartic.analysis.claims import margins
+from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.comparisons import Higher, all_higher
+from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
+from coartic.analysis.claims.judging import Finding
+from coartic.analysis.claims.reader import Measurement, MissingError, Reader
 from coartic.analysis.report.contents import TABLES
-from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
+from coartic.analysis.topics.families.claims import in_every_family
 from coartic.analysis.topics.paper import sentences
+from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of
 from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.analysis.trajectories import Trajectories
 from coartic.benchmarks.suites import Cell
@@ -49,26 +53,20 @@ def found(holds, *p, against=None, n=20):
     return Finding(holds, "planted", tests, contrary)
 
 
-@pytest.fixture
-def judged(monkeypatch):
-    """A function that judges planted findings together; each with fields of its claim, or None."""
+def judged(*planted):
+    """Planted findings judged together: each, or None, with fields of its claim."""
 
-    def together(*planted):
-        claims = []
-        for number, (finding, fields) in enumerate(planted):
-            given = {"id": f"planted-{number}", "place": "p"} | fields
-            words = {"section": "s", "statement": "It is so.", "place": "Results", "quote": "so"}
-            claims.append(Claim(**(words | given)))
+    def decide(finding):
+        if finding is None:
+            raise MissingError("not run")
+        return finding
 
-            def decide(data, finding=finding):
-                if finding is None:
-                    raise MissingError("not run")
-                return finding
-
-            monkeypatch.setitem(JUDGES, claims[-1].id, decide)
-        return judge.judge_claims(nothing(), claims)
-
-    return together
+    claims = [
+        Claim(f"planted-{number}", "It is so.", "Results", "so", "exact",
+              lambda _, finding=finding: decide(finding), **fields)
+        for number, (finding, fields) in enumerate(planted)
+    ]  # fmt: skip
+    return judge_claims(nothing(), claims)
 
 
 @pytest.mark.parametrize(
@@ -94,9 +92,8 @@ def judged(monkeypatch):
         (None, "undecided"),
     ],
 )
-def test_verdicts(finding, verdict, judged):
-    (entry,) = judged((finding, {}))
-    assert entry.verdict == verdict
+def test_verdicts(finding, verdict):
+    assert judged((finding, {})).verdict.tolist() == [verdict]
 
 
 def test_the_opposite_counts_as_many_resamples_as_the_test():
@@ -116,23 +113,20 @@ def test_the_opposite_counts_as_many_resamples_as_the_test():
         (found(False, 0.999), "not supported"),
     ],
 )
-def test_what_our_runs_show_may_depend_on_the_goals(finding, verdict, judged):
-    (entry,) = judged((finding, {"fitted": True, "depends": True}))
-    assert entry.verdict == verdict
-    (entry,) = judged((finding, {"fitted": True}))
-    assert entry.verdict != "depends on the goals"
+def test_what_our_runs_show_may_depend_on_the_goals(finding, verdict):
+    depends = judged((finding, {"fitted": True, "depends": True}), (finding, {"fitted": True}))
+    assert depends.verdict.iloc[0] == verdict
+    assert depends.verdict.iloc[1] != "depends on the goals"
 
 
-def test_claims_are_counted_by_verdict(judged):
+def test_claims_are_counted_by_verdict():
     entries = judged(
-        (found(True, 0.001), {"short": "it is so"}),
-        (found(False, 0.999), {}),
-        (found(True, 0.2), {"short": "it may be so"}),
-        (None, {}),
-    )
+        (found(True, 0.001), {}), (found(False, 0.999), {}), (found(True, 0.2), {}), (None, {})
+    ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
-    assert judge.counts(entries) == numbers
-    central = {"supported": ["it is so"], "undecided": ["it may be so"]}
+    assert counts(entries.verdict) == numbers
+    central = {"supported": ["the posture depends on the next goal"],
+               "undecided": ["the reward for the whole task makes the difference"]}  # fmt: skip
     assert sentences.central_claims(entries) == central
     others = sentences.counts_of_others(entries)
     assert sentences.in_numbers(others) == "0 are supported, 1 is not, 1 is undecided"
@@ -140,42 +134,35 @@ def test_claims_are_counted_by_verdict(judged):
     assert not sentences.mostly_undecided(entries[:-1])
 
 
-def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims(judged):
+def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
     """0.03 alone is significant, and is not beside two others (Holm 1979)."""
     entries = judged(
         (found(True, 0.03), {}),
         (found(True, 0.001), {}),
         (found(True, 0.02, 0.04), {}),
-        (found(True), {"exact": True}),  # no part of the group
+        (found(True), {"group": "exact"}),  # no part of the group
     )
-    assert entries.pop().verdict == "supported"
-    assert [entry.finding.p for entry in entries] == [0.03, 0.001, 0.04]
-    assert [entry.adjusted_p for entry in entries] == pytest.approx([0.06, 0.003, 0.06])
-    assert [entry.verdict for entry in entries] == ["undecided", "supported", "undecided"]
+    assert entries.p_holm.tolist() == pytest.approx([0.06, 0.003, 0.06, NAN], nan_ok=True)
+    assert entries.verdict.tolist() == ["undecided", "supported", "undecided", "supported"]
 
 
-def test_opposites_are_corrected_over_the_claims_too(judged):
-    entries = judged(*((found(False, p), {}) for p in (0.96, 0.975, 0.999)))
-    assert [entry.verdict for entry in entries] == ["undecided", "undecided", "not supported"]
-    opposite = [entry.finding.opposite_p for entry in entries]
+def test_opposites_are_corrected_over_the_claims_too():
+    findings = [found(False, p) for p in (0.96, 0.975, 0.999)]
+    opposite = [finding.opposite_p for finding in findings]
     assert opposite == pytest.approx([0.0401, 0.0251, 0.0011])
-    expected = [0.0502, 0.0502, 0.0033]
-    assert [entry.adjusted_opposite_p for entry in entries] == pytest.approx(expected)
+    entries = judged(*((finding, {}) for finding in findings))
+    assert entries.verdict.tolist() == ["undecided", "undecided", "not supported"]
+    assert entries.opposite_p_holm.tolist() == pytest.approx([0.0502, 0.0502, 0.0033])
 
 
-def test_groups_are_corrected_apart(judged):
+def test_groups_are_corrected_apart():
     """A claim that is not judged counts in its group as one with p = 1."""
     papers = [(found(True, p), {}) for p in (0.02, 0.001)] + [(None, {})]
-    groups = {
-        "beside": {"beside": True},
-        "families": {"families": True, "beside": True},
-    }
-    others = [(found(True, 0.0001), fields) for fields in groups.values() for _ in range(4)]
-    entries = judged(*papers, *others)
-    adjusted = [entry.adjusted_p for entry in entries]
+    groups = ("beside", "families") * 4
+    others = [(found(True, 0.0001), {"group": group}) for group in groups]
+    adjusted = judged(*papers, *others).p_holm.tolist()
     assert adjusted[:2] == pytest.approx([0.04, 0.003])
     assert adjusted[3:] == pytest.approx([0.0004] * 8)
-    assert [entry.claim.group for entry in entries[3::4]] == list(groups)
 
 
 def learner(task, condition, rewards, hands="LRLR", initial=-671, trials=10_000, **more):
@@ -211,12 +198,7 @@ def planted_study(rows, sequences=SEQUENCES, tasks=()):
 
 def verdict_of(claim, study):
     """The verdict of a claim's tests alone, uncorrected, and what was seen."""
-    (entry,) = judge.judge_claims(study, [CLAIMS[claim]])
-    finding = entry.finding
-    verdict = finding.verdict(finding.p, finding.opposite_p)
-    return SimpleNamespace(
-        verdict=verdict, evidence=finding.evidence, run_ids=entry.run_ids, entry=entry
-    )
+    return judge_claims(study, [replace(CLAIMS[claim], depends=False)]).iloc[0]
 
 
 BELOW = [-710, -712, -708, -711, -709, -713, -707, -710]
@@ -277,15 +259,15 @@ def test_values_are_those_of_the_runs():
     rows = learner(T1, "EC4", HIGH, replay_reward=-700)
     rows += [row("cma-es/bandit", reward, run=k) for k, reward in enumerate(LOW)]
     rows += [row("trajectory-optimisation/jerk", LOW[0])]
-    data = Data(planted_study(rows))
-    assert data.initial(T1).numbers == -675
-    learned = data.reward(T1, "dual-process/EC4")
+    read = Reader(planted_study(rows))
+    assert read.initial(T1).numbers == -675
+    learned = read.reward(T1, "dual-process/EC4")
     assert learned.numbers.tolist() == HIGH
-    assert data.replay(T1, "dual-process/EC4").numbers.tolist() == [-700] * 8
-    assert data.best(T1).numbers == -533
+    assert read.replay(T1, "dual-process/EC4").numbers.tolist() == [-700] * 8
+    assert read.best(T1).numbers == -533
     for method, n in (("cma-es/bandit", (8, 8)), ("trajectory-optimisation/jerk", (8,))):
-        assert all_of([higher(learned, data.reward(T1, method))]).tests[0].n == n
-    assert set(data.run_ids) == {entry["run_id"] for entry in rows}
+        assert all_higher([Higher(learned, read.reward(T1, method))]).tests[0].n == n
+    assert set(read.run_ids) == {entry["run_id"] for entry in rows}
 
 
 def ticks(task, *values):
@@ -295,15 +277,15 @@ def ticks(task, *values):
 
 def test_a_margin_is_taken_off_and_values_are_said_once():
     first, second = ticks("t", 4, 5, 6), ticks("t", 3, 4, 4)
-    finding = all_of([higher(first, by=2), higher(first, second, by=1), higher(second)])
+    finding = all_higher([Higher(first, by=2), Higher(first, second, by=1), Higher(second)])
     assert [test.value for test in finding.tests] == pytest.approx([3, 1 / 3, 11 / 3])
     assert finding.holds
-    assert not all_of([higher(first, second, by=2)]).holds
+    assert not all_higher([Higher(first, second, by=2)]).holds
     assert finding.evidence.startswith("Ticks by which it is so: t, who: 5.0 [")
     assert finding.evidence.count("t, who: 5.0 [") == 1
     assert "; t, who against 3.7 [" in finding.evidence
     assert "(who), a difference of 1.3 [" in finding.evidence
-    one_of = some_of([higher(second, first), higher(first, second)])
+    one_of = some_of(all_higher([Higher(second, first), Higher(first, second)]))
     least = bootstrap_test(first.numbers, second.numbers)
     assert one_of.holds
     assert one_of.tests[0].p == pytest.approx(2 * least.p)
@@ -313,7 +295,8 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     ("quantity", "value", "margin", "words"),
     [
         ("ticks by which it is so", 2.0, 1.0, "Ticks by which it is so: one-armed/v1, so: 2.00 ["),
-        ("", 20 / 3, 0.0, "one-armed/v1, so: 6.7 ["),  # of rewards per cent of 200, 300 and 400
+        # Of rewards per cent of 200, 300 and 400.
+        ("", 20 / 3, 0.0, "Gain as a share of the best known reward: one-armed/v1, so: 6.7 ["),
     ],
 )
 def test_the_mean_over_a_family_is_one_of_instances(quantity, value, margin, words):
@@ -332,14 +315,14 @@ def test_the_mean_over_a_family_is_one_of_instances(quantity, value, margin, wor
 
     def compare(task):
         mine = Measurement(task, "learner", np.array([-1.0, 1.0] * len(task)) + off[task], quantity)
-        return higher(mine, by=margin)
+        return Higher(mine, by=margin)
 
-    finding = in_every_family(Data(study), ["one-armed/v1"], (", so", compare))
+    finding = in_every_family(Reader(study), ["one-armed/v1"], (", so", compare))
     assert finding.tests[0].value == pytest.approx(value - margin)
     assert finding.evidence.startswith(words)
-    assert finding.evidence.endswith("on 3 instances.")
+    assert finding.evidence.endswith("on 3 instances")
     with pytest.raises(MissingError, match="no instances of long/v1"):
-        in_every_family(Data(study), ["long/v1"], ("", compare))
+        in_every_family(Reader(study), ["long/v1"], ("", compare))
 
 
 CELLS = [
@@ -371,7 +354,7 @@ def seven(replays):
         (on_2("EC3", WORSE[:2], "RLRR"), "fewer than 3 runs"),
         (
             on_2("EC3", WORSE, "RLRR")[:-1] + on_2("EC3", WORSE, "RLRR", status="crashed")[-1:],
-            "Not judged: 1 of 8 runs of dual-process/EC3 on two-armed-2 failed",
+            "Not judged: 1 of 8 runs of dual-process/EC3 on Two-armed 2 failed",
         ),
     ],
 )
@@ -398,7 +381,7 @@ def test_corrections_early_and_late():
             assert judged.verdict == verdict
         # Of 999.9 trials with four goals; first and last tenth.
         early = np.mean([row["early_corrections"] for row in rows[-5:]]) / 3999.6
-        assert f"two-armed-2, EC4: {early:.3f} [" in judged.evidence
+        assert f"Two-armed 2, EC4: {early:.3f} [" in judged.evidence
 
 
 EVERY = {"ascending": {"RRR": -319}, "descending": {"RRR": -333}, **SEQUENCES}
@@ -454,7 +437,7 @@ def test_the_corrective_process_is_near_the_shortest_way():
     assert verdict_of(claims[0], study).verdict == "supported"
     two = verdict_of(claims[1], study)
     assert two.verdict == "not supported"
-    assert "two-armed-2 0.3%, 13.2%" in two.evidence
+    assert "Two-armed 2 0.3%, 13.2%" in two.evidence
 
 
 BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
@@ -730,18 +713,18 @@ def study(tmp_path_factory):
 
 
 def test_the_register_on_runs(study):
-    entries = {entry.claim.id: entry for entry in judge.judgements(study)}
-    assert list(entries) == [claim.id for claim in CLAIMS.values() if not claim.families]
-    sacrificed = entries["first-movement-sacrificed"]
-    assert "(random guesses)" in sacrificed.finding.evidence
-    assert len(sacrificed.run_ids) == 24
+    entries = judgements(study)
+    assert list(entries.index) == [claim.id for claim in CLAIMS_OF_THE_PAPER]
+    sacrificed = entries.loc["first-movement-sacrificed"]
+    assert "(random guesses)" in sacrificed.evidence
+    assert len(sacrificed.run_ids.split()) == 24
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
-        assert entries[name].verdict == "undecided"
-        assert "this folder has no runs of" in entries[name].finding.evidence
-    assert TABLES["claims"](study).verdict.tolist() == [each.verdict for each in entries.values()]
+        assert entries.verdict[name] == "undecided"
+        assert "this folder has no runs of" in entries.evidence[name]
+    assert TABLES["claims"](study).verdict.tolist() == entries.verdict.tolist()
     # Claims on printed tasks alone do not rest on goals that were chosen for results like theirs.
     task_of = dict(zip(study.runs.run_id, study.runs.task, strict=True))
-    read = {name: {task_of[run] for run in each.run_ids} for name, each in entries.items()}
+    read = {name: {task_of[run] for run in runs.split()} for name, runs in entries.run_ids.items()}
     assert sum(map(bool, read.values())) > 10
     for name, tasks in read.items():
         assert not tasks or bool(tasks & {T1, T2}) == CLAIMS[name].fitted, name
@@ -781,12 +764,8 @@ def test_every_sentence_is_accounted_for():
     assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
 
 
-def test_margins_have_a_reason():
-    assert all(each["reason"] for each in HISTORY.values())
-    assert MARGINS["few"] == 1 - MARGINS["most"]
-    assert MARGINS["ticks"] == ROUNDING
-    for claim in CLAIMS.values():
-        assert "{" not in judge.words_of_test(claim)
+def test_few_and_most_are_one_margin():
+    assert margins.FEW == 1 - margins.MOST
 
 
 def test_sets_of_goals_are_as_counted():

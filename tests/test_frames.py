@@ -10,13 +10,13 @@ import coartic
 from coartic.analysis import frames, load, pages
 from coartic.analysis.claims import judging
 from coartic.analysis.claims.judging import all_of, judge, mean_beyond
-from coartic.analysis.signatures import context
+from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics import instances
 from coartic.benchmarks import Selection, run_suite
 
 
-@pytest.mark.parametrize("module", [context, frames, instances, judging, pages])
+@pytest.mark.parametrize("module", [context_tests, frames, instances, judging, pages])
 def test_examples(module):
     options = doctest.NORMALIZE_WHITESPACE
     assert doctest.testmod(module, optionflags=options) == (0, doctest.testmod(module).attempted)

@@ -7,12 +7,13 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.claims import data, judge
-from coartic.analysis.claims.register import CLAIMS
+from coartic.analysis.claims import reader
+from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import one_by_one
-from coartic.analysis.topics.families.sample import sample, signs
+from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
+from coartic.analysis.topics.families.instances import sample, signs
 from coartic.tasks.families import instances_in
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -154,29 +155,28 @@ def test_presence():
 
 def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
-    monkeypatch.setattr(data, "initial_solution", lambda task: alone)
+    monkeypatch.setattr(reader, "initial_solution", lambda task: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
     study = with_signs(rewarded(centres, families=ONE + TWO))
-    entries = {entry.claim.id: entry for entry in judge.judgements(study)}
-    assert set(entries) == {name for name, claim in CLAIMS.items() if claim.families}
+    entries = judgements(study)
+    assert list(entries.index) == [claim.id for claim in CLAIMS_ON_FAMILIES]
     for name in (
         "learning-improves",
         "proficiency-rises",
         "other-arm-coarticulation",
         "arm-coarticulation",
     ):
-        entry = entries[f"{name}-in-general"]
-        assert entry.verdict == "supported", entry.finding.evidence
-        assert entry.adjusted_p < 0.05
+        entry = entries.loc[f"{name}-in-general"]
+        assert entry.verdict == "supported", entry.evidence
+        assert entry.p_holm < 0.05
     guessed = with_signs(rewarded(centres, families=ONE + TWO), placebo=1.0)
-    entries_of_guesses = {entry.claim.id: entry for entry in judge.judgements(guessed)}
+    verdicts = judgements(guessed).verdict
     for name in ("other-arm-coarticulation-in-general", "arm-coarticulation-in-general"):
-        assert entries_of_guesses[name].verdict == "undecided"  # no more than guessing shows
-    ensured = entries["corrective-ensures-in-general"]
-    assert ensured.verdict == "supported"
-    jerk = entries["beats-inaccurate-in-general"]
+        assert verdicts[name] == "undecided"  # no more than guessing shows
+    assert entries.verdict["corrective-ensures-in-general"] == "supported"
+    jerk = entries.loc["beats-inaccurate-in-general"]
     assert jerk.verdict == "undecided"
-    assert "fewer than 3 instances of one-armed/v1" in jerk.finding.evidence
+    assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
 
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
@@ -188,8 +188,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
                 values["hand"] = np.array([0.4, 0.6]) + shift
-        (entry,) = judge.judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]])
-        return entry.verdict
+        return judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]]).verdict.iloc[0]
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [
         "supported", "not supported", "undecided",
@@ -205,13 +204,13 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
         CLAIMS[f"{name}-in-general"]
         for name in ("other-arm-pays", "proficiency-rises", "random-hands-pay")
     ]
-    assert {entry.verdict for entry in judge.judge_claims(falling, claims)} == {"not supported"}
-    assert judge.judge_claims(mixed, claims)[0].verdict == "undecided"
+    assert set(judge_claims(falling, claims).verdict) == {"not supported"}
+    assert judge_claims(mixed, claims).verdict.iloc[0] == "undecided"
 
 
 def test_development_instances_are_not_judged():
     study = with_signs(rewarded(RISING, split="d"))
-    assert {entry.verdict for entry in judge.judgements(study)} == {"undecided"}
+    assert set(judgements(study).verdict) == {"undecided"}
 
 
 def test_tables_over_instances():

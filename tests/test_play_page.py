@@ -7,7 +7,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from coartic import Movement, corrective_trial, execute, initial_hands, learn, load_task
-from coartic.analysis.signatures.context import context_dependence
+from coartic.analysis.signatures.context_tests import context_dependence
 from coartic.play import page as pages
 from tests.support.strategies import changed
 

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
-from coartic.analysis.claims.register import CLAIMS
+from coartic.analysis.claims.judgements import CLAIMS
 from coartic.analysis.topics.paper.published import (
     ENTRIES,
     RUNS,

@@ -12,8 +12,7 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.claims.judge import judge_claims
-from coartic.analysis.claims.register import CLAIMS
+from coartic.analysis.claims.judgements import CLAIMS, judge_claims
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import numbers, render
 from coartic.analysis.report.about import limits
@@ -229,13 +228,12 @@ def test_answers_name_failed_runs_behind_them(traced):
 
 
 def test_claims_without_their_runs_are_named(traced):
-    entries = judge_claims(traced, [CLAIMS["context"]])
-    assert not entries[0].failed
+    assert judge_claims(traced, [CLAIMS["context"]]).failed.tolist() == [()]
     runs = traced.runs.assign(status="crashed")
     spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    (entry,) = judge_claims(spoiled, [CLAIMS["context"]])
-    assert ("ascending", "dual-process/EC1") in entry.failed
-    told = failed_runs(spoiled, entry.failed, "")
+    (failed,) = judge_claims(spoiled, [CLAIMS["context"]]).failed
+    assert ("ascending", "dual-process/EC1") in failed
+    told = failed_runs(spoiled, failed, "")
     assert re.fullmatch(r" (\d+) of \1 runs of learner EC1 failed\.", told)
 
 

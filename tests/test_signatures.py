@@ -11,16 +11,13 @@ import pytest
 
 from coartic import Movement, corrective_trial, execute, learn, learn_many, load_task, trajectory
 from coartic.analysis.methods import EC1, PLACEBO
-from coartic.analysis.signatures import context, subtasks
-from coartic.analysis.signatures.between import NOWHERE, TwoContexts
-from coartic.analysis.signatures.context import context_pairs, distance_of_means, permutation_p
+from coartic.analysis.signatures import context_tests, subtasks
+from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
-from coartic.analysis.signatures.register import REGISTER
-from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
+from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.statistics.estimates import wilson
-from coartic.analysis.topics.coarticulation import placebo, sentences, tables, values
-from coartic.analysis.topics.coarticulation.values import signature_values
+from coartic.analysis.topics.coarticulation import placebo, sentences, tables
 from coartic.analysis.trajectories import Trajectories, best_sequences
 from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -65,9 +62,9 @@ def test_context_dependence_by_hand():
     first = np.array([[0.0, 0.0], [2.0, 0.0]])  # mean (1, 0), squares 2
     second = np.array([[4.0, 3.0], [4.0, 5.0]])  # mean (4, 4), squares 2
     assert distance_of_means(first, second) == 5.0
-    assert context.context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
-    assert math.isnan(context.context_dependence(first[:1], second[:1]))
-    assert math.isnan(context.context_dependence(first[[0, 0]], second[[1, 1]]))
+    assert context_tests.context_dependence(first, second) == pytest.approx(5.0 / math.sqrt(4 / 2))
+    assert math.isnan(context_tests.context_dependence(first[:1], second[:1]))
+    assert math.isnan(context_tests.context_dependence(first[[0, 0]], second[[1, 1]]))
 
 
 def test_permutation_p_finds_a_planted_context_and_no_other():
@@ -77,9 +74,6 @@ def test_permutation_p_finds_a_planted_context_and_no_other():
     assert math.isnan(permutation_p(first[:1], second, rng()))
     shift = np.array([0, 0, 2.0, 0, 0, 0])
     assert permutation_p(first, second + shift, rng()) < 0.001
-    inside, outside = np.eye(6)[:, [2]], np.eye(6)[:, [0, 1, 3, 4, 5]]
-    assert permutation_p(first, second + shift, rng(), basis=inside) < 0.001
-    assert permutation_p(first, second + shift, rng(), basis=outside) > 0.05
 
 
 def test_the_smallest_p_is_that_of_the_clearest_case():
@@ -89,9 +83,9 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
         second = rng(m).standard_normal((m, 3)) + 1000.0
         p = float(permutation_p(first, second, rng()))
         # Of groups of one size the exchange of both is as far apart.
-        assert p == pytest.approx(context.smallest_p(n, m) * (2 if n == m else 1))
-    assert context.smallest_p(2, 2) > 0.05 > context.smallest_p(4, 4)
-    assert context.smallest_p(50, 50, resamples=99) == 0.01
+        assert p == pytest.approx(context_tests.smallest_p(n, m) * (2 if n == m else 1))
+    assert context_tests.smallest_p(2, 2) > 0.05 > context_tests.smallest_p(4, 4)
+    assert context_tests.smallest_p(50, 50, resamples=99) == 0.01
 
 
 def test_more_than_a_placebo_by_brute_force():
@@ -118,7 +112,7 @@ def test_more_than_a_placebo_by_brute_force():
             rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
             count += excess((one, two), rest) >= observed - 1e-12
             total += 1
-    p = context.beyond_p(method, placebo, rng(), resamples=20_000)
+    p = context_tests.beyond_p(method, placebo, rng(), resamples=20_000)
     assert p == pytest.approx(2 * count / total, abs=0.03)
 
 
@@ -127,11 +121,11 @@ def test_drawn_tests_count_what_was_seen():
     near = rng(9).standard_normal((2, 30, 2))
     far = near[0], near[1] + 100.0
     assert permutation_p(*far, rng(), resamples=9) == 0.1
-    assert context.beyond_p(far, near, rng(), resamples=19) == 2 / 20
-    assert context.beyond_p(near, far, rng(), resamples=19) == 1.0
-    assert math.isnan(context.beyond_p((far[0][:1], far[1]), near, rng()))
-    assert context.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
-    assert math.isnan(context.dependence_below(near[0][:1], near[1], 1.0, rng()))
+    assert context_tests.beyond_p(far, near, rng(), resamples=19) == 2 / 20
+    assert context_tests.beyond_p(near, far, rng(), resamples=19) == 1.0
+    assert math.isnan(context_tests.beyond_p((far[0][:1], far[1]), near, rng()))
+    assert context_tests.dependence_below(*near, 50.0, rng(), resamples=9) == 0.1
+    assert math.isnan(context_tests.dependence_below(near[0][:1], near[1], 1.0, rng()))
 
 
 def test_dependence_below_a_bound_by_brute_force():
@@ -144,7 +138,7 @@ def test_dependence_below_a_bound_by_brute_force():
         for b in itertools.product(second, repeat=2)
         for a, b in [(np.array(a), np.array(b))]
     ]  # fmt: skip
-    p = context.dependence_below(first, second, 2.0, rng())
+    p = context_tests.dependence_below(first, second, 2.0, rng())
     assert 0.1 < p < 0.9
     assert p == pytest.approx(np.mean(reached), abs=0.02)
 
@@ -210,11 +204,9 @@ def test_parts_of_two_contexts():
     contexts = TwoContexts(
         posed(task, "", q + noise), posed(task, "", moved + noise[::-1]), 1, "right"
     )
-    parts = [REGISTER[f"{of}motor-equivalent part"].measure(contexts) for of in ("", "non-")]
-    assert parts[0].estimate.value == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
-    assert parts[1].estimate.value < 5e-4
-    assert [part.n for part in parts] == [12, 12]
-    assert parts[0].estimate.p < 0.01
+    assert contexts.parts[0] == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
+    assert contexts.parts[1] < 5e-4
+    assert contexts.n == 12
     assert contexts.hands_apart < 1e-3 < contexts.apart == pytest.approx(0.02)
 
 
@@ -259,7 +251,7 @@ def test_what_a_posture_serves():
     assert subtasks.gain_at_next(task, [path])[0, 0] == gain
 
 
-def test_signs_are_signatures_with_one_number_a_run():
+def test_signs_are_one_number_a_run():
     """A learner's first movement is slower, the whole faster, than with the same hands."""
     task = load_task("two-armed-1")
     runs = [learn(task, "EC4", seed=seed, trials=400).solution for seed in (1, 2)]
@@ -277,6 +269,7 @@ def test_signs_are_signatures_with_one_number_a_run():
     one = load_task("ascending")
     alone = Trajectories(one, "", "", (trajectory(one, corrective_trial(one, "RRR").movements),))
     assert [sign.of(alone).size for sign in SIGNS.values()] == [0, 1, 0, 1, 1]
+    assert [sign.each(alone).size for sign in SIGNS.values()] == [1] * 5
 
 
 def test_choice_in_isolation():
@@ -284,12 +277,10 @@ def test_choice_in_isolation():
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
     paths = [trajectory(task, corrective_trial(task, hands).movements) for hands in ("RL", "LR")]
-    agrees = REGISTER["hand as in isolation"].measure(Trajectories(task, "", "", tuple(paths)))
-    assert agrees[:, 0].tolist() == [True, False]
-    assert agrees[0, 1]
-    shares = values.over_runs(np.arange(10) < 7, NOWHERE)
-    assert (shares.estimate, shares.n) == (wilson(7, 10), 10)
-    assert SIGNS["hand"].of_run(np.array([[0.0, 1.0, 1.0]])) == 0.5  # not of the last goal
+    agrees = as_in_isolation(Trajectories(task, "", "", tuple(paths)))
+    assert agrees[:, 0].tolist() == [1, 0]
+    assert agrees[0, 1] == 1
+    # Not of the last goal.
     assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
 
 
@@ -380,43 +371,25 @@ def test_frame_of_two_contexts():
         initial = corrective_trial(task, "RRR").movements
         cells += [cell_of(task, EC1, *(run.solution for run in runs))]
         cells += [cell_of(task, "corrective", initial), cell_of(task, "failed")]
-    frame = signature_values(study_with(*cells))
-    assert frame.equals(signature_values(study_with(*cells)))  # nothing is random but by its seed
-
-    def one(method, signature):
-        rows = frame[(frame.task == "ascending") & (frame.method == method)]
-        return rows[rows.signature == signature].iloc[0]
-
-    assert one(EC1, "context dependence").p < 0.02  # 2 of 252 at best
-    parts = [one(EC1, f"{part}motor-equivalent part").value for part in ("", "non-")]
-    assert parts[0] > 5 * parts[1]
-    assert one("corrective", "context distance").value == 0
-    assert math.isnan(one("corrective", "total against the same hands").low)  # one run
-    shown = frame.groupby("method", sort=False).signature.unique().map(list).to_dict()
-    assert "failed" not in shown
-    assert shown[EC1] == [  # nothing of two hands
-        "first subtask against the same hands", "total against the same hands",
-        "context distance", "context dependence", "motor-equivalent part",
-        "non-motor-equivalent part",
-    ]  # fmt: skip
-    # A single run a context has no spread.
-    assert shown["corrective"] == [name for name in shown[EC1] if name != "context dependence"]
-    assert frame.value.notna().all()
-    # The mean of five runs with Student's interval, four degrees of freedom.
-    total = one(EC1, "total against the same hands")
-    values = cells[0].against_same_hands.sum(axis=1)
-    half = 2.776445 * np.std(values, ddof=1) / math.sqrt(5)
-    expected = values.mean(), values.mean() - half, values.mean() + half, 5
-    assert (total.value, total.low, total.high, total.n) == pytest.approx(expected)
-    shown = tables.contexts(study_with(*cells)).loc[f"ascending {EC1} goal 1 right"]
-    assert shown.p_holm == one(EC1, "context dependence").p
-    for column, signature in (
-        ("distance", "context distance"),
-        ("dependence", "context dependence"),
-        ("equivalent", "motor-equivalent part"),
-        ("other", "non-motor-equivalent part"),
-    ):
-        assert shown[column] == one(EC1, signature).value
+    study = study_with(*cells)
+    frame = tables.contexts(study)
+    assert frame.equals(tables.contexts(study_with(*cells)))  # nothing is random but by its seed
+    assert list(frame.index) == [f"ascending {name} goal 1 right" for name in (EC1, "corrective")]
+    learned, alone = frame.iloc[0], frame.iloc[1]
+    assert learned.p_holm < 0.02  # 2 of 252 at best
+    assert learned.equivalent > 5 * learned.other
+    assert (learned.runs, alone.runs) == (10, 2)
+    assert alone.distance == 0
+    assert math.isnan(alone.dependence)  # a single run a context has no spread
+    assert math.isnan(alone.p_holm)
+    shown = tables.signatures(study)
+    assert list(shown.index) == [
+        f"{task} {method}" for task in ("ascending", "descending") for method in (EC1, "corrective")
+    ]
+    changes = cells[0].against_same_hands
+    assert shown["first"].iloc[0] == pytest.approx(changes[:, 0].mean())
+    assert shown.total.iloc[0] == pytest.approx(changes.sum(axis=1).mean())
+    assert shown[["as_in_isolation", "preshaping"]].isna().all(axis=None)  # of two hands
 
 
 def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):

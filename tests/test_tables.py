@@ -18,8 +18,7 @@ from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation
 from coartic.analysis.topics.comparison import sentences
 from coartic.analysis.topics.comparison.scores import BY_FORMULA, BY_TRIAL
-from coartic.analysis.trajectories import Trajectories
-from tests.support.made_up import MadeUp, made, made_up_optima, row, study_of
+from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
@@ -161,23 +160,7 @@ def test_learning(study):
 
 
 def test_contexts(study, monkeypatch):
-    """Signatures of two goals that two methods share, each in its column; Holm by method."""
-    names = ["context distance", "context dependence", "motor-equivalent part",
-             "non-motor-equivalent part"]  # fmt: skip
-    rows = [
-        {"task": ONE, "label": label, "goal": goal, "hand": "right", "against": TWO, "moving": None,
-         "signature": name, "value": value, "n": n - (name == names[3]),
-         "p": p if name == names[1] else 0.9}
-        for label, goal, n, p, values in (
-            (CMA, 1, 6, 0.01, (0.5, 3.0, 0.4, 0.3)),
-            (CMA, 2, 5, 0.04, (0.1, 1.0, 0.06, 0.08)),
-            (PLAN, 1, 2, 0.04, (0.2, 2.0, 0.12, 0.16)),
-        )
-        for name, value in zip(names, values, strict=True)
-    ]  # fmt: skip
-    monkeypatch.setattr(coarticulation, "signature_values", lambda study: pd.DataFrame(rows))
-    beyond = {CMA: 0.5, PLAN: NONE}
-    monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
+    """Goals that two methods share, a row each; Holm by method."""
     columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
                "other"]  # fmt: skip
     cells = {
@@ -185,8 +168,18 @@ def test_contexts(study, monkeypatch):
         f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08),
         f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16),
     }
-    unsolved = {key: Trajectories(study.tasks[key[0]], key[1], "", ()) for key in study.cells}
-    frame = coarticulation.contexts(MadeUp(study, trajectories=made(unsolved)))
+    tasks = study.tasks[ONE], study.tasks[TWO]
+    shared = [
+        SimpleNamespace(tasks=tasks, row=name, goal=1, p=p, method=method, n=n, apart=apart,
+                        spreads=spreads, parts=parts)
+        for (name, (method, n, apart, spreads, _, _, *parts)), p in zip(
+            cells.items(), (0.01, 0.04, 0.04), strict=True
+        )
+    ]  # fmt: skip
+    monkeypatch.setattr(coarticulation, "shared_goals", lambda study: shared)
+    beyond = {CMA: 0.5, PLAN: NONE}
+    monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
+    frame = coarticulation.contexts(study)
     same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
     assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]
 

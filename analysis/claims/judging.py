@@ -1,4 +1,4 @@
-"""Claims of a study: tests of means, and one verdict each, corrected together.
+"""Claims judged: what was seen of each, and one verdict each by tests corrected together.
 
 A claim is tested by one or more means, one value a task, of which each must lie beyond a bound
 (:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the claims of a study over
@@ -9,19 +9,65 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic.analysis.claims.register import Finding
-from coartic.analysis.statistics.estimates import FEWEST, mean
+from coartic.analysis.statistics.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
-"""Resamples of a test: p-values are corrected over many claims."""
+"""Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
+Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was seen of one claim, before any correction of its tests."""
+
+    holds: bool | None
+    """Whether what the claim says is seen; None where that cannot be said."""
+    evidence: str
+    tests: tuple[Estimate, ...] = ()
+    """Tests that it rests on, turned so that a positive estimate is as claimed."""
+    against: tuple[Estimate, ...] | None = None
+    """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
+
+    @property
+    def p(self) -> float:
+        """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
+        return max((t.p for t in self.tests if not math.isnan(t.p)), default=math.nan)
+
+    @property
+    def opposite_p(self) -> float:
+        """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
+
+        The other tail of a test by resampling counts the observed sample as well. Exact tests
+        come with their opposites (``against``).
+        """
+        if self.against is not None:
+            every = [test.p for test in self.against]
+        else:
+            every = [min(1.0, 1 - test.p + 1 / (test.resamples + 1)) for test in self.tests]
+        tested = [p for p in every if not math.isnan(p)]
+        return min(1.0, min(tested) * len(tested)) if tested else math.nan
+
+    def verdict(self, p: float, opposite_p: float) -> Verdict:
+        """The verdict of the tests alone, by p-values that may be corrected."""
+        untested = any(math.isnan(test.p) and min(test.n) < 2 for test in self.tests)
+        if self.holds is None or (self.holds and untested):
+            return "undecided"
+        if self.holds:
+            # NaN: counted exactly, or no spread in any sample.
+            return "undecided" if p >= LEVEL else "supported"
+        certain = not self.tests or any(
+            test.value <= 0 and math.isnan(test.p) and min(test.n) > 1 for test in self.tests
+        )
+        return "not supported" if certain or opposite_p < LEVEL else "undecided"
 
 
 def mean_beyond(
@@ -76,8 +122,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        It holds where all of them hold, and rests on all their tests; where one cannot be said,
-        it is that one.
+        It holds where all of them hold, and rests on all their tests and on those of their
+        opposites where all have some; where one cannot be said, it is that one.
 
     Examples
     --------
@@ -88,10 +134,12 @@ def all_of(*findings: Finding) -> Finding:
     for finding in findings:
         if finding.holds is None:
             return finding
+    opposites = [finding.against for finding in findings if finding.against is not None]
     return Finding(
         all(finding.holds for finding in findings),
         "; ".join(finding.evidence for finding in findings),
         tuple(test for finding in findings for test in finding.tests),
+        sum(opposites, ()) if len(opposites) == len(findings) else None,
     )
 
 

@@ -16,7 +16,7 @@ from typing import Any, get_args
 import pandas as pd
 
 from coartic import CoarticError
-from coartic.analysis.claims.register import CLAIMS, Verdict
+from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about, text
 from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
@@ -202,17 +202,16 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them, by verdict."""
     order = get_args(Verdict)
     rows = TABLES["claims"](study).reset_index(names="id")
-    entries = papers_claims(study)
-    if entries and mostly_undecided(entries):  # they lack their runs
+    judged = papers_claims(study)
+    if len(judged) and mostly_undecided(judged):  # they lack their runs
         rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]
     return [
         {
             **{
                 key: str(row[key])
-                for key in ("id", "statement", "verdict", "evidence", "test", "quote")
+                for key in ("id", "statement", "verdict", "evidence", "test", "place", "quote")
             },
             "tone": TONES[row["verdict"]],
-            "place": ", ".join(filter(None, (row["place"], CLAIMS[row["id"]].figure))),
             "sets": row["sets"] or NONE,
             "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
         }

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from coartic.analysis.claims.judge import counts
+from coartic.analysis.claims.judgements import counts
 from coartic.analysis.methods import is_variant, main_methods, name_of
 from coartic.analysis.report import about
 from coartic.analysis.report.contents import TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import COLUMNS
-from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.comparison import sentences as comparison
 from coartic.analysis.topics.paper.sentences import papers_claims, rewards_by_verdict
 
@@ -64,8 +64,8 @@ def with_interval(
 
 def numbers(study: Study) -> Iterator[Number]:
     """The headline first: verdicts, running times, gaps; then rewards."""
-    if entries := papers_claims(study):
-        for verdict_of_claim, count in counts(entries).items():
+    if len(judged := papers_claims(study)):
+        for verdict_of_claim, count in counts(judged.verdict).items():
             comment = f"claims that are {verdict_of_claim}: table claims"
             yield f"Claims{letters_alone(verdict_of_claim)}", str(count), comment
         for verdict, count in rewards_by_verdict(study).items():

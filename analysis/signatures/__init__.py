@@ -1,4 +1,4 @@
 """Signatures of coarticulation: how a method's solutions move, beyond their reward.
 
-:mod:`~.register` has them all; the other files have what they are computed from.
+:mod:`~.signs` gives one number for each run, :mod:`~.two_contexts` compares the runs of two tasks.
 """

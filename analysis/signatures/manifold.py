@@ -22,12 +22,6 @@ def movable(task: Task, hand: Hand) -> Array:
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
-def jacobian_of(task: Task, hand: Hand, configurations: Array) -> tuple[Array, Array]:
-    """Joints that can move a hand, and its Jacobian in these, ``(2, k)``, at the mean posture."""
-    joints = movable(task, hand)
-    return joints, task.robot.jacobian(configurations.mean(axis=0), hand)[:, joints]
-
-
 def subspaces(jacobian: Array) -> tuple[Array, Array]:
     """Orthonormal bases of nullspace and of its complement, ``(k, d)`` each.
 

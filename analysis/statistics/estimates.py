@@ -1,9 +1,9 @@
-"""Estimates with their intervals: means, differences, shares.
+"""Estimates with their intervals: means and differences.
 
 Samples are rewards (or any score) of independent runs; a plain number in the place of a sample is
 taken as known without error. Intervals are of the BCa bootstrap, and the edge cases of that are
-all in :func:`bootstrap_estimate`. Signatures have :func:`student` intervals, shares of runs
-Wilson's. Resampling has one seed, :data:`SEED`, which has nothing to do with the seeds of the runs.
+all in :func:`bootstrap_estimate`. Resampling has one seed, :data:`SEED`, which has nothing to do
+with the seeds of the runs.
 
 scipy.stats is imported where it is needed: it takes longer than drawing a figure.
 
@@ -16,7 +16,6 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -179,23 +178,6 @@ def student(value: float, error: float, freedom: float, p: float = math.nan) -> 
     return Estimate(value, value - half, value + half, p)
 
 
-def student_mean(values: Array) -> Estimate:
-    """Mean of values (n,) with Student's interval; without one for a single value."""
-    if len(values) < 2:
-        return Estimate(float(np.mean(values)))
-    error = standard_deviation(values) / math.sqrt(len(values))
-    return student(float(np.mean(values)), error, len(values) - 1)
-
-
 def standard_deviation(values: Array) -> float:
     """SD of values (n,), n - 1 degrees of freedom; 0 without spread, NaN of fewer than two."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan
-
-
-@cache
-def wilson(count: int, total: int) -> Estimate:
-    """``count`` of ``total`` runs as a share, with Wilson's interval (1927)."""
-    from scipy import stats
-
-    ends = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
-    return Estimate(count / total, float(ends.low), float(ends.high))

@@ -13,9 +13,9 @@ from matplotlib.patheffects import withStroke
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import name_of
-from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
-from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.drawing import MARKERS
 
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]

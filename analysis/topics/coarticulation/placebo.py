@@ -10,13 +10,13 @@ import math
 from typing import NamedTuple
 
 from coartic.analysis.methods import PLACEBO
-from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.context import smallest_p
+from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.coarticulation.values import shared_goal
+from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
 
 

@@ -6,7 +6,7 @@ import math
 
 from coartic.analysis.methods import is_variant, name_of
 from coartic.analysis.section import Section
-from coartic.analysis.signatures.between import TwoContexts
+from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
 from coartic.analysis.topics.coarticulation import tables
 from coartic.analysis.topics.coarticulation.placebo import difference

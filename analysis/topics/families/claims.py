@@ -1,152 +1,251 @@
-"""The paper's claims on families of random tasks."""
+"""The paper's claims on families of random tasks, each with its words and how it is judged."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 
-from coartic.analysis.claims.data import Data, judges
-from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.claims.rules import (
-    TEST_OF_FAMILIES,
-    Comparison,
-    higher,
-    in_every_family,
-    no_trial_fails,
-    reported_instances,
-)
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNERS, PLACEBO, most_exploring
+from coartic.analysis.claims import margins
+from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.comparisons import Higher, all_positive, no_trial_fails
+from coartic.analysis.claims.judging import RESAMPLES_OF_CLAIMS, Finding
+from coartic.analysis.claims.reader import MissingError, Reader, who_is
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring
+from coartic.analysis.statistics.estimates import FEWEST, mean
+from coartic.analysis.statistics.hypotheses import bootstrap_test
+from coartic.analysis.topics.families.instances import sample
+from coartic.analysis.words import estimate
+from coartic.tasks.optima import KnownOptimum
 
 OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
+Comparing = tuple[str, Callable[[str], Higher]]
+"""What stands behind the name of a family, and a comparison on a task."""
 
 
-@judges("learning-improves-in-general", test=TEST_OF_FAMILIES)
-def learning_improves_in_general(data: Data) -> Finding:
-    """Replays of the learner that explores most are better than the initial solution."""
+def in_every_family(read: Reader, families: Iterable[str], *comparisons: Comparing) -> Finding:
+    """Whether comparisons are as claimed in the mean over the instances of each family.
 
-    def compare(task: str) -> Comparison:
-        label = most_exploring(data.task(task))
-        return higher(data.replay(task, label), data.initial(task))
+    Rewards are in per cent of the best known.
+    """
+    tests, parts = [], []
+    for name, compare in comparisons:
+        for family in families:
+            values = []
+            for task, best in reported_instances(read, family).items():
+                with suppress(MissingError):
+                    first, second, margin = compare(task)
+                    other = 0.0 if second is None else second.numbers.mean()
+                    unit = 1.0 if first.quantity else 100 / abs(best.reward)
+                    values.append(unit * float(first.numbers.mean() - other))
+            if len(values) < FEWEST:
+                raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
+            tests.append(bootstrap_test(values, margin, resamples=RESAMPLES_OF_CLAIMS))
+            seen = estimate(mean(values), 2 if first.quantity else 1) + " %" * (not first.quantity)
+            quantity = first.quantity or "gain as a share of the best known reward"
+            parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances"))
+    return all_positive(tests, parts)
 
-    return in_every_family(data, EVERY_FAMILY, (" replay EC > initial", compare))
+
+def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
+    """The best known of a family's instances but for those of development, for tuning."""
+    instances = sample(read.study)
+    names = instances.families.get(family, ())
+    reported = [name for name in names if read.task(name).split != "development"]
+    if not reported:
+        raise MissingError(f"this folder has no instances of {family} that can be judged")
+    return {name: instances.references[name] for name in reported}
 
 
-@judges(
-    "proficiency-rises-in-general",
-    test=TEST_OF_FAMILIES,
-    pairs={"EC3 > EC2": (EC3, EC2), "EC4 > EC3": (EC4, EC3)},
-)
-@judges("random-hands-pay-in-general", test=TEST_OF_FAMILIES, pairs={"EC4 > EC2": (EC4, EC2)})
-@judges("other-arm-pays-in-general", test=TEST_OF_FAMILIES, pairs={"EC4 > EC3": (EC4, EC3)})
-@judges(
-    "beats-inaccurate-in-general",
-    test=TEST_OF_FAMILIES,
-    pairs={f"EC1 > {JERK}": (EC1, JERK)},
-    families=OF_ONE_ARM,
-)
-def earns_more_in_general(
-    data: Data, pairs: dict[str, tuple[str, str]], families: Sequence[str] = OF_TWO_ARMS
-) -> Finding:
+def earns_more(read: Reader, families: Iterable[str], *pairs: tuple[str, str]) -> Finding:
     """Whether the first of each pair of methods earns more."""
 
-    def comparing(first: str, second: str) -> Callable[[str], Comparison]:
-        return lambda task: higher(data.reward(task, first), data.reward(task, second))
+    def comparing(first: str, second: str) -> Comparing:
+        words = f" {first.removeprefix(LEARNER)} > {second.removeprefix(LEARNER)}"
+        return words, lambda task: Higher(read.reward(task, first), read.reward(task, second))
 
-    pairs_by_name = ((f" {name}", comparing(*pair)) for name, pair in pairs.items())
-    return in_every_family(data, families, *pairs_by_name)
+    return in_every_family(read, families, *(comparing(*pair) for pair in pairs))
 
 
-@judges("beats-exhaustive-in-general", test=TEST_OF_FAMILIES)
-def beats_exhaustive_in_general(data: Data) -> Finding:
+def shows(read: Reader, sign: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
+    """A sign of the learner that explores most, alone or beside that of another method."""
+
+    def compare(task: str) -> Higher:
+        first = read.sign(sign, task, most_exploring(read.task(task)))
+        return Higher(first, read.sign(sign, task, beyond) if beyond else None, by)
+
+    return f", more than {who_is(beyond)}" if beyond else "", compare
+
+
+def learning_improves(read: Reader) -> Finding:
+    """Replays of the learner that explores most are better than the initial solution."""
+
+    def compare(task: str) -> Higher:
+        return Higher(read.replay(task, most_exploring(read.task(task))), read.initial(task))
+
+    return in_every_family(read, EVERY_FAMILY, (" replay EC > initial", compare))
+
+
+def beats_exhaustive(read: Reader) -> Finding:
     """Learning is better than trying all hands with the corrective process alone."""
-    best = (" EC3 > best", lambda task: higher(data.reward(task, EC3), data.best(task)))
-    return in_every_family(data, OF_TWO_ARMS, best)
+
+    def compare(task: str) -> Higher:
+        return Higher(read.reward(task, EC3), read.best(task))
+
+    return in_every_family(read, OF_TWO_ARMS, (" EC3 > best", compare))
 
 
-@judges(
-    "first-movement-sacrificed-in-general",
-    test="one-tailed bootstrap tests over instances, against the corrective process with the same "
-    "hands: the first movement takes more than {ticks:g} tick longer, and longer than in the best "
-    "of random guesses (placebo); the whole task is faster",
-)
-def first_movement_sacrificed_in_general(data: Data) -> Finding:
-    """The first movement is slower, the whole faster."""
-    return in_every_family(
-        data,
-        OF_ONE_ARM,
-        ("", lambda task: higher(data.sign("first", task, EC1), by=MARGINS["ticks"])),
-        more_than_placebo(data, "first"),
-        ("", lambda task: higher(data.sign("whole", task, EC1))),
-    )
-
-
-def more_than_placebo(data: Data, sign: str) -> tuple[str, Callable[[str], Comparison]]:
-    """A sign of the learner that explores most beside that of the placebo."""
-
-    def compare(task: str) -> Comparison:
-        first = data.sign(sign, task, most_exploring(data.task(task)))
-        return higher(first, data.sign(sign, task, PLACEBO))
-
-    return ", more than random guesses", compare
-
-
-@judges(
-    "hand-coarticulation-in-general",
-    test="one-tailed bootstrap tests over instances, in each family, of the difference of the "
-    "shares of such goals, and of that to the best of random guesses (placebo)",
-)
-def hand_coarticulation_in_general(data: Data) -> Finding:
-    """Slower hands are chosen more often than where the closest is tried."""
-    return in_every_family(
-        data,
-        OF_TWO_ARMS,
-        (
-            ", more than EC2",
-            lambda task: higher(data.sign("hand", task, EC4), data.sign("hand", task, EC2)),
-        ),
-        more_than_placebo(data, "hand"),
-    )
-
-
-@judges(
-    "arm-coarticulation-in-general",
-    test="one-tailed bootstrap tests over instances, in each family: from the learned posture of "
-    "base and chosen arm the corrective process reaches the next goal more than {ticks:g} tick "
-    "sooner than from the posture in which it would itself have hit the goal, and by more ticks "
-    "than in the best of random guesses (placebo). On both sides the waiting arm is where it was "
-    "before the movement. EC1 on one arm, EC4 on two; mean over goals",
-)
-def arm_coarticulation_in_general(data: Data) -> Finding:
-    """Postures of base and chosen arm leave the next goal nearer."""
-
-    def compare(task: str) -> Comparison:
-        arm = data.sign("arm", task, most_exploring(data.task(task)))
-        return higher(arm, by=MARGINS["ticks"])
-
-    return in_every_family(data, EVERY_FAMILY, ("", compare), more_than_placebo(data, "arm"))
-
-
-@judges(
-    "other-arm-coarticulation-in-general",
-    test="one-tailed bootstrap tests over instances, in each family, that the hand of the waiting "
-    "arm gets nearer (0 where it keeps still; runs with both hands), and nearer than in the best "
-    "of random guesses (placebo)",
-)
-def other_arm_coarticulation_in_general(data: Data) -> Finding:
-    """The waiting arm brings its hand nearer to its next goal."""
-    return in_every_family(
-        data,
-        OF_TWO_ARMS,
-        ("", lambda task: higher(data.sign("other arm", task, EC4))),
-        more_than_placebo(data, "other arm"),
-    )
-
-
-@judges("corrective-ensures-in-general", test="exact: failed trials of the learner")
-def corrective_ensures_in_general(data: Data) -> Finding:
+def corrective_ensures(read: Reader) -> Finding:
     """No trial fails."""
-    names = [name for family in EVERY_FAMILY for name in reported_instances(data, family)]
+    names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
     cells = [(name, label) for name in names for label in LEARNERS]
-    return no_trial_fails(data, [cell for cell in cells if cell in data.study.cells])
+    return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])
+
+
+TEST_OF_FAMILIES = (
+    "one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
+    "known reward, in each family"
+)
+
+CLAIMS_ON_FAMILIES = [
+    Claim(
+        id="learning-improves-in-general",
+        text="In every family of random tasks learning improves on the initial solution.",
+        place="Results, Summary of Two-Armed Task Results",
+        quote="each bar is significantly higher than the bar to its left",
+        test=TEST_OF_FAMILIES,
+        judge=learning_improves,
+        group="families",
+    ),
+    Claim(
+        id="proficiency-rises-in-general",
+        text="In every family with two arms reward rises when more is explored: EC3 is better than "
+        "EC2, and EC4 better than EC3.",
+        place="Method, Experiments",
+        quote="proficiency would increase as the number of levels",
+        test=TEST_OF_FAMILIES,
+        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC3, EC2), (EC4, EC3)),
+        group="families",
+    ),
+    Claim(
+        id="random-hands-pay-in-general",
+        text="In every family with two arms it is better to try hands at random than to try the "
+        "closest one: EC4 is better than EC2.",
+        place="Results, Exploration Condition 2",
+        quote="did not produce enough exploration to reliably find a better",
+        test=TEST_OF_FAMILIES,
+        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC2)),
+        group="families",
+    ),
+    Claim(
+        id="other-arm-pays-in-general",
+        text="In every family with two arms moving the other arm as well is better: EC4 beats EC3.",
+        place="Results, Exploration Condition 4",
+        quote="but performance increased",
+        test=TEST_OF_FAMILIES,
+        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC3)),
+        group="families",
+    ),
+    Claim(
+        id="beats-exhaustive-in-general",
+        text="In every family with two arms EC3 is better than trying every hand sequence with the "
+        "corrective process alone.",
+        place="Results, Exploration Condition 3",
+        quote="the overall performance with exploration at AModChosen and DASel was better",
+        test=TEST_OF_FAMILIES,
+        judge=beats_exhaustive,
+        group="families",
+    ),
+    Claim(
+        id="beats-inaccurate-in-general",
+        text="On random tasks for one arm the learner finds better movements than a planner whose "
+        "objective is not the reward (minimum jerk).",
+        place="Discussion, Implications of Using a Simple Learning Process",
+        quote="movements can be found (if they exist) that deliver better consequences",
+        test=TEST_OF_FAMILIES,
+        judge=lambda read: earns_more(read, OF_ONE_ARM, (EC1, JERK)),
+        group="families",
+    ),
+    Claim(
+        id="first-movement-sacrificed-in-general",
+        text="On random tasks for one arm the first movement gets slower than in the initial "
+        "solution while the whole task gets faster.",
+        place="Results, Exploration Condition 1",
+        quote="the reward incurred after making the first movement is more negative",
+        test="one-tailed bootstrap tests over instances, against the corrective process with the "
+        "same hands: the first movement takes more than 1 tick longer, and longer than in the best "
+        "of random guesses (placebo); the whole task is faster",
+        judge=lambda read: in_every_family(
+            read,
+            OF_ONE_ARM,
+            shows(read, "first", by=margins.TICKS),
+            shows(read, "first", beyond=PLACEBO),
+            shows(read, "whole"),
+        ),
+        group="families",
+    ),
+    Claim(
+        id="hand-coarticulation-in-general",
+        text="In every family with two arms coarticulation shows in the choice of hand: goals that "
+        "others follow are hit with the slower hand for that goal alone more often where hands are "
+        "learned (EC4) than where the closest is tried (EC2).",
+        place="Discussion",
+        quote="Coarticulation was seen in terms of which arm was used",
+        test="one-tailed bootstrap tests over instances, in each family, of the difference of the "
+        "shares of such goals, and of that to the best of random guesses (placebo)",
+        judge=lambda read: in_every_family(
+            read,
+            OF_TWO_ARMS,
+            shows(read, "hand", beyond=EC2),
+            shows(read, "hand", beyond=PLACEBO),
+        ),
+        group="families",
+    ),
+    Claim(
+        id="arm-coarticulation-in-general",
+        text="In every family learned postures of base and chosen arm leave the next goal nearer "
+        "(the waiting arm is left out).",
+        place="Abstract; Discussion",
+        quote="how the corresponding arm was used",
+        test="one-tailed bootstrap tests over instances, in each family: from the learned posture "
+        "of base and chosen arm the corrective process reaches the next goal more than 1 tick "
+        "sooner than from the posture in which it would itself have hit the goal, and by more "
+        "ticks than in the best of random guesses (placebo). On both sides the waiting arm is "
+        "where it was before the movement. EC1 on one arm, EC4 on two; mean over goals",
+        judge=lambda read: in_every_family(
+            read,
+            EVERY_FAMILY,
+            shows(read, "arm", by=margins.TICKS),
+            shows(read, "arm", beyond=PLACEBO),
+        ),
+        group="families",
+    ),
+    Claim(
+        id="other-arm-coarticulation-in-general",
+        text="In every family with two arms the waiting arm brings its hand nearer to its own next "
+        "goal under EC4.",
+        place="Method, The Learning Process; Discussion",
+        quote="possibly in way so that the robot would be able to hit",
+        test="one-tailed bootstrap tests over instances, in each family, that the hand of the "
+        "waiting arm gets nearer (0 where it keeps still; runs with both hands), and nearer than "
+        "in the best of random guesses (placebo)",
+        judge=lambda read: in_every_family(
+            read,
+            OF_TWO_ARMS,
+            shows(read, "other arm"),
+            shows(read, "other arm", beyond=PLACEBO),
+        ),
+        group="families",
+    ),
+    Claim(
+        id="corrective-ensures-in-general",
+        text="In every family the corrective process completes every trial of the learner.",
+        place="Method, The Corrective Process; Discussion, Multiple Controller Schemes",
+        quote="to ensure that the overall task is accomplished",
+        test="exact: failed trials of the learner",
+        judge=corrective_ensures,
+        group="exact",
+    ),
+]

@@ -8,7 +8,7 @@ from coartic.analysis.methods import name_of
 from coartic.analysis.section import Section
 from coartic.analysis.study import Study
 from coartic.analysis.topics.families import tables
-from coartic.analysis.topics.families.sample import sample
+from coartic.analysis.topics.families.instances import sample
 from coartic.analysis.words import interval_in_words, number
 
 MOST_GAPS = 4

@@ -27,7 +27,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import Scores, other_tasks, value
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.sample import THERE, Sample, sample, scores_of
+from coartic.analysis.topics.families.instances import THERE, Sample, sample, scores_of
 from coartic.robot import Array
 
 OfFamily = TypeVar("OfFamily")

@@ -1,29 +1,42 @@
-"""The paper's claims on its own tasks: one function each, which says how it is judged."""
+"""The paper's claims on its own tasks, each with its words and how it is judged."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy import stats
 
-from coartic.analysis.claims import rules
-from coartic.analysis.claims.data import Data, Measurement, MissingError, judges
-from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.claims.rules import TEST_OF_MEANS, all_of, higher
+from coartic import Execution
+from coartic.analysis.claims import margins
+from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.comparisons import Higher, all_higher, all_positive, no_trial_fails
+from coartic.analysis.claims.judging import Finding, all_of
+from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4
 from coartic.analysis.signatures.subtasks import postures_before
-from coartic.analysis.statistics.hypotheses import (
-    bootstrap_test,
+from coartic.analysis.statistics.estimates import Estimate
+from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
+from coartic.analysis.topics.paper.coarticulation import (
+    CLAIMS_OF_COARTICULATION,
+    ONE_ARMED,
+    TASK_1,
+    TASK_2,
+    TEST_OF_MEANS,
+    TWO_ARMED,
 )
+from coartic.analysis.topics.paper.published import published_cell
 from coartic.analysis.topics.paper.shortest import shortest_reach
+from coartic.analysis.words import tally
+from coartic.learner.kernel import TENTHS
 from coartic.robot import Array
 from coartic.tasks.task import hands_of
 
-ONE_ARMED = ASCENDING, DESCENDING = "ascending", "descending"
-TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 FREE_BASE = "two-armed-1.free-base"
 CELLS_OF_ONE_ARM = tuple((task, EC1) for task in ONE_ARMED)
 CELLS_OF_TWO_ARMS = (
@@ -31,8 +44,12 @@ CELLS_OF_TWO_ARMS = (
     *((TASK_2, label) for label in (EC3, EC4)),
 )
 """The paper's conditions on its tasks."""
-SMOOTH_PLANS = tuple(
-    f"trajectory-optimisation/{cost}" for cost in ("squared-changes", "acceleration", "jerk")
+LEAST_CHANGES = "trajectory-optimisation/squared-changes"
+"""The plan of Jordan's smoothness cost."""
+SMOOTH_PLANS = (
+    LEAST_CHANGES,
+    "trajectory-optimisation/acceleration",
+    "trajectory-optimisation/jerk",
 )
 Cells = Sequence[tuple[str, str]]
 """Tasks, each with the label of a method."""
@@ -40,39 +57,23 @@ Cells = Sequence[tuple[str, str]]
 # One-armed tasks, and what is judged on both kinds alike.
 
 
-ENSURES = (
-    "exact: failed trials of the learner, and hand sequences that the corrective process cannot "
-    "complete"
-)
-
-
-@judges("corrective-ensures-one-armed", test=ENSURES, cells=CELLS_OF_ONE_ARM)
-@judges("corrective-ensures-two-armed", test=ENSURES, cells=CELLS_OF_TWO_ARMS)
-def corrective_ensures(data: Data, cells: Cells) -> Finding:
+def corrective_ensures(read: Reader, cells: Cells) -> Finding:
     """Whether the corrective process completes every trial, and every hand sequence by itself."""
-    no_trial_fails = rules.no_trial_fails(data, cells)
-    rewards = [reward for task in dict(cells) for reward in data.sequences(task).values()]
-    missed = sum(map(math.isnan, rewards))
+    trials = no_trial_fails(read, cells)
+    rewards = np.concatenate([read.alone(task) for task in dict(cells)])
+    missed = int(np.isnan(rewards).sum())
     return Finding(
-        no_trial_fails.holds and not missed,
-        f"{no_trial_fails.evidence} Without any experience, the corrective process completes "
-        f"{len(rewards) - missed} of {len(rewards)} hand sequences.",
+        trials.holds and not missed,
+        f"{trials.evidence}. Without any experience, the corrective process completes "
+        f"{len(rewards) - missed} of {len(rewards)} hand sequences",
     )
 
 
-NEAR_SHORTEST = (
-    "exact: no subtask of the initial solution is more than {close:.0%} longer than the shortest "
-    "path from the same posture (the shortest that a search finds)"
-)
-
-
-@judges("corrective-near-shortest-one-armed", test=NEAR_SHORTEST, tasks=ONE_ARMED)
-@judges("corrective-near-shortest-two-armed", test=NEAR_SHORTEST, tasks=TWO_ARMED)
-def corrective_near_shortest(data: Data, tasks: Iterable[str]) -> Finding:
+def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
     """Whether each subtask of initial solutions is nearly the shortest path by itself."""
     parts, most = [], 0.0
     for name in tasks:
-        task, initial = data.task(name), data.initial_execution(name)
+        task, initial = read.task(name), read.initial_execution(name)
         before, after = np.array(postures_before(initial, task)), initial.configurations
         reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
         shortest = np.array([shortest_reach(task, *reach) for reach in reaches])
@@ -82,60 +83,134 @@ def corrective_near_shortest(data: Data, tasks: Iterable[str]) -> Finding:
         each = ", ".join(f"{share:.1%}" for share in excess)
         parts.append(f"{name} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
     return Finding(
-        most <= MARGINS["close"],
-        f"By so much each subtask is longer than the shortest path: {'; '.join(parts)}.",
+        most <= margins.CLOSE,
+        f"By so much each subtask is longer than the shortest path: {'; '.join(parts)}",
     )
 
 
-FEWER_CORRECTIONS = (
-    "one-tailed paired bootstrap tests in each cell: more corrective movements in the first tenth "
-    "of the trials than in the last. Trial 0 does not count, as it has no others by construction"
-)
+def corrected_less_later(read: Reader, cells: Cells) -> Finding:
+    """Whether the runs of each cell make fewer corrective movements in the end.
 
-
-@judges("corrections-one-armed", test=FEWER_CORRECTIONS, cells=CELLS_OF_ONE_ARM)
-@judges("corrections-two-armed", test=FEWER_CORRECTIONS, cells=CELLS_OF_TWO_ARMS)
-def corrected_less_later(data: Data, cells: Cells) -> Finding:
-    """Whether the runs of each cell make fewer corrective movements in the end."""
-    tests, parts = [], []
-    last: list[partial[Measurement]] = []
+    Trial 0 does not count: it has no other movements by construction.
+    """
+    words = "share of movements that are corrected, in the"
+    tests, parts, learned = [], [], []
     for task, label in cells:
-        early, late = (data.corrections(task, label, tenth) for tenth in ("early", "late"))
+        runs, goals = read.runs(task, label), len(read.task(task).goals)
+        movements = (runs.trials - 1) * goals / TENTHS
+        early, late, last = (
+            Measurement(task, who_is(label), shares.to_numpy(np.float64), f"{words} {when}")
+            for shares, when in (
+                (runs.early_corrections / movements, "first tenth of the trials"),
+                (runs.late_corrections / movements, "last tenth of the trials"),
+                (runs.solution_corrections / goals, "learned solution"),
+            )
+        )
         tests.append(bootstrap_test(early.numbers - late.numbers, 0.0))
         parts.append((early.quantity, f"{early.name}: {early}, late {late}"))
-        last.append(partial(data.last_corrections, task, label))
-    parts += [(values.quantity, f"{values.name}: {values}") for values in rules.there(last)]
-    return rules.all_positive(tests, parts)
+        learned.append((last.quantity, f"{last.name}: {last}"))
+    return all_positive(tests, parts + learned)
 
 
-@judges(
-    "resembles-squared-changes",
-    test="one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances to "
-    "the plan, learned over initial, is below {halfway:g}",
-)
-def resembles_squared_changes(data: Data) -> Finding:
-    """Learned postures are nearer to the plan than halfway from the initial ones."""
-    return all_of(higher(data.resemblance(task, EC1), by=MARGINS["halfway"]) for task in ONE_ARMED)
+def resemblance(read: Reader, task: str) -> Measurement:
+    """Share of the initial solution's distance to the plan that each run has covered."""
+    learned = read.cell(task, EC1).runs
+    (plan,) = read.cell(task, LEAST_CHANGES).runs
+    planned = plan.execution.configurations
+
+    def apart(execution: Execution) -> float:
+        """Mean distance of postures at the goals, length unit and rad mixed."""
+        return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
+
+    before = apart(read.initial_execution(task))
+    shares = np.array([1 - apart(run.execution) / before for run in learned])
+    return Measurement(
+        task, who_is(EC1), shares,
+        "share of the distance of the initial solution to the plan for least squared changes "
+        "that learning has covered (postures at the goals)",
+    )  # fmt: skip
 
 
-INACCURATE = (
-    "one-tailed bootstrap tests against plans for smoothness (free times); at least one of them "
-    "holds, the smallest p times their number (Bonferroni)"
-)
-
-
-@judges("beats-inaccurate-one-armed", test=INACCURATE, tasks=ONE_ARMED, label=EC1)
-@judges("beats-inaccurate-two-armed", test=INACCURATE, tasks=TWO_ARMED, label=EC4)
-def beats_smooth_plans(data: Data, tasks: Iterable[str], label: str) -> Finding:
+def beats_smooth_plans(read: Reader, tasks: Iterable[str], label: str) -> Finding:
     """Whether a plan for smoothness is worse than what is learned, on some task."""
     comparisons = []
     for task in tasks:
-        learned = data.reward(task, label)
-        comparisons += [higher(learned, data.reward(task, plan)) for plan in SMOOTH_PLANS]
-    return rules.some_of(comparisons)
+        learned = read.reward(task, label)
+        comparisons += [Higher(learned, read.reward(task, plan)) for plan in SMOOTH_PLANS]
+    return some_of(all_higher(comparisons))
+
+
+def some_of(every: Finding) -> Finding:
+    """Whether one test or more is as claimed: smallest p times their number."""
+    best = min(every.tests, key=lambda test: math.inf if math.isnan(test.p) else test.p)
+    holds = any(test.value > 0 for test in every.tests)
+    if holds:
+        best = replace(best, p=min(1.0, best.p * len(every.tests)))
+    return Finding(holds, every.evidence, (best,))
 
 
 # Two-armed tasks.
+
+
+def most_do(words: str, does: Sequence[bool], *, claimed: bool = True) -> Finding:
+    """Whether more than three quarters of the runs do something; or fewer, if not ``claimed``."""
+    count, total = sum(does), len(does)
+    more = share_test(count, total, margins.MOST, "greater")
+    fewer = share_test(count, total, margins.MOST, "less")
+    side = "greater" if claimed else "less"
+    limits = stats.binomtest(count, total, alternative=side).proportion_ci()
+    limit = f"at least {limits.low:.0%}" if claimed else f"at most {limits.high:.0%}"
+    if limits.low > 0 or limits.high < 1:
+        words += f", {limit} of all (95 %)"
+    if claimed:
+        return Finding(more.value > 0, words, (more,), (fewer,))
+    return Finding(fewer.value < 0, words, (fewer,), (more,))
+
+
+def runs_that(task: str, label: str, what: str, does: Sequence[bool], hands: list[str]) -> str:
+    """How many runs do something, in words, with the hands of all."""
+    each = tally(Counter(hands))
+    return f"{task} {who_is(label)} {what}: {sum(does)} of {len(does)} runs ({each})"
+
+
+def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
+    """Whether neither few nor most runs learned a sequence; the printed count speaks against it."""
+    learned = read.hands(task, label)
+    does = [each == hands for each in learned]
+    count, total = sum(does), len(does)
+    share = count / total
+    low, high = stats.binomtest(count, total).proportion_ci()
+    cell = published_cell(task, who_is(label))
+    assert cell is not None
+    printed, of_printed = cell.sequences[hands], sum(s.runs for s in cell.sequences.values())
+    more = share_test(count, total, margins.FEW, "greater")
+    fewer = share_test(count, total, margins.MOST, "less")
+    inside = min(share - margins.FEW, margins.MOST - share)
+    within = Estimate(inside, n=(total,), p=max(more.p, fewer.p))
+    table = [[count, total - count], [printed.runs, of_printed - printed.runs]]
+    unlike = Estimate(
+        share - printed.runs / of_printed,
+        n=(total, of_printed),
+        p=float(stats.fisher_exact(table).pvalue),
+    )
+    return Finding(
+        margins.FEW < share < margins.MOST,
+        f"{runs_that(task, label, hands, does, learned)}, {low:.0%} to {high:.0%} of all (95 %); "
+        f"published {printed.runs} of {of_printed}{' (derived)' * printed.derived_runs}",
+        (within,),
+        (unlike,),
+    )
+
+
+def no_reversal(read: Reader) -> Finding:
+    """With RRLR the base only moves right."""
+    learned, q0 = read.hands(TASK_1, EC2), read.task(TASK_1).q0
+    runs = [run.execution for run in read.cell(TASK_1, EC2).runs if run.execution.hands == "RRLR"]
+    if not runs:
+        raise MissingError(f"no run of EC2 on {TASK_1} learned RRLR")
+    rightward = [bool((base_steps(q0, run.configurations) > 0).all()) for run in runs]
+    words = runs_that(TASK_1, EC2, "RRLR rightward", rightward, learned)
+    return most_do(words, rightward)
 
 
 def base_steps(start: Array, configurations: Array) -> Array:
@@ -143,71 +218,210 @@ def base_steps(start: Array, configurations: Array) -> Array:
     return np.diff(np.append(start[0], configurations[:, 0]))
 
 
-@judges("ec2-sequences", test=rules.TEST_OF_HALF, task=TASK_1, label=EC2, hands="RRLR")
-@judges("half-choose-rlrr", test=rules.TEST_OF_HALF, task=TASK_2, label=EC3, hands="RLRR")
-def half_find(data: Data, task: str, label: str, hands: str) -> Finding:
-    """Whether about half of the runs learn a sequence."""
-    return rules.about_half(data.hands(task, label), hands)
-
-
-@judges("multilevel-search", TEST_OF_MEANS)
-def multilevel_search(data: Data) -> Finding:
-    """Exploring hands as well earns more than the right hand alone."""
-    return all_of(higher(data.reward(task, EC3), data.reward(task, EC1)) for task in TWO_ARMED)
-
-
-@judges(
-    "no-reversal",
-    test="exact binomial test that more than {most:.0%} of the runs that learned RRLR do so (the "
-    "paper shows one)",
-)
-def no_reversal(data: Data) -> Finding:
-    """With RRLR the base only moves right."""
-    learned, q0 = data.hands(TASK_1, EC2), data.task(TASK_1).q0
-    runs = [run.execution for run in data.cell(TASK_1, EC2).runs if run.execution.hands == "RRLR"]
-    if not runs:
-        raise MissingError(f"no run of EC2 on {TASK_1} learned RRLR")
-    rightward = [bool((base_steps(q0, run.configurations) > 0).all()) for run in runs]
-    return rules.most(learned.count("RRLR rightward", rightward))
-
-
-@judges(
-    "ec4-mixed",
-    test="exact: at least one run does not have the commonest hand sequence (the paper names none)",
-)
-def ec4_mixed(data: Data) -> Finding:
+def ec4_mixed(read: Reader) -> Finding:
     """Runs learn different hands."""
-    learned = data.hands(TASK_2, EC4)
-    others = learned.count("not commonest", [h != learned.commonest for h in learned.sequences])
-    return Finding(others.number > 0, others.words)
+    learned = read.hands(TASK_2, EC4)
+    others = [hands != commonest(learned) for hands in learned]
+    return Finding(any(others), runs_that(TASK_2, EC4, "not commonest", others, learned))
 
 
-@judges("proficiency-rises", test=TEST_OF_MEANS)
-def proficiency_rises(data: Data) -> Finding:
+def commonest(learned: list[str]) -> str:
+    """The sequence that most runs learned."""
+    return Counter(learned).most_common(1)[0][0]
+
+
+def proficiency_rises(read: Reader) -> Finding:
     """Each condition is better than the one before, the first than the initial solution."""
-    comparisons: list[rules.Comparison] = []
+    comparisons: list[Higher] = []
     for task, label in CELLS_OF_TWO_ARMS:
-        learned = data.reward(task, label)
         first = not comparisons or comparisons[-1].first.task != task
-        before = data.initial(task) if first else comparisons[-1].first
-        comparisons.append(higher(learned, before))
-    return all_of(comparisons)
+        before = read.initial(task) if first else comparisons[-1].first
+        comparisons.append(Higher(read.reward(task, label), before))
+    return all_higher(comparisons)
 
 
-@judges(
-    "rail",
-    test="exact binomial tests under EC3: with the base on its rail more than {most:.0%} "
-    "of the runs have the commonest sequence, and with the base free fewer do",
-)
-def rail(data: Data) -> Finding:
+def rail(read: Reader) -> Finding:
     """Most runs have the commonest hands with the base on its rail, and not most without."""
-    on_rail = data.hands(TASK_1, EC3)
-    consistent = rules.most(on_rail.are(on_rail.commonest, name="commonest"))
-    free = data.hands(FREE_BASE, EC3)
-    mixed = rules.not_most(free.are(free.commonest, name="commonest"))
-    return Finding(
-        bool(consistent.holds and mixed.holds),
-        f"{consistent.evidence}; {mixed.evidence}",
-        consistent.tests + mixed.tests,
-        (consistent.against or ()) + (mixed.against or ()),
-    )
+    findings = []
+    for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
+        learned = read.hands(task, EC3)
+        does = [hands == commonest(learned) for hands in learned]
+        words = runs_that(task, EC3, "commonest", does, learned)
+        findings.append(most_do(words, does, claimed=consistent))
+    return all_of(*findings)
+
+
+def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
+    """The claims that are judged alike on tasks for one arm and on tasks for two.
+
+    ``best`` is the condition that explores most.
+    """
+    tasks, fitted = list(dict(cells)), which == "two"
+    return [
+        Claim(
+            id=f"corrective-ensures-{which}-armed",
+            text=f"On the {which}-armed tasks, the corrective process completes every trial, and "
+            "needs no experience to do so.",
+            place="Method, The Corrective Process; Discussion, Multiple Controller Schemes",
+            quote="to ensure that the overall task is accomplished",
+            test="exact: failed trials of the learner, and hand sequences that the corrective "
+            "process cannot complete",
+            judge=partial(corrective_ensures, cells=cells),
+            group="exact",
+            fitted=fitted,
+            sets="242 of 242 (Two-armed 1); 240 of 240 (Two-armed 2)" * fitted,
+        ),
+        Claim(
+            id=f"corrective-near-shortest-{which}-armed",
+            text=f"On the {which}-armed tasks, the corrective process takes nearly the shortest "
+            "path in joint space for each subtask by itself.",
+            place="Method, The Corrective Process",
+            quote="close to the shortest distance in joint space for each subtask",
+            test="exact: no subtask of the initial solution is more than 10% longer than the "
+            "shortest path from the same posture (the shortest that a search finds)",
+            judge=partial(corrective_near_shortest, tasks=tasks),
+            group="exact",
+            fitted=fitted,
+        ),
+        Claim(
+            id=f"corrections-{which}-armed",
+            text=f"On the {which}-armed tasks, the corrective process is needed early in learning, "
+            "and less later.",
+            place="Discussion, Multiple Controller Schemes",
+            quote="The general controller is useful for generating behavior early in learning",
+            test="one-tailed paired bootstrap tests in each cell: more corrective movements in the "
+            "first tenth of the trials than in the last. Trial 0 does not count, as it has no "
+            "others by construction",
+            judge=partial(corrected_less_later, cells=cells),
+            fitted=fitted,
+            sets="0 of 242 (Two-armed 1, refuted in 242); 0 of 240 (Two-armed 2, refuted in 231)"
+            * fitted,
+            depends=fitted,
+        ),
+        Claim(
+            id=f"beats-inaccurate-{which}-armed",
+            text=f"On the {which}-armed tasks, the learner finds better movements than at least "
+            "one planner whose objective is not the reward.",
+            place="Discussion, Implications of Using a Simple Learning Process",
+            quote="movements can be found (if they exist) that deliver better consequences",
+            test="one-tailed bootstrap tests against plans for smoothness (free times); at least "
+            "one of them holds, the smallest p times their number (Bonferroni)",
+            judge=partial(beats_smooth_plans, tasks=tasks, label=best),
+            group="beside",
+            fitted=fitted,
+        ),
+    ]
+
+
+HALF = (
+    "exact binomial tests that more than 25% and fewer than 75% of all runs do; for the opposite: "
+    "the share lies outside, and Fisher's exact test tells the counts from the printed ones. 20 "
+    "runs are too few to pass it after Holm's correction"
+)
+
+CLAIMS_OF_THE_PAPER = [
+    *CLAIMS_OF_COARTICULATION,
+    *on_either_kind("one", CELLS_OF_ONE_ARM, best=EC1),
+    Claim(
+        id="resembles-squared-changes",
+        text="Learned movements are similar to movements planned for smoothness (least squared "
+        "configuration changes). We judge whether the postures at the goals lie less than half as "
+        "far from the plan's as those of the initial solution do.",
+        place="Method, The Learning Process",
+        quote="These movements are similar to movements that would be found through",
+        test="one-tailed bootstrap tests on both one-armed tasks that the ratio of mean distances "
+        "to the plan, learned over initial, is below 0.5",
+        judge=lambda read: all_higher(
+            Higher(resemblance(read, task), by=margins.HALFWAY) for task in ONE_ARMED
+        ),
+        group="beside",
+    ),
+    Claim(
+        id="ec2-sequences",
+        text="On Two-armed 1, about half of the runs under EC2 find RRLR; the others (9 of 20) "
+        "keep RRRR.",
+        place="Results, Exploration Condition 2, Figure 6",
+        quote="in nine of the 20 runs, the learned solution continued to use",
+        test=HALF,
+        judge=partial(half_find, task=TASK_1, label=EC2, hands="RRLR"),
+        fitted=True,
+        sets="9 of 242 (Two-armed 1, refuted in 192)",
+        depends=True,
+    ),
+    Claim(
+        id="no-reversal",
+        text="On Two-armed 1, once RRLR is learned under EC2, the base moves right on the way to "
+        "every goal.",
+        place="Results, Exploration Condition 2, Figure 6",
+        quote="in contrast to the initial solution, the base always moves",
+        test="exact binomial test that more than 75% of the runs that learned RRLR do so (the "
+        "paper shows one)",
+        judge=no_reversal,
+        fitted=True,
+        sets="2 of 242 (Two-armed 1, refuted in 84)",
+        depends=True,
+    ),
+    Claim(
+        id="half-choose-rlrr",
+        text="On Two-armed 2, about half of the runs under EC3 choose RLRR instead of RRRR (9 of "
+        "20).",
+        place="Results, Exploration Condition 3, Figure 7",
+        quote="in about half the runs of two-armed task 2",
+        test=HALF,
+        judge=partial(half_find, task=TASK_2, label=EC3, hands="RLRR"),
+        fitted=True,
+        sets="0 of 240 (Two-armed 2, refuted in 237)",
+        depends=True,
+    ),
+    Claim(
+        id="ec4-mixed",
+        text="On Two-armed 2, runs under EC4 differ in the hands that they find.",
+        place="Results, Summary of Two-Armed Task Results, Figure 8",
+        quote="(mixed)",
+        test="exact: at least one run does not have the commonest hand sequence (the paper names "
+        "none)",
+        judge=ec4_mixed,
+        group="exact",
+        fitted=True,
+        sets="70 of 240 (Two-armed 2, refuted in 170)",
+        depends=True,
+    ),
+    Claim(
+        id="proficiency-rises",
+        text="On both two-armed tasks each condition is better than the one before it, and the "
+        "first is better than the initial solution.",
+        place="Results, Summary of Two-Armed Task Results, Figure 8",
+        quote="each bar is significantly higher than the bar to its left",
+        test=TEST_OF_MEANS,
+        judge=proficiency_rises,
+        fitted=True,
+        sets="130 of 242 (Two-armed 1, refuted in 50); 7 of 240 (Two-armed 2, refuted in 201)",
+        depends=True,
+    ),
+    Claim(
+        id="rail",
+        text="On Two-armed 1 EC3 finds one hand sequence because the base moves only horizontally; "
+        "with the base free it finds none consistently.",
+        place="Method, Two-Armed Task 1",
+        quote="This restriction led to the development of a consistent sequence",
+        test="exact binomial tests under EC3: with the base on its rail more than 75% of the runs "
+        "have the commonest sequence, and with the base free fewer do",
+        judge=rail,
+        group="beside",
+        fitted=True,
+    ),
+    Claim(
+        id="multilevel-search",
+        text="Exploring two levels finds more than exploring one in as many trials: EC3, which "
+        "also explores hands, beats EC1, which uses the right hand alone, on both two-armed tasks.",
+        place="Introduction",
+        quote="A multilevel exploration scheme facilitates search over an objective function",
+        test=TEST_OF_MEANS,
+        judge=lambda read: all_higher(
+            Higher(read.reward(task, EC3), read.reward(task, EC1)) for task in TWO_ARMED
+        ),
+        group="beside",
+        fitted=True,
+    ),
+    *on_either_kind("two", CELLS_OF_TWO_ARMS, best=EC4),
+]

@@ -10,61 +10,49 @@ import numpy as np
 from scipy import stats
 
 from coartic.analysis import methods
-from coartic.analysis.claims import rules
-from coartic.analysis.claims.data import Data, MissingError, judges, who_is
-from coartic.analysis.claims.register import MARGINS, Finding
-from coartic.analysis.claims.rules import TEST_OF_MEANS, all_of, higher
+from coartic.analysis.claims import margins
+from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.comparisons import Higher, all_higher
+from coartic.analysis.claims.judging import Finding
+from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
-from coartic.analysis.signatures.between import TwoContexts
-from coartic.analysis.signatures.context import dependence_below
+from coartic.analysis.signatures.context_tests import dependence_below
 from coartic.analysis.signatures.subtasks import hand_numbers, ticks_slower
+from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
-from coartic.analysis.statistics.hypotheses import (
-    share_test,
-)
-from coartic.analysis.topics.paper.claims import ONE_ARMED, TASK_1, TWO_ARMED
+from coartic.analysis.statistics.hypotheses import share_test
 from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import estimate, number
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 
+ONE_ARMED = ASCENDING, DESCENDING = "ascending", "descending"
+TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
 """The learner that is rewarded for each subtask by itself."""
 CONTROLS = ("posture-based/one-goal", methods.INITIAL)
 """Methods that do not look beyond the current goal."""
+TEST_OF_MEANS = "one-tailed bootstrap test of the mean reward for each comparison"
 
 
-@judges(
-    "first-movement-sacrificed",
-    test="one-tailed bootstrap tests: the first movement takes more than {ticks:g} tick longer "
-    "than in the initial solution, it takes longer than in either placebo (the best of random "
-    "guesses, the learner rewarded by subtask), and the whole task is faster",
-)
-def first_movement_sacrificed(data: Data) -> Finding:
+def first_movement_sacrificed(read: Reader) -> Finding:
     """The first movement is slower, the whole faster."""
     comparisons = []
     for task in ONE_ARMED:
-        first = data.sign("first", task, EC1)
+        first = read.sign("first", task, EC1)
         comparisons += [
-            higher(first, by=MARGINS["ticks"]),
-            higher(first, data.sign("first", task, PLACEBO)),
-            higher(first, data.sign("first", task, EC1_BY_SUBTASK)),
-            higher(data.sign("whole", task, EC1)),
+            Higher(first, by=margins.TICKS),
+            Higher(first, read.sign("first", task, PLACEBO)),
+            Higher(first, read.sign("first", task, EC1_BY_SUBTASK)),
+            Higher(read.sign("whole", task, EC1)),
         ]
-    replayed = [partial(data.replayed_sign, "first", t, EC1) for t in ONE_ARMED]
-    return all_of(comparisons, rules.there(replayed))
+    replayed = [partial(read.sign, "first", task, EC1, replay=True) for task in ONE_ARMED]
+    return all_higher(comparisons, there(replayed))
 
 
-@judges(
-    "context",
-    test="permutation tests: postures at goal 1 lie more than {spread:g} pooled SD apart, and "
-    "further apart than those of either placebo (the best of random guesses, the learner rewarded "
-    "by subtask). For the opposite: fewer than 5 % of bootstrap samples are, or a placebo's lie "
-    "further apart",
-)
-def posture_depends_on_context(data: Data) -> Finding:
+def posture_depends_on_context(read: Reader) -> Finding:
     """Postures at goal 1 depend on the goal that follows, more than a placebo's."""
-    contexts, replayed = contexts_of(data, EC1), contexts_of(data, EC1, replayed=True)
+    contexts, replayed = contexts_of(read, EC1), contexts_of(read, EC1, replay=True)
     equivalent, other = contexts.parts
     parts = [
         f"postures at goal 1 lie {number(contexts.apart, 2)} apart, {number(contexts.spreads, 1)} "
@@ -72,13 +60,12 @@ def posture_depends_on_context(data: Data) -> Finding:
         f"{number(other, 3)} moves it",
         f"in noiseless replays {number(replayed.apart, 2)} apart",
     ]
-    bound = MARGINS["spread"]
     test = Estimate(contexts.spreads, p=contexts.p, n=(contexts.n,))
-    less_p = dependence_below(*contexts.postures, bound, np.random.default_rng(SEED))
+    less_p = dependence_below(*contexts.postures, margins.SPREAD, np.random.default_rng(SEED))
     tests = [test]
-    against = [replace(test, value=bound - test.value, p=less_p)]
+    against = [replace(test, value=margins.SPREAD - test.value, p=less_p)]
     for label in (PLACEBO, EC1_BY_SUBTASK):
-        placebo = contexts_of(data, label)
+        placebo = contexts_of(read, label)
         more = contexts.apart - placebo.apart
         beyond = replace(test, value=more, n=(contexts.n, placebo.n))
         tests.append(replace(beyond, p=contexts.p_beyond(placebo)))
@@ -86,110 +73,65 @@ def posture_depends_on_context(data: Data) -> Finding:
         parts.append(f"{methods.name_of(label)}: {number(placebo.apart, 2)} apart")
     for label in CONTROLS:
         with suppress(MissingError):
-            apart = contexts_of(data, label).apart
+            apart = contexts_of(read, label).apart
             parts.append(f"{methods.name_of(label)}: {number(apart, 2)} apart")
-    holds = contexts.spreads > bound and all(each.value > 0 for each in tests)
-    return Finding(holds, f"{'; '.join(parts)}.", tuple(tests), tuple(against))
+    holds = contexts.spreads > margins.SPREAD and all(each.value > 0 for each in tests)
+    return Finding(holds, "; ".join(parts), tuple(tests), tuple(against))
 
 
-def contexts_of(data: Data, label: str, *, replayed: bool = False) -> TwoContexts:
+def contexts_of(read: Reader, label: str, *, replay: bool = False) -> TwoContexts:
     """Runs of a method that hit goal 1 of both one-armed tasks; MissingError without them."""
-    first, second = (data.cell(task, label) for task in ONE_ARMED)
-    if replayed:
-        first, second = (data.study.replays(task, label) for task in ONE_ARMED)
+    first, second = (read.cell(task, label, replay=replay) for task in ONE_ARMED)
     contexts = TwoContexts(first, second, 1, "right")
     if not all(contexts.runs):
         raise MissingError(f"no run of {label} hits goal 1 of both tasks with the right hand")
     return contexts
 
 
-@judges(
-    "overall-reward",
-    test="one-tailed bootstrap tests on both tasks, EC1 against the same learner with a "
-    "reward for each subtask, both by what they learned (noiseless replay): it earns more, and its "
-    "first movement takes more than {ticks:g} tick longer",
-)
-def overall_reward(data: Data) -> Finding:
+def overall_reward(read: Reader) -> Finding:
     """Without a reward for the whole, the first movement is not sacrificed and less is earned."""
     comparisons = []
     for task in ONE_ARMED:
+        first = read.sign("first", task, EC1, replay=True)
         comparisons += [
-            higher(data.replay(task, EC1), data.replay(task, EC1_BY_SUBTASK)),
-            higher(
-                data.replayed_sign("first", task, EC1),
-                data.sign("first", task, EC1_BY_SUBTASK),
-                by=MARGINS["ticks"],
-            ),
+            Higher(read.replay(task, EC1), read.replay(task, EC1_BY_SUBTASK)),
+            Higher(first, read.sign("first", task, EC1_BY_SUBTASK), by=margins.TICKS),
         ]
-    return all_of(comparisons)
+    return all_higher(comparisons)
 
 
-@judges(
-    "arm-coarticulation",
-    test="one-tailed bootstrap tests: from the learned posture of base and chosen arm the "
-    "corrective process reaches the next goal more than {ticks:g} tick sooner than from the "
-    "posture in which it would itself have hit the goal, and by more than in the placebos (the "
-    "best of random guesses; of EC4 also the learner rewarded by subtask). The waiting arm "
-    "is where it was before the movement. Mean over the goals of a run that others follow",
-)
-def arm_coarticulation(data: Data) -> Finding:
+def arm_coarticulation(read: Reader) -> Finding:
     """Postures of base and chosen arm leave the next goal nearer."""
     comparisons, replayed = [], []
     for task in TWO_ARMED:
         for label in (EC3, EC4):
-            arm = data.sign("arm", task, label)
+            arm = read.sign("arm", task, label)
             comparisons += [
-                higher(arm, by=MARGINS["ticks"]),
-                higher(arm, data.sign("arm", task, PLACEBO)),
+                Higher(arm, by=margins.TICKS),
+                Higher(arm, read.sign("arm", task, PLACEBO)),
             ]
             if label == EC4:
-                comparisons.append(higher(arm, data.sign("arm", task, EC4_BY_SUBTASK)))
-            replayed.append(partial(data.replayed_sign, "arm", task, label))
-    return all_of(comparisons, rules.there(replayed))
+                comparisons.append(Higher(arm, read.sign("arm", task, EC4_BY_SUBTASK)))
+            replayed.append(partial(read.sign, "arm", task, label, replay=True))
+    return all_higher(comparisons, there(replayed))
 
 
-@judges(
-    "other-arm-coarticulation",
-    test="one-tailed bootstrap tests that what the arm does since its own last hit brings its hand "
-    "nearer (0 where it keeps still), as a share of the initial distance, and nearer than in the "
-    "placebos (the best of random guesses, the learner rewarded by subtask); mean over the goals "
-    "of a run",
-)
-def other_arm_coarticulation(data: Data) -> Finding:
+def other_arm_coarticulation(read: Reader) -> Finding:
     """The waiting arm brings its hand nearer to its next goal."""
-    arm = data.sign("other arm", TASK_1, EC4)
-    comparisons = [
-        higher(arm),
-        higher(arm, data.sign("other arm", TASK_1, PLACEBO)),
-        higher(arm, data.sign("other arm", TASK_1, EC4_BY_SUBTASK)),
-    ]
+    arm = read.sign("other arm", TASK_1, EC4)
+    placebos = [read.sign("other arm", TASK_1, label) for label in (PLACEBO, EC4_BY_SUBTASK)]
     shown = [
-        partial(data.replayed_sign, "other arm", TASK_1, EC4),
-        partial(data.sign, "other arm", TASK_1, EC3),
+        partial(read.sign, "other arm", TASK_1, EC4, replay=True),
+        partial(read.sign, "other arm", TASK_1, EC3),
     ]
-    return all_of(comparisons, rules.there(shown))
+    return all_higher([Higher(arm), *(Higher(arm, other) for other in placebos)], there(shown))
 
 
-@judges("overall-reward-two-armed", test=TEST_OF_MEANS)
-def overall_reward_two_armed(data: Data) -> Finding:
-    """Without a reward for the whole less is earned."""
-    return all_of(
-        higher(data.replay(task, EC4), data.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
-    )
-
-
-@judges(
-    "hand-coarticulation-task-1",
-    test="one-tailed Fisher's exact tests: in one of the cells more than {few:.0%} of the runs, "
-    "and more than of the placebo's, hit a goal that others follow with a hand that is slower for "
-    "that goal alone and is not the initial solution's (smallest p times their number). For the "
-    "opposite: in each cell fewer than {few:.0%} of the runs do (exact binomial tests)",
-)
-def slower_hands_are_chosen(data: Data) -> Finding:
+def slower_hands_are_chosen(read: Reader) -> Finding:
     """Whether more runs than of the placebo choose a hand that is slower for its goal alone."""
     task, labels = TASK_1, (EC2, EC3)
-    initial = data.initial_execution(task).hands
-    chosen = {label: chosen_slower(data.cell(task, label), initial) for label in (*labels, PLACEBO)}
+    initial = read.initial_execution(task).hands
+    chosen = {label: chosen_slower(read.cell(task, label), initial) for label in (*labels, PLACEBO)}
     of_placebo = chosen[PLACEBO] > 0
     tests, against, parts = [], [], []
     for label in labels:
@@ -197,16 +139,16 @@ def slower_hands_are_chosen(data: Data) -> Finding:
         count, total = int(does.sum()), len(does)
         table = [[count, total - count], [int(of_placebo.sum()), int((~of_placebo).sum())]]
         p = float(stats.fisher_exact(table, alternative="greater").pvalue)
-        more = min(does.mean() - of_placebo.mean(), does.mean() - MARGINS["few"])
+        more = min(does.mean() - of_placebo.mean(), does.mean() - margins.FEW)
         tests.append(Estimate(more, p=p, n=(total, len(of_placebo))))
-        against.append(share_test(count, total, MARGINS["few"], "less"))
-        seen = gained_by_slower(data.cell(task, label), chosen[label])
+        against.append(share_test(count, total, margins.FEW, "less"))
+        seen = gained_by_slower(read.cell(task, label), chosen[label])
         parts.append(f"{task} {who_is(label)}: {count} of {total} runs{seen}")
     parts.append(f"{methods.name_of(PLACEBO)}: {of_placebo.sum()} of {len(of_placebo)} runs")
     best = min(tests, key=lambda test: (test.value <= 0, test.p))
     test = replace(best, p=min(1.0, best.p * len(tests)))
     contrary = max(against, key=lambda test: test.p)
-    return Finding(test.value > 0, f"{'; '.join(parts)}.", (test,), (contrary,))
+    return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
 
 
 def chosen_slower(cell: Trajectories, initial: str) -> Array:
@@ -231,3 +173,107 @@ def gained_by_slower(cell: Trajectories, slower: Array) -> str:
         better = difference_of_means(with_it, without_it)
         words += f", which end with {estimate(better, 1)} ticks more reward than the others"
     return words
+
+
+CLAIMS_OF_COARTICULATION = [
+    # Those first that make the paper's point and rest on little that we chose.
+    Claim(
+        id="first-movement-sacrificed",
+        text="The first movement gets slower than in the initial solution while the whole task "
+        "gets faster.",
+        place="Results, Exploration Condition 1, Figure 5",
+        quote="the reward incurred after making the first movement is more negative",
+        test="one-tailed bootstrap tests: the first movement takes more than 1 tick longer than in "
+        "the initial solution, it takes longer than in either placebo (the best of random guesses, "
+        "the learner rewarded by subtask), and the whole task is faster",
+        judge=first_movement_sacrificed,
+        group="beside",
+        short="the first movement is sacrificed",
+    ),
+    Claim(
+        id="context",
+        text="The first goal is hit in another posture when another goal follows (ascending "
+        "against descending).",
+        place="Results, Exploration Condition 1, Figure 5",
+        quote="the joint configuration the robot used to hit the first goal differed",
+        test="permutation tests: postures at goal 1 lie more than 1 pooled SD apart, and further "
+        "apart than those of either placebo (the best of random guesses, the learner rewarded by "
+        "subtask). For the opposite: fewer than 5 % of bootstrap samples are, or a placebo's lie "
+        "further apart",
+        judge=posture_depends_on_context,
+        group="beside",
+        short="the posture depends on the next goal",
+    ),
+    Claim(
+        id="overall-reward",
+        text="The reward for the whole task makes the difference: a learner that is rewarded for "
+        "each subtask by itself does not sacrifice the first movement and ends with less.",
+        place="Discussion",
+        quote="Crucial to our results was the use of hierarchical optimization",
+        test="one-tailed bootstrap tests on both tasks, EC1 against the same learner with a reward "
+        "for each subtask, both by what they learned (noiseless replay): it earns more, and its "
+        "first movement takes more than 1 tick longer",
+        judge=overall_reward,
+        group="beside",
+        short="the reward for the whole task makes the difference",
+    ),
+    Claim(
+        id="arm-coarticulation",
+        text="Coarticulation shows in the chosen arm: base and arm hit a goal in a posture that "
+        "leaves the next goal nearer (both two-armed tasks, EC3 and EC4; the waiting arm is left "
+        "out).",
+        place="Abstract; Discussion",
+        quote="how the corresponding arm was used",
+        test="one-tailed bootstrap tests: from the learned posture of base and chosen arm the "
+        "corrective process reaches the next goal more than 1 tick sooner than from the posture in "
+        "which it would itself have hit the goal, and by more than in the placebos (the best of "
+        "random guesses; of EC4 also the learner rewarded by subtask). The waiting arm is where it "
+        "was before the movement. Mean over the goals of a run that others follow",
+        judge=arm_coarticulation,
+        group="beside",
+        fitted=True,
+        sets="224 of 242 (Two-armed 1, refuted in 6); 131 of 240 (Two-armed 2, refuted in 44)",
+    ),
+    Claim(
+        id="other-arm-coarticulation",
+        text="Coarticulation shows in the waiting arm: under EC4 it brings its hand nearer to the "
+        "goal that it will hit next (Two-armed 1).",
+        place="Method, The Learning Process; Discussion",
+        quote="possibly in way so that the robot would be able to hit",
+        test="one-tailed bootstrap tests that what the arm does since its own last hit brings its "
+        "hand nearer (0 where it keeps still), as a share of the initial distance, and nearer than "
+        "in the placebos (the best of random guesses, the learner rewarded by subtask); mean over "
+        "the goals of a run",
+        judge=other_arm_coarticulation,
+        group="beside",
+        fitted=True,
+        sets="240 of 242 (Two-armed 1)",
+    ),
+    Claim(
+        id="overall-reward-two-armed",
+        text="On the two-armed tasks as well, EC4 ends with less where each subtask is rewarded by "
+        "itself.",
+        place="Discussion",
+        quote="the reward signal was based on performance across the overall task",
+        test=TEST_OF_MEANS,
+        judge=lambda read: all_higher(
+            Higher(read.replay(task, EC4), read.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
+        ),
+        group="beside",
+        fitted=True,
+    ),
+    Claim(
+        id="hand-coarticulation-task-1",
+        text="On Two-armed 1 coarticulation shows in the choice of hand, under EC2 or EC3: goals "
+        "that others follow are hit with a hand that is slower for that goal alone.",
+        place="Method, Two-Armed Task 1; Discussion, Figure 6",
+        quote="Coarticulation was seen in terms of which arm was used",
+        test="one-tailed Fisher's exact tests: in one of the cells more than 25% of the runs, and "
+        "more than of the placebo's, hit a goal that others follow with a hand that is slower for "
+        "that goal alone and is not the initial solution's (smallest p times their number). For "
+        "the opposite: in each cell fewer than 25% of the runs do (exact binomial tests)",
+        judge=slower_hands_are_chosen,
+        group="beside",
+        fitted=True,
+    ),
+]

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
-from coartic.analysis.claims.judge import Judgement, counts, judgements
-from coartic.analysis.claims.register import Verdict
+import pandas as pd
+
+from coartic.analysis.claims.judgements import CLAIMS as REGISTER
+from coartic.analysis.claims.judgements import counts, judgements
+from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.section import Section
 from coartic.analysis.statistics.estimates import Estimate
@@ -20,16 +23,15 @@ MOST_CHANGES = 4
 """Tasks with changed hands that a sentence names."""
 
 
-def papers_claims(study: Study) -> list[Judgement]:
+def papers_claims(study: Study) -> pd.DataFrame:
     """Claims of the paper; none where the folder has no runs for any of them or its rewards."""
-    entries = judgements(study)
-    return entries if beside_paper(study) or any(entry.run_ids for entry in entries) else []
+    judged = judgements(study)
+    return judged if beside_paper(study) or judged.run_ids.any() else judged[:0]
 
 
-def mostly_undecided(entries: Iterable[Judgement]) -> bool:
+def mostly_undecided(judged: pd.DataFrame) -> bool:
     """Whether half of the claims are undecided: they lack runs or trials."""
-    by_verdict = counts(entries)
-    return 2 * by_verdict["undecided"] >= sum(by_verdict.values())
+    return 2 * counts(judged.verdict)["undecided"] >= len(judged)
 
 
 def rewards_by_verdict(study: Study) -> Counter[str]:
@@ -42,7 +44,7 @@ def rewards_by_verdict(study: Study) -> Counter[str]:
 
 def finding_of_rewards(study: Study) -> str:
     """How many printed rewards agree with ours, and which of the undecided are off."""
-    if not papers_claims(study):
+    if papers_claims(study).empty:
         return ""
     n = rewards_by_verdict(study)
     if not n.total():
@@ -72,68 +74,66 @@ def finding_of_rewards(study: Study) -> str:
 
 def finding_of_claims(study: Study) -> str:
     """Which verdicts there are: on the claims that carry the paper's point, and on the others."""
-    entries = papers_claims(study)
-    if not entries:
+    judged = papers_claims(study)
+    if judged.empty:
         return ""
-    by_verdict = counts(entries)
-    judged = sum(by_verdict.values())
-    if mostly_undecided(entries):
+    by_verdict = counts(judged.verdict)
+    if mostly_undecided(judged):
         words = (
-            f"These runs do not decide {by_verdict['undecided']} of {judged} claims: tasks, "
+            f"These runs do not decide {by_verdict['undecided']} of {len(judged)} claims: tasks, "
             "methods, runs or trials are missing. Claims without runs are only in "
             "tables/claims.csv."
         )
-    elif central := central_claims(entries):
+    elif central := central_claims(judged):
         each = [
             f"{len(claims)} {is_or_are(len(claims))} {verdict}: {listed(claims)}"
             for verdict, claims in central.items()
         ]
-        others = counts_of_others(entries)
+        others = counts_of_others(judged)
         words = f"Of the claims that carry the paper's point {'; '.join(each)}."
         words += f" Of {sum(others.values())} others {in_numbers(others)}."
     else:
-        words = f"Of {judged} claims {in_numbers(by_verdict)}."
+        words = f"Of {len(judged)} claims {in_numbers(by_verdict)}."
     return words
 
 
 def answer_paper(study: Study) -> str:
     """Whether the paper is reproduced, by its claims."""
-    entries = papers_claims(study)
-    if not entries:
+    judged = papers_claims(study)
+    if judged.empty:
         return ""
-    by_verdict = counts(entries)
-    judged = sum(by_verdict.values())
-    if mostly_undecided(entries):
-        decided = judged - by_verdict["undecided"]
+    by_verdict = counts(judged.verdict)
+    if mostly_undecided(judged):
+        decided = len(judged) - by_verdict["undecided"]
         words = (
-            f"Too little to judge the paper: {decided} of {judged} claims {is_or_are(decided)} "
-            f"decided, {supported(by_verdict)}."
+            f"Too little to judge the paper: {decided} of {len(judged)} claims "
+            f"{is_or_are(decided)} decided, {supported(by_verdict)}."
         )
-    elif central := central_claims(entries):
+    elif central := central_claims(judged):
         if list(central) == ["supported"]:
             words = f"In its main point, yes: {listed(central['supported'])}."
         else:
             words = " ".join(f"{capital(v)}: {listed(claims)}." for v, claims in central.items())
-        others = counts_of_others(entries)
+        others = counts_of_others(judged)
         words += f" Of {sum(others.values())} other claims {supported(others)}."
     else:
-        words = f"Of {judged} claims {in_numbers(by_verdict)}."
-    failed = (cell for entry in entries for cell in entry.failed)
+        words = f"Of {len(judged)} claims {in_numbers(by_verdict)}."
+    failed = (cell for cells in judged.failed for cell in cells)
     return words + failed_runs(study, failed, ", which leaves claims undecided")
 
 
-def central_claims(entries: Iterable[Judgement]) -> dict[Verdict, list[str]]:
+def central_claims(judged: pd.DataFrame) -> dict[Verdict, list[str]]:
     """The claims that carry the paper's point, in a few words, by verdict."""
     central: dict[Verdict, list[str]] = {}
-    for entry in entries:
-        if entry.claim.short:
-            central.setdefault(entry.verdict, []).append(entry.claim.short)
+    for name, verdict in judged.verdict.items():
+        if REGISTER[str(name)].short:
+            central.setdefault(verdict, []).append(REGISTER[str(name)].short)
     return central
 
 
-def counts_of_others(entries: Iterable[Judgement]) -> Mapping[Verdict, int]:
+def counts_of_others(judged: pd.DataFrame) -> Mapping[Verdict, int]:
     """Verdicts on the claims that do not carry the paper's point."""
-    return counts(entry for entry in entries if not entry.claim.short)
+    return counts(v for name, v in judged.verdict.items() if not REGISTER[str(name)].short)
 
 
 def in_numbers(n: Mapping[Verdict, int]) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Any
 
 import pandas as pd
 
-from coartic.analysis.claims.judge import judgements, words_of_test
+from coartic.analysis.claims.judgements import CLAIMS, judgements
 from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import interval, standard_deviation
@@ -111,33 +110,19 @@ def named(study: Study, cell: CellRuns) -> Row:
 
 
 @table(
-    "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote, section",
+    "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote",
 )
 def claims(study: Study) -> Rows:
     """The paper's claims with their verdicts."""
-    for entry in judgements(study):
-        claim = entry.claim
+    for name, judged in judgements(study).iterrows():
+        claim = CLAIMS[str(name)]
         row: Row = {
-            "statement": claim.statement + " †" * claim.fitted,
-            "verdict": entry.verdict,
-            "evidence": with_names(entry.finding.evidence, study),
-            "test": words_of_test(claim),
-            "p_holm": entry.adjusted_p,
-            "opposite_p_holm": entry.adjusted_opposite_p,
+            "statement": claim.text + " †" * claim.fitted,
             "sets": claim.sets or "not counted" * claim.fitted,
             "place": claim.place,
             "quote": claim.quote,
-            "section": claim.section,
-            "run_ids": " ".join(entry.run_ids),
         }
-        yield claim.id, row
-
-
-def with_names(text: str, study: Study) -> str:
-    """A text with people's names of tasks in place of their ids."""
-    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
-    whole = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
-    return re.sub(whole, lambda found: study.tasks[found[1]].label, text)
+        yield claim.id, {**judged, **row}
 
 
 @cached

@@ -1,7 +1,5 @@
-"""Context dependence: the same subgoal, reached on the way to different successors.
+"""Tests of postures at one goal in two contexts, and the distance that they are about.
 
-Anticipatory coarticulation is a difference between contexts that share all that comes
-before (Shah, Barto & Fagg 2013, tasks ascending and descending, which share goal 1).
 Configurations mix length unit (base) and rad (joints), as the model's own joint-space
 distance does. All tests permute whole runs between contexts, so they ask nothing of the
 distribution; they take runs as exchangeable if the context did nothing.
@@ -10,30 +8,17 @@ distribution; they take runs as exchangeable if the context did nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, takewhile
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic import Task
 from coartic.analysis.statistics.estimates import RESAMPLES, centred, slices
 from coartic.robot import Array
-from coartic.tasks.optima import KEPT
 
 IN_MEMORY = 500
 """Divisions or resamples of whole runs at once: thousands of runs would fill the memory."""
-
-
-def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Pairs of tasks that differ only after their first goals, and how many they share."""
-    pairs = []
-    for (a, first), (b, second) in combinations(tasks.items(), 2):
-        others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
-        if not others_differ and first.goals != second.goals:
-            same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
-            pairs.append((a, b, len(list(takewhile(bool, same)))))
-    return [pair for pair in pairs if pair[2]]
 
 
 def distance_of_means(first: Array, second: Array) -> float:
@@ -94,21 +79,17 @@ def permutation_p(
     second: Array,
     rng: np.random.Generator,
     *,
-    basis: Array | None = None,
     resamples: int = RESAMPLES,
 ) -> float:
     """Probability of so large a distance between means if the context did nothing.
 
-    One-sided permutation test over runs of :func:`distance_of_means`, with an orthonormal
-    ``basis`` (dof, d) within its span; exact where all divisions of the runs are no more than
-    ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN where a context has one run.
-    ``first`` and ``second`` have shape ``(runs, dof)``.
+    One-sided permutation test over runs of :func:`distance_of_means`; exact where all divisions of
+    the runs are no more than ``resamples``. 0 < p ≤ 1; 1 where no run differs from another; NaN
+    where a context has one run. ``first`` and ``second`` have shape ``(runs, dof)``.
     """
     if min(len(first), len(second)) < 2:
         return math.nan
     pool = centred(np.concatenate([first, second]))
-    if basis is not None:
-        pool = pool @ basis
     weights, exact = divisions(len(first), len(second), rng, resamples)
     observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     null = np.concatenate([np.linalg.norm(rows @ pool, axis=1) for rows in weights])

@@ -1,63 +1,43 @@
-"""What signatures between tasks are of: one goal in two contexts."""
+"""One goal in two contexts: hit on the way to different successors.
+
+Anticipatory coarticulation is a difference between contexts that share all that comes
+before (Shah, Barto & Fagg 2013, tasks ascending and descending, which share goal 1).
+"""
 
 from __future__ import annotations
 
-import math
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import combinations, takewhile
 
 import numpy as np
 
 from coartic import Hand, Task, Trajectory
-from coartic.analysis.signatures.context import (
+from coartic.analysis.signatures.context_tests import (
     beyond_p,
     context_dependence,
     distance_of_means,
     permutation_p,
 )
-from coartic.analysis.signatures.manifold import jacobian_of, motor_equivalence
-from coartic.analysis.statistics.estimates import SEED, Estimate
+from coartic.analysis.signatures.manifold import motor_equivalence, movable
+from coartic.analysis.statistics.estimates import SEED
 from coartic.analysis.trajectories import Trajectories, postures
 from coartic.robot import Array
 from coartic.runs.plan import label_of
+from coartic.tasks.optima import KEPT
 
 
-class Place(NamedTuple):
-    """Where in a solution, and between which tasks, a value belongs; None or empty: nowhere."""
-
-    goal: int | None = None
-    """Number of the goal, from 1."""
-    hand: str = ""
-    against: str = ""
-    """Task that is the other context."""
-
-    def __str__(self) -> str:
-        """In words: ``goal 1, right hand, against descending``."""
-        parts = [] if self.goal is None else [f"goal {self.goal}"]
-        parts += [f"{self.hand} hand"] if self.hand else []
-        parts += [f"against {self.against}"] if self.against else []
-        return ", ".join(parts)
-
-
-NOWHERE = Place()
-
-
-class Value(NamedTuple):
-    """A value of a signature."""
-
-    place: Place = NOWHERE
-    estimate: Estimate = Estimate(math.nan)
-    n: int = 0
-    """Runs that went into it."""
-    unit: str | None = None
-    """Where it is not that of the signature."""
-
-
-def rng_of(signature: str, place: Place) -> np.random.Generator:
-    """A generator for each value of a signature, the same in every folder."""
-    return np.random.default_rng([SEED, zlib.crc32(f"{signature} {place}".encode())])
+def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
+    """Pairs of tasks that differ only after their first goals, and how many they share."""
+    pairs = []
+    for (a, first), (b, second) in combinations(tasks.items(), 2):
+        others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
+        if not others_differ and first.goals != second.goals:
+            same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
+            pairs.append((a, b, len(list(takewhile(bool, same)))))
+    return [pair for pair in pairs if pair[2]]
 
 
 @dataclass(frozen=True)
@@ -94,11 +74,6 @@ class TwoContexts:
     def method(self) -> str:
         """Label of the method."""
         return label_of(self.first.method, self.first.variant)
-
-    @property
-    def place(self) -> Place:
-        """The goal, the hand and the other task."""
-        return Place(self.goal, self.hand, self.second.task.name)
 
     @property
     def row(self) -> str:
@@ -140,35 +115,25 @@ class TwoContexts:
         return float(np.linalg.norm(ends[0] - ends[1]))
 
     @cached_property
-    def jacobian(self) -> tuple[Array, Array]:
-        """Joints that can move the hand, and its Jacobian in these, at the mean posture."""
-        return jacobian_of(self.first.task, self.hand, np.concatenate(self.postures))
-
-    @cached_property
     def parts(self) -> tuple[float, float]:
         """Parts of the difference of mean postures: leaving the hand in place, and moving it."""
-        joints, jacobian = self.jacobian
+        task, joints = self.first.task, movable(self.first.task, self.hand)
+        posture = np.concatenate(self.postures).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.postures)
+        jacobian = task.robot.jacobian(posture, self.hand)[:, joints]
         return motor_equivalence((first - second)[joints], jacobian)
 
     @cached_property
     def p(self) -> float:
         """P-value of the permutation test over runs; NaN where a context has one run."""
-        return self.p_within("context dependence")
-
-    def p_within(self, signature: str, basis: Array | None = None) -> float:
-        """P-value of that test within the span of an orthonormal ``basis`` (dof, d).
-
-        Each ``signature`` has draws of its own.
-        """
-        return permutation_p(*self.postures, rng_of(signature, self.place), basis=basis)
+        return permutation_p(*self.postures, self._rng("context dependence"))
 
     def p_beyond(self, placebo: TwoContexts) -> float:
         """P-value of the test that these runs lie further apart than a placebo's; NaN where a
         context has one run."""
-        rng = rng_of(f"beyond {placebo.method}", self.place)
-        return beyond_p(self.postures, placebo.postures, rng)
+        return beyond_p(self.postures, placebo.postures, self._rng(f"beyond {placebo.method}"))
 
-    def value(self, value: float, p: float = math.nan) -> Value:
-        """A value of these contexts with its test."""
-        return Value(self.place, Estimate(value, p=p), self.n)
+    def _rng(self, test: str) -> np.random.Generator:
+        """A generator for each test, the same in every folder."""
+        where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
+        return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

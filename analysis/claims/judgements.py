@@ -1,0 +1,81 @@
+"""The paper's claims judged on a results folder: tests corrected together, one verdict each.
+
+- *Supported*: what the claim says is seen, and the largest p-value of its tests, which must all
+  hold (intersection-union test), is below 5 % after Holm's correction.
+- *Not supported*: it is not seen, and the opposite of one of its tests is significant (smallest
+  p-value of the opposites times their number, below 5 % after Holm's correction).
+- *Depends on the goals*: it would be supported at our goals, but at most half of the sets of goals
+  that the paper's text admits support it.
+- *Undecided*: none of these, or the folder lacks the runs.
+
+What is counted exactly, or shows no spread over runs, needs no test. Corrections are over fixed
+groups of claims: those on the paper's own seven cells, those that take other runs beside them,
+and those on families of random tasks. A claim that a folder cannot test
+counts in its group all the same, so that what is decided stays decided whatever else is run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import get_args
+
+import pandas as pd
+
+from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.judging import Finding, Verdict, judge
+from coartic.analysis.claims.reader import MissingError, Reader
+from coartic.analysis.study import Study, cached
+from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
+from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER
+
+CLAIMS = {claim.id: claim for claim in (*CLAIMS_OF_THE_PAPER, *CLAIMS_ON_FAMILIES)}
+"""Every claim by its id."""
+
+
+@cached
+def judgements(study: Study) -> pd.DataFrame:
+    """The claims on the folder's tasks, the paper's or random ones, as :func:`judge_claims`."""
+    drawn = {task.family is not None for task in study.tasks.values()}
+    paper = CLAIMS_OF_THE_PAPER if drawn != {True} else []
+    return judge_claims(study, [*paper, *(CLAIMS_ON_FAMILIES if True in drawn else [])])
+
+
+def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
+    """The claims judged, each corrected over those of its group among ``claims``.
+
+    A row a claim, as :func:`~coartic.analysis.judge` has it, and ``run_ids``, of the runs that were
+    read, and ``failed``, the cells that it lacks as some of their runs failed.
+    """
+    groups: dict[str, dict[str, tuple[str, str, Finding]]] = {}
+    rows = []
+    for claim in claims:
+        read = Reader(study)
+        try:
+            finding = claim.judge(read)
+        except MissingError as missing:
+            finding, read.run_ids = Finding(None, str(missing)), []
+        finding = replace(finding, evidence=with_names(finding.evidence, study))
+        groups.setdefault(claim.group, {})[claim.id] = claim.text, claim.test, finding
+        run_ids = " ".join(dict.fromkeys(read.run_ids))
+        rows.append((claim.id, run_ids, tuple(dict.fromkeys(read.failed)), claim.depends))
+    columns = ["claim", "run_ids", "failed", "depends"]
+    read_of = pd.DataFrame(rows, columns=columns).set_index("claim")
+    judged = read_of.join(pd.concat(map(judge, groups.values())))
+    goals = judged.pop("depends") & (judged.verdict == "supported")
+    return judged.assign(verdict=judged.verdict.mask(goals, "depends on the goals"))
+
+
+def with_names(text: str, study: Study) -> str:
+    """A text with people's names of tasks in place of their ids."""
+    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
+    whole = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
+    return re.sub(whole, lambda found: study.tasks[found[1]].label, text)
+
+
+def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
+    """How many claims have each verdict; 0 for those that none has."""
+    found = Counter(verdicts)
+    return {verdict: found[verdict] for verdict in get_args(Verdict)}

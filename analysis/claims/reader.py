@@ -1,0 +1,206 @@
+"""What claims read of a results folder, with a record of the runs that each claim has read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from coartic import Execution, Task
+from coartic.analysis.methods import LEARNER, PLACEBO, name_of
+from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.statistics.estimates import FEWEST, mean
+from coartic.analysis.study import CellKey, Study
+from coartic.analysis.topics.families.instances import signs
+from coartic.analysis.topics.paper.published import (
+    PrintedNumber,
+    published_cell,
+    published_exhaustive,
+    published_initial,
+)
+from coartic.analysis.trajectories import Trajectories, initial_solution
+from coartic.analysis.words import estimate, number
+from coartic.learner.learning import TRIALS
+from coartic.robot import Array
+
+
+class MissingError(Exception):
+    """The folder lacks what a claim needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """A value of each run, or one number, with the words by which evidence names them."""
+
+    task: str
+    who: str
+    """Whose they are: ``EC2``, ``replay of EC1``, ``initial``, ``random guesses``."""
+    numbers: Array
+    """Shape ``(runs,)``; ``()`` of one number, which is exact."""
+    quantity: str = ""
+    """What is measured, in words; empty for rewards."""
+    printed: str = ""
+    """The reward that the paper prints, in words; empty where it prints none."""
+
+    @property
+    def name(self) -> str:
+        """Where they are from."""
+        return f"{self.task}, {self.who}"
+
+    @property
+    def in_ticks(self) -> bool:
+        """Whether it is counted in ticks."""
+        return not self.quantity or "ticks by which" in self.quantity
+
+    def __str__(self) -> str:
+        """One number, or the mean with its BCa interval."""
+        if not self.numbers.ndim:
+            return number(float(self.numbers))
+        return estimate(mean(self.numbers), 1 if self.in_ticks else 3)
+
+
+@dataclass
+class Reader:
+    """A results folder as one claim reads it. Methods raise MissingError for what it lacks.
+
+    A method of the folder is named by its label.
+    """
+
+    study: Study
+    run_ids: list[str] = field(default_factory=list)
+    """Runs read so far, some of them more than once."""
+    failed: list[CellKey] = field(default_factory=list)
+    """Cells that were asked for so far and not read, as some of their runs failed."""
+
+    def task(self, name: str) -> Task:
+        """A task of the folder."""
+        if name not in self.study.tasks:
+            raise MissingError(f"this folder has no task {name}")
+        return self.study.tasks[name]
+
+    def runs(self, task: str, label: str) -> pd.DataFrame:
+        """Solved runs of a method."""
+        cell = self.study.cells.get((task, label))
+        if cell is None or not len(cell.runs):
+            raise MissingError(f"this folder has no runs of {label} on {task}")
+        if len(cell.good) < len(cell.runs):
+            self.failed.append((task, label))
+            failed = len(cell.runs) - len(cell.good)
+            raise MissingError(
+                f"{failed} of {len(cell.runs)} runs of {label} on {task} failed, so "
+                "the mean of the others would mislead"
+            )
+        runs = cell.good
+        if label.startswith((LEARNER, PLACEBO)):
+            trials = sorted(set(cell.runs.trials))
+            if trials != [TRIALS]:
+                raise MissingError(
+                    f"the paper's runs have {TRIALS} trials; those of {label} on {task} have "
+                    f"{', '.join(map(str, trials))}"
+                )
+            if len(runs) < FEWEST:
+                raise MissingError(f"fewer than {FEWEST} runs of {label} on {task}")
+        self.run_ids.extend(runs.run_id)
+        return runs
+
+    def cell(self, task: str, label: str, *, replay: bool = False) -> Trajectories:
+        """Executed solutions of a method, or its noiseless replays after learning."""
+        self.runs(task, label)
+        return (self.study.replays if replay else self.study.trajectories)(task, label)
+
+    def hands(self, task: str, label: str) -> list[str]:
+        """Hand sequence that each run of the learner learned."""
+        return list(map(str, self.runs(task, label).hands))
+
+    def reward(self, task: str, label: str) -> Measurement:
+        """Rewards of the best trials; of a method that draws nothing its one reward."""
+        rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
+        method = self.study.cells[task, label].method
+        if not self.study.plan.methods[method].stochastic:
+            rewards = np.array(rewards.mean())
+        return Measurement(task, who_is(label), rewards, printed=printed_reward(task, label))
+
+    def replay(self, task: str, label: str) -> Measurement:
+        """Rewards of noiseless replays after learning.
+
+        The learned reward is that of the best trial, which is never below trial 0's.
+        """
+        runs = self.runs(task, label)
+        rewards = runs.replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
+        if np.isnan(rewards).any():
+            raise MissingError(f"{who_is(label)} on {task} has no replay")
+        printed = printed_reward(task, label)
+        return Measurement(task, f"replay of {who_is(label)}", rewards, printed=printed)
+
+    def initial(self, task: str) -> Measurement:
+        """Reward of a task's initial solution."""
+        reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
+        return Measurement(task, "initial", reward, printed=in_words(published_initial(task)))
+
+    def best(self, task: str) -> Measurement:
+        """Highest reward of the corrective process alone over all hand sequences."""
+        rewards = self.alone(task)
+        if np.isnan(rewards).all():
+            raise MissingError(
+                f"the corrective process alone completes {task} with no hand sequence"
+            )
+        best, printed = np.array(np.nanmax(rewards)), in_words(published_exhaustive(task))
+        return Measurement(task, "best", best, printed=printed)
+
+    def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
+        """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
+        sign, words = SIGNS[name], SIGNS[name].words
+        self.runs(task, label)
+        if replay:
+            values = sign.of(self.study.replays(task, label))
+            words = f"in noiseless replays, {sign.in_short}"
+        elif self.task(task).family is not None:
+            values = signs(self.study)[task, label].get(name, np.empty(0))
+        else:
+            values = sign.of(self.study.trajectories(task, label))
+        if not len(values):
+            raise MissingError(f"{who_is(label)} on {task} has no {name}")
+        return Measurement(task, who_is(label), values, words)
+
+    def initial_execution(self, task: str) -> Execution:
+        """A task's initial solution: the corrective process alone with the task's hands."""
+        execution = initial_solution(self.task(task))
+        if execution is None:
+            raise MissingError(f"the corrective process alone does not complete {task}")
+        return execution
+
+    def alone(self, task: str) -> Array:
+        """Reward of the corrective process alone with each hand sequence; NaN where it fails."""
+        rewards = self.study.sequences(self.task(task).name).reward
+        if not len(rewards):
+            raise MissingError(
+                f"this folder has no rewards of the corrective process alone on {task}"
+            )
+        return rewards.to_numpy(dtype=np.float64, na_value=np.nan)
+
+
+def who_is(label: str) -> str:
+    """A method as evidence names it: the learner by its condition."""
+    return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
+
+
+def in_words(printed: PrintedNumber | None) -> str:
+    """A number that the paper prints; empty where it prints none."""
+    return printed.in_words if printed else ""
+
+
+def printed_reward(task: str, label: str) -> str:
+    """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
+    cell = published_cell(task, label.removeprefix(LEARNER))
+    summary = cell and cell.summary
+    return summary.in_words if summary else ""
+
+
+def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:
+    """What the folder has of some values."""
+    for read in reads:
+        with suppress(MissingError):
+            yield read()
