@@ -19,19 +19,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 
-import coartic.gym  # noqa: F401 (registers the environments)
 from coartic import CONDITIONS, Objective, Task, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.random_search import Climbing, Guesses
 from coartic.benchmarks.planning import plan_suite
+from coartic.gym import TaskVectorEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
 from coartic.motion.lanes import LANES
-from coartic.motion.reach import Requests, batch_for, blank, reach_goals
+from coartic.motion.reach import batch_for, blank, reach_goals
 from coartic.motion.trials import Bench, hand_codes, movements_of
 from coartic.robot import Array
 
@@ -43,9 +42,6 @@ def main(*, is_long: bool = False) -> None:
     for way, rate in rates.items():
         kernel = rates[ALONE if "one by one" in way else TOGETHER]
         print(f"{way:32}{rate:18,.0f}{kernel / rate:20.2f}")
-    print(f"{'way':32}{'over the kernel':>18}")
-    for way, ratio in environments_over_kernel().items():
-        print(f"{way:32}{ratio:18.2f}")
     warm_up(load_task("ascending"))
     print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
     for cell in plan_suite("paper").cells:
@@ -62,7 +58,8 @@ ALONE, TOGETHER = "bare kernel, one by one", "bare kernel, 1000 at once"
 def trials_a_second() -> dict[str, float]:
     """Trials a CPU second through each public way: the same trials, of ``two-armed-1``.
 
-    They are around what CMA-ES finds, so that few goals are missed.
+    They are around what CMA-ES finds, so that few goals are missed; those of the vector environment
+    are others, around what the corrective process does.
     """
     task = load_task("two-armed-1")
     session = Session(task, 0, CMAES.told)
@@ -73,13 +70,8 @@ def trials_a_second() -> dict[str, float]:
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
     single = [movements_of(hands, target) for target in targets[:100]]
-    many = gymnasium.make_vec(
-        "coartic/TwoArmed1-v1", num_envs=1000, around=best, hands=None, scale=1.0
-    )
-    sides = np.where(np.array([*hands]) == "R", 1.0, -1.0)
-    choice = np.broadcast_to(sides[:, None], (1000, len(hands), 1))
-    free = noise[..., many.unwrapped.arms.free]
-    actions = np.concatenate([choice, free], axis=-1).swapaxes(0, 1)  # goals first
+    many = TaskVectorEnv(1000, task)
+    actions = np.random.default_rng(0).uniform(-0.1, 0.1, (4, *many.action_space.shape))
     many.reset()
     bench, codes = Bench(task), hand_codes(task, hands, 1000)
 
@@ -92,10 +84,7 @@ def trials_a_second() -> dict[str, float]:
         TOGETHER: _rate(1000, lambda: reach_goals(*together)),
         "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(hands, targets)),
         "objective.many, 1000 at once": _rate(1000, lambda: cost.many(targets[:, cost.joints])),
-        "vector environment of 1000": _rate(
-            1000,
-            lambda: [many.step(action) for action in (*actions, actions[0])],  # all begin anew
-        ),
+        "vector environment of 1000": _rate(1000, lambda: [*map(many.step, actions)]),
         ALONE: _rate(100, lambda: [reach_goals(*arguments) for arguments in alone]),
         "objective, one by one": _rate(
             100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
@@ -104,49 +93,6 @@ def trials_a_second() -> dict[str, float]:
             100, lambda: [session.trial(solution) for solution in single]
         ),
     }
-
-
-def environments_over_kernel() -> dict[str, float]:
-    """Time of a step of environments over that of the bare kernel call of the same subtasks.
-
-    One robot, and 16 and 1,000 in a vector, whose steps that only begin trials anew count as well;
-    on ``two-armed-1``, uniformly random actions in the default box.
-    """
-    ratios = {}
-    for count in (1, 16, 1000):
-        vector = gymnasium.make_vec("coartic/TwoArmed1-v1", num_envs=count)
-        env: Any = vector if count > 1 else gymnasium.make("coartic/TwoArmed1-v1").unwrapped
-        arms, rng = env.unwrapped.arms, np.random.default_rng(0)
-        actions = rng.uniform(-1, 1, (4, *env.action_space.shape))
-        env.reset()
-        calls = []
-        for action in actions:  # the robots are at the same goal: one group
-            env.step(action)
-            asked = [np.array(each) for each in arms._asked]
-            one_goal = {"bounds": np.array([0, count]), "goals": asked[-1][:1]}
-            calls.append(Requests(*asked)._replace(**one_goal))
-
-        def kernel(calls: list[Requests] = calls, arms: Any = arms) -> None:
-            for call in calls:
-                reach_goals(call, arms._setups[0], arms._reached, arms._batch)
-
-        def steps(env: Any = env, actions: Any = actions, count: int = count) -> None:
-            if count == 1:
-                env.reset()
-            for action in actions if count == 1 else (actions[0], *actions):
-                env.step(action)
-
-        times = [(_seconds(steps), _seconds(kernel)) for _ in range(200 if count < 1000 else 20)]
-        ours, bare = np.median(times, axis=0)
-        name = f"vector environment of {count:,}" if count > 1 else "environment, reset among steps"
-        ratios[name] = ours / bare
-    return ratios
-
-
-def _seconds(make: Callable[[], None]) -> float:
-    clock = time.thread_time()
-    make()
-    return time.thread_time() - clock
 
 
 def _rate(trials: int, make: Callable[[], object]) -> float:

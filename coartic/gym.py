@@ -1,15 +1,15 @@
-"""Tasks and families as environments of Gymnasium: a step is a subtask, its reward minus the ticks
-it took.
+"""Tasks and families as environments of Gymnasium: a step is a goal, its reward minus the ticks.
 
-Importing this module registers ``coartic/Ascending-v1``, ``Descending``, ``TwoArmed1`` and
-``TwoArmed2``, ``coartic/Task-v1`` for any other task, and ``coartic/Family-v0`` for the instances
-of a family. Needs the extra ``coartic[gym]``.
+Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``TwoArmed1-v2``,
+``TwoArmed2-v2``, and ``coartic/Task-v2`` for any other task or a family. It needs the extra
+``coartic[gym]``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,231 +17,285 @@ import gymnasium
 import numpy as np
 import pandas as pd
 from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
-from coartic.arms import Arms, Frame
-from coartic.inputs import MOST_CELLS, brief_value, check_limits
+from coartic.inputs import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, Session
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.initial import corrective_trial, initial_hands
-from coartic.motion.solution import execute
-from coartic.robot import BASE_DOF, Array, Hand
-from coartic.tasks.catalogue import load_task
-from coartic.tasks.families import instance_names, load_family
+from coartic.motion.reach import reach_unchecked
+from coartic.motion.solution import Execution, execute
+from coartic.optimisers import FAILED
+from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
+from coartic.tasks.families import LOCKED, instance_names, shipped_families
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import Task, as_task
+from coartic.tasks.task import MOST_GOALS, Split, Task, as_task
 from coartic.text import unknown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from coartic.sb3 import RobotEnvs
 
-OPTIONS = ("scale", "around", "observe", "ahead", "hands", "model")
-OF_FAMILY = ("family", "split", "count", "year")
-FAMILY_OPTIONS = (*OF_FAMILY, "scale", "ahead", "hands", "model")
-WORKS = {"around": "hands", "hands": "initial", "scale": 0.5}
-"""Options of version 1 of the single tasks."""
+REACH = 0.5
+"""Half the width of the box of targets, length unit (base) and rad (angles)."""
+MOST_ROBOTS = 1_000_000
 
 
-def make_arms(
-    num_envs: int, task: Task | str | Path | None = None, **options: Any
-) -> tuple[Arms, list[str]]:
-    """Robots with the options of an environment, and the instances that they are given.
-
-    Raises TypeError for an option that there is not.
-    """
-    of_family = task is None and "family" in options
-    known = FAMILY_OPTIONS if of_family else OPTIONS
-    for name in options.keys() - {*known}:
-        raise TypeError(unknown("option", name, [*known, "render_mode"]))
-    if not of_family:
-        return Arms(num_envs, as_task(task), **options), []  # type: ignore[arg-type]
-    which: dict[str, Any] = {"split": "development"}
-    which |= {name: options.pop(name) for name in OF_FAMILY if name in options}
-    names, family = instance_names(**which), load_family(which["family"])
-    goals, links = family.goals[1], family.links[1]
-    frame = Frame(len(names), goals, links, BASE_DOF + 2 * links, family.hands)
-    options = {"scale": 0.5} | options | {"observe": "ahead", "around": "corrective"}
-    return Arms(num_envs, frame=frame, **options), names
-
-
-def check_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
-    """The mode itself. Raises ValueError for one that there is not."""
-    if mode is not None and mode not in metadata["render_modes"]:
-        raise ValueError(f"render_mode is {mode!r}; it must be one of {metadata['render_modes']}")
-    return mode
-
-
-def draw_picture(arms: Arms, row: int) -> NDArray[np.uint8]:
-    """A robot and its goals, ``(height, width, 3)``."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 4))
-    canvas: Any = FigureCanvasAgg(figure)
-    draw_arms(figure, arms, row)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def draw_arms(figure: Figure, arms: Arms, row: int) -> None:
-    """Draw a robot and its goals; those that it has hit are filled."""
-    from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
-
-    task = arms.tasks[arms.rows["task"][row]]
-    (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-    figure.clear()
-    axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-    draw_robot(axes, task, arms.q[row, : task.robot.dof], weight=1.5)
-    number_goals(axes, task, weight=1.5)
-    fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < arms.goal[row])
-
-
-class TaskEnv(gymnasium.Env):
-    """One robot and one task, or instances of a family of which each trial has one.
-
-    An episode is a trial, of as many steps as there are goals; it ends earlier where the
-    corrective process fails, which costs ``coartic.optimisers.FAILED``. Actions are clipped to the
-    box. Nothing is random but which instance is drawn.
+class Robots:
+    """N robots side by side, each at a goal of its own trial: what the environments share.
 
     Parameters
     ----------
-    task : Task, str or Path, optional
-        The task; in its place a family, of which instances are drawn.
-    family : str
-        The family with its version, ``"two-armed/v1"``.
-    split : {"development", "test", "fresh"}
-        Its instances to train on, to report on, or those of a ``year``. They never mix.
+    num_envs : int
+        Number of robots.
+    task : Task, str or Path
+        The task; or a family, ``"two-armed/v1"``, of which each trial has an instance.
+    split : {"development", "test", "fresh"}, optional
+        Instances to train on (by default), to report on, or those of a ``year``. They never mix.
     count : int, optional
-        How many instances, the first ones of the split; by default 1,000 of the development split
+        How many instances of the split, from its first; by default 1,000 of the development split
         and 10 of the others.
     year : int, optional
         Of fresh instances.
-    render_mode : {"human", "rgb_array"}, optional
-        As in Gymnasium.
-    **options
-        As in :class:`coartic.arms.Arms`. Of a family the middle of the box is ``"corrective"``,
-        half its width by default 0.5, and ``"ahead"`` is observed.
+    ahead : int
+        Goals in view beyond the next one.
+    model : MotionModel
+        Constants of movement.
 
     Raises
     ------
     ValueError, TypeError, TaskError
         An option is wrong, or there is no such task or family.
-    """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 4}
+    Notes
+    -----
+    Joints are the coordinates of the base (length unit) and the angles of the arms (rad) that can
+    move, in the order of a configuration; in a family, of arms with the most links.
+
+    An observation has an entry for the next goal and for each of those ahead, 1 where there is
+    one; x and y of each from the base, length unit, 0 where there is none; and the joints.
+
+    An action has an entry for the hand, where the robot has two, and one for each joint. The box is
+    from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
+    process brings to the goal by the shorter way in joint space, above 0.5 the other one. The
+    target is where the corrective process would bring it, plus :data:`REACH` times the entries of
+    the joints: zeros do what the corrective process does. Where it would fail, the present posture
+    takes the place of its result. Entries of joints that a robot does not have do nothing.
+    """
 
     def __init__(
         self,
-        task: Task | str | Path | None = None,
+        num_envs: int,
+        task: Task | str | Path,
         *,
-        render_mode: str | None = None,
-        **options: Any,
+        split: Split | None = None,
+        count: int | None = None,
+        year: int | None = None,
+        ahead: int = 1,
+        model: MotionModel = PAPER,
     ) -> None:
-        self.arguments = {"task": task, **options}
-        self.arms, self.names = make_arms(1, **self.arguments)
-        self.action_space = self.arms.action_space
-        self.observation_space = self.arms.observation_space
-        self.render_mode = check_render_mode(render_mode, self.metadata)
-        self._figure: Figure | None = None
+        check_limits("num_envs", num_envs, 1, MOST_ROBOTS)
+        check_limits("ahead", ahead, 0, MOST_GOALS)
+        self.model = check_model(model)
+        if isinstance(task, str) and task in shipped_families():
+            family = shipped_families()[task]
+            instances = instance_names(task, split or "development", count, year)
+            self.tasks: list[Task | str] = [*instances]
+            goals, links, hands = family.goals[1], family.links[1], family.hands
+            locked = set.intersection(*({*LOCKED[base]} for base in family.base))
+        elif (split, count, year) != (None, None, None):
+            raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
+        else:
+            only = as_task(task)
+            self.tasks = [only]
+            goals, links, hands = len(only.goals), only.robot.most_links, only.hands
+            locked = {*only.locked_base}
+        # All configurations have one width: base, left arm, right arm, 0 beyond its links.
+        self.links, width, number = links, BASE_DOF + 2 * links, len(self.tasks)
+        self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
+        self.sides = np.array([HANDS.index(hand) for hand in hands])
+        arms = (BASE_DOF + links * self.sides[:, None] + np.arange(links)).ravel()
+        base = [place for place, axis in enumerate("xy") if axis not in locked]
+        self.joints = np.array([*base, *arms])
+        self.starts, self.goals = np.zeros((number, width)), np.zeros((number, goals, 2))
+        self.counts, self.kinds = np.zeros(number, np.int64), np.full(number, -1)
+        self.kind_of: dict[Any, int] = {}
+        self.task, self.goal = np.zeros((2, num_envs), np.int64)
+        self.q, self.view = np.zeros((num_envs, width)), np.arange(ahead + 1)
+        entries = (len(hands) > 1) + len(self.joints)
+        self.action_space = Box(-1.0, 1.0, (entries,), np.float32)
+        high = np.full(3 * (ahead + 1) + len(self.joints), LARGEST_FIGURE, np.float32)
+        low = -high
+        low[self.view], high[self.view] = 0.0, 1.0
+        self.observation_space = Box(low, high, dtype=np.float32)
+
+    def task_at(self, number: int) -> Task:
+        """A task by its number; it is loaded when it is first asked for."""
+        task = as_task(self.tasks[number])
+        if self.kinds[number] < 0:
+            check_model(self.model, radius=task.radius)
+            self.tasks[number] = task
+            self.starts[number, self.places(task.robot)] = task.q0
+            self.goals[number, : len(task.goals)] = task.goal_array
+            self.counts[number] = len(task.goals)
+            kind = task.robot, float(task.radius), task.locked_base
+            self.kinds[number] = self.kind_of.setdefault(kind, len(self.kind_of))
+        return task
+
+    def places(self, robot: Robot) -> NDArray[np.int64]:
+        """Where the entries of its configurations are among those of all robots, ``(dof,)``."""
+        left, right = (BASE_DOF + np.arange(len(robot.arm(hand).links)) for hand in HANDS)
+        return np.concatenate([np.arange(BASE_DOF), left, self.links + right])
+
+    def begin(self, rows: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
+        """Put robots at the start of the tasks of these numbers."""
+        for number in np.unique(numbers).tolist():
+            self.task_at(number)
+        self.task[rows], self.goal[rows] = numbers, 0
+        self.q[rows] = self.starts[numbers]
+
+    def observe(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """What is seen of the next goals, and where the robots are, ``(N, O)``."""
+        task, q = self.task[rows], self.q[rows]
+        goals = self.goal[rows, None] + self.view
+        there = goals < self.counts[task, None]
+        places = self.goals[task[:, None], np.where(there, goals, 0)] - q[:, None, :BASE_DOF]
+        places[~there] = 0.0
+        seen = [there, places.reshape(len(rows), -1), q[:, self.joints]]
+        return np.concatenate(seen, axis=1, dtype=np.float32)
+
+    def step(self, actions: ArrayLike, rows: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
+        """Reach for the next goal: rewards ``(N,)``, and whose trials have ended.
+
+        Raises ValueError for actions of another shape than ``(N, A)``, or with NaN.
+        """
+        chosen = real_array("actions", actions)
+        if chosen.shape != (shape := (len(rows), *self.action_space.shape)):
+            raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
+        if np.isnan(chosen).any():
+            row = int(np.isnan(chosen).any(axis=1).argmax())
+            raise ValueError(f"the action of robot {row} has NaN; it must be numbers")
+        chosen = np.clip(chosen, -1.0, 1.0)
+        away = np.zeros((len(rows), self.q.shape[1]))
+        away[:, self.joints] = REACH * chosen[:, -len(self.joints) :]
+        other = (chosen[:, 0] > 0.5) & (len(self.sides) > 1)
+        rewards, kinds = np.empty(len(rows)), self.kinds[self.task[rows]]
+        for (robot, radius, locked), kind in self.kind_of.items():
+            of_kind = np.flatnonzero(kinds == kind)
+            if not len(of_kind):
+                continue
+            some, places = rows[of_kind], self.places(robot)
+            q, goals = self.q[some[:, None], places], self.goals[self.task[some], self.goal[some]]
+            reach = partial(reach_unchecked, locked_base=locked, model=self.model)
+            sides = np.tile(self.sides[:, None], len(some))
+            found = [reach(robot, q, side, goals, radius, looks=False).corrected for side in sides]
+            ways = np.nan_to_num(np.linalg.norm(np.array(found) - q, axis=2), nan=np.inf)
+            hand = np.where(other[of_kind], 1 - ways.argmin(axis=0), ways.argmin(axis=0))
+            middle = np.choose(hand[:, None], found)
+            moved = away[of_kind[:, None], places]
+            moved[:, ["xy".index(axis) for axis in locked]] = 0.0
+            targets = np.where(np.isnan(middle), q, middle) + moved
+            made = reach(robot, q, self.sides[hand], goals, radius, targets)
+            self.q[some[:, None], places] = made.q
+            self.goal[some] += made.hit
+            rewards[of_kind] = np.where(made.hit, -made.ticks, -FAILED)
+        return rewards, (rewards == -FAILED) | (self.goal[rows] == self.counts[self.task[rows]])
+
+    def infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
+        """Names of tasks, and whether all goals are hit."""
+        task = self.task[rows]
+        return {"task": self.names[task], "is_success": self.goal[rows] == self.counts[task]}
+
+
+ONLY = np.zeros(1, np.int64)
+
+
+class TaskEnv(gymnasium.Env):
+    """One robot: an episode is a trial, of as many steps as there are goals.
+
+    It ends earlier where the corrective process fails, which costs ``coartic.optimisers.FAILED``.
+    Nothing is random but which instance of a family is drawn. Options, observations and actions
+    are those of :class:`Robots`; ``render_mode`` may be ``"rgb_array"``.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(
+        self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
+    ) -> None:
+        self.options = {"task": task, **options}
+        self.robots = Robots(1, **self.options)
+        self.action_space = self.robots.action_space
+        self.observation_space = self.robots.observation_space
+        self.render_mode = render_mode
         self._goes_on = False
-        self._all = np.array([True])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial."""
         super().reset(seed=seed)
-        if self.names:
-            give_instance(self.arms, 0, self.names, self.np_random)
-        self.arms.reset(self._all)
+        check_no_options(options)
+        self.robots.begin(ONLY, self.np_random.integers(len(self.robots.tasks), size=1))
         self._goes_on = True
-        if self.render_mode == "human":
-            self.render()
-        return self.arms.observations()[0], self._info()
+        return self.robots.observe(ONLY)[0], self._info()
 
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Make the next subtask of the trial. Raises ResetNeeded where it has ended."""
+        """Reach for the next goal. Raises ResetNeeded where the trial has ended."""
         if not self._goes_on:
             raise ResetNeeded("no trial goes on: reset first")
-        rewards, ended = self.arms.step(np.asarray(action)[None], self._all)
+        rewards, ended = self.robots.step(np.asarray(action)[None], ONLY)
         self._goes_on = not ended[0]
-        if self.render_mode == "human":
-            self.render()
-        return self.arms.observations()[0], float(rewards[0]), bool(ended[0]), False, self._info()
-
-    def action_for(self, hand: Hand, target: Array | None) -> Array:
-        """The action that moves this hand to a target, to replay a solution: see
-        :meth:`coartic.arms.Arms.action_for`. A movement of kind ``"corrective"`` has no target."""
-        return self.arms.action_for(0, hand, target)
+        return self.robots.observe(ONLY)[0], float(rewards[0]), bool(ended[0]), False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Show the robot and the goals in a window, or as a picture ``(height, width, 3)``."""
+        """The robot and its goals as a picture ``(400, 600, 3)``; goals that are hit are filled."""
         if self.render_mode is None:
             return None
-        if self.render_mode == "rgb_array":
-            return draw_picture(self.arms, 0)
-        from matplotlib import pyplot
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
-        self._figure = self._figure or pyplot.figure(figsize=(6, 4))
-        draw_arms(self._figure, self.arms, 0)
-        pyplot.pause(1 / self.metadata["render_fps"])
-        return None
+        from coartic.drawing import box, draw_goals, draw_robot, fill_goals
 
-    def close(self) -> None:
-        """Close the window."""
-        if self._figure is not None:
-            from matplotlib import pyplot
-
-            pyplot.close(self._figure)
-        self._figure = None
+        task = self.robots.task_at(int(self.robots.task[0]))
+        (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
+        figure = Figure(figsize=(6, 4))
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        draw_robot(axes, task, self.robots.q[0, self.robots.places(task.robot)], weight=1.5)
+        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < self.robots.goal[0])
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _info(self) -> dict[str, Any]:
-        return {name: values.tolist()[0] for name, values in self.arms.infos().items()}
+        return {name: values.tolist()[0] for name, values in self.robots.infos(ONLY).items()}
 
 
 class TaskVectorEnv(VectorEnv):
-    """N robots side by side, which takes a fraction of the time; options as :class:`TaskEnv`.
+    """N robots side by side, which takes a fraction of the time; see :class:`TaskEnv`.
 
-    ``autoreset_mode`` is one of Gymnasium's. By default, ``"NextStep"``, an episode that has ended
-    begins anew in the next step, whose action is ignored. Actions are clipped to the box.
+    A trial that has ended begins anew in the same step, as in Gymnasium's mode ``SAME_STEP``:
+    ``final_obs`` and ``final_info`` are what it ended with.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": ["rgb_array"],
-        "render_fps": TaskEnv.metadata["render_fps"],
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
 
-    def __init__(
-        self,
-        num_envs: int,
-        task: Task | str | Path | None = None,
-        *,
-        render_mode: str | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **options: Any,
-    ) -> None:
-        self.arguments = {"task": task, **options}
-        self.arms, self.names = make_arms(num_envs, **self.arguments)
+    def __init__(self, num_envs: int, task: Task | str | Path, **options: Any) -> None:
+        self.options = {"task": task, **options}
+        self.robots = Robots(num_envs, **self.options)
         self.num_envs = num_envs
-        self.render_mode = check_render_mode(render_mode, self.metadata)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}  # type: ignore[misc]
-        self.single_action_space = self.arms.action_space
-        self.single_observation_space = self.arms.observation_space
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        self._all = np.ones(self.num_envs, dtype=np.bool_)
-        self._rngs: list[np.random.Generator | None] = [None] * self.num_envs
+        self.single_action_space = self.robots.action_space
+        self.single_observation_space = self.robots.observation_space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._all = np.arange(num_envs)
+        self._rngs: list[Any] = [None] * num_envs
 
     def reset(
         self,
@@ -249,90 +303,51 @@ class TaskVectorEnv(VectorEnv):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin all trials, or those of ``options["reset_mask"]``, shape ``(num_envs,)``.
-
-        A seed, or one for each environment, is taken as by Gymnasium. Nothing is random but which
-        instance of a family is drawn.
-        """
-        seeds: Sequence[int | None]
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            seeds = seed
-            if len(seeds) != self.num_envs:
-                raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
-            super().reset(seed=seeds[0])
-        else:
-            super().reset(seed=seed)  # raises for what is no seed
-            seeds = [None if seed is None else seed + row for row in range(self.num_envs)]
-        which = self._all
-        if options is not None and "reset_mask" in options:
-            which = options["reset_mask"]
-            fits = isinstance(which, np.ndarray) and which.dtype == np.bool_
-            if not fits or which.shape != (self.num_envs,) or not which.any():
-                raise ValueError(
-                    f"reset_mask must be an array of {self.num_envs} booleans, at least one of "
-                    "them True"
-                )
-        for row in np.flatnonzero(which).tolist():
-            if seeds[row] is not None or self._rngs[row] is None:
-                self._rngs[row] = seeding.np_random(seeds[row])[0]  # raises for what is no seed
-        self._begin(which)
-        return self.arms.observations(), self._infos(which)
-
-    def _begin(self, which: NDArray[np.bool_]) -> None:
-        """Begin these trials."""
-        for row in np.flatnonzero(which).tolist() if self.names else ():
-            give_instance(self.arms, row, self.names, self._rngs[row])
-        self._ended[which] = False
-        self.arms.reset(which)
+        """Begin all trials, with a seed for each robot, or for the first, which others follow."""
+        check_no_options(options)
+        if seed is None or isinstance(seed, int):
+            seed = [None if seed is None else seed + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
+        for row, each in enumerate(seed):
+            if each is not None or self._rngs[row] is None:
+                self._rngs[row] = seeding.np_random(each)[0]
+        self._begin(self._all)
+        return self.robots.observe(self._all), self._infos(self._all)
 
     def step(
-        self, actions: Array
+        self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Make the next subtask of each trial that goes on; begin the others anew.
-
-        Raises ResetNeeded where they are not begun by themselves, in the mode ``"Disabled"``.
-        """
-        going = ~self._ended
-        if not going.all():
-            if self.autoreset_mode == AutoresetMode.DISABLED:
-                raise ResetNeeded(
-                    f"the trials of environments {np.flatnonzero(self._ended).tolist()} have "
-                    "ended: reset them first"
-                )
-            self._begin(~going)
-        rewards, ended = self.arms.step(actions, going)
-        truncated = np.zeros_like(ended)
-        observations, infos = self.arms.observations(), self._infos(self._all)
-        if self.autoreset_mode != AutoresetMode.SAME_STEP:
-            self._ended = ended.copy()
-        elif ended.any():
+        """Reach for the next goal of each trial, and begin anew those that have ended."""
+        if self._rngs[0] is None:
+            raise ResetNeeded("no trial goes on: reset first")
+        rewards, ended = self.robots.step(actions, self._all)
+        final, rows = {}, np.flatnonzero(ended)
+        if len(rows):
             last = np.full(self.num_envs, None, dtype=object)
-            for row in np.flatnonzero(ended):
-                last[row] = observations[row]
-            final = {"final_obs": last, "final_info": self._infos(ended)}
-            self._begin(ended)
-            observations, infos = self.arms.observations(), self._infos(self._all) | final
-            infos |= {f"_{name}": ended.copy() for name in final}
-        return observations, rewards, ended, truncated, infos
+            for row, seen in zip(rows.tolist(), self.robots.observe(rows), strict=True):
+                last[row] = seen
+            final = {"final_obs": last, "final_info": self._infos(rows)}
+            final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
+            self._begin(rows)
+        infos = self._infos(self._all) | final
+        return self.robots.observe(self._all), rewards, ended, np.zeros_like(ended), infos
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """A picture of each robot and its goals."""
-        if self.render_mode is None:
-            return None
-        return tuple(draw_picture(self.arms, row) for row in range(self.num_envs))
+    def _begin(self, rows: NDArray[np.int64]) -> None:
+        number = len(self.robots.tasks)
+        drawn = [self._rngs[row].integers(number) for row in rows.tolist()]
+        self.robots.begin(rows, np.array(drawn))
 
-    def _infos(self, which: NDArray[np.bool_]) -> dict[str, Any]:
-        infos = self.arms.infos()
-        return infos | {f"_{name}": which.copy() for name in infos}
+    def _infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
+        there = np.isin(self._all, rows)
+        infos = self.robots.infos(self._all)
+        return infos | {f"_{name}": there.copy() for name in infos}
 
 
-def give_instance(
-    arms: Arms, row: int, names: Sequence[str], rng: np.random.Generator | None
-) -> None:
-    """Give a robot an instance that is drawn among these."""
-    assert rng is not None
-    name = names[int(rng.integers(len(names)))]
-    arms.give(row, name if arms.knows(name) else load_task(name))
+def check_no_options(options: Mapping[str, Any] | None) -> None:
+    """Raises ValueError for options of a reset: there are none."""
+    if options:
+        raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
@@ -341,11 +356,11 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     Parameters
     ----------
     env : str
-        Id of an environment, such as ``"coartic/Family-v0"``.
+        Id of an environment, such as ``"coartic/TwoArmed1-v2"``.
     num_envs : int
         Number of robots.
     **options
-        As in ``gymnasium.make``.
+        Those of :class:`Robots`.
 
     Returns
     -------
@@ -360,8 +375,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     """
     from coartic.sb3 import RobotEnvs
 
-    given = known_env(env) | options
-    return RobotEnvs(TaskVectorEnv(num_envs, **given, autoreset_mode=AutoresetMode.SAME_STEP))
+    return RobotEnvs(TaskVectorEnv(num_envs, **known_env(env) | options))
 
 
 def known_env(env: str) -> dict[str, Any]:
@@ -398,17 +412,17 @@ def score(
     seed : int
         Of random actions and of methods.
     **options
-        As in ``gymnasium.make``.
+        Those of :class:`Robots`.
 
     Returns
     -------
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process alone with
-        the given hands or the task's initial ones, and for the best solution known. Columns:
-        ``reward``, the mean over tasks, ticks; ``gap`` to the best known reward, per cent, with its
-        95 % interval ``gap_low`` to ``gap_high`` over tasks, or of one task over trials;
-        ``completed``, the share of trials that hit all goals. The others are left out of the means.
-        NaN where nothing is known, or too few trials for an interval.
+        the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
+        over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
+        ``gap_low`` to ``gap_high`` over tasks, or of one task over trials; ``completed``, the share
+        of trials that hit all goals. The others are left out of the means. NaN where nothing is
+        known, or too few trials for an interval.
 
     Raises
     ------
@@ -419,86 +433,84 @@ def score(
     if isinstance(env, str):
         given = known_env(env)
     elif isinstance(unwrapped := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
-        given = unwrapped.arguments
+        given = unwrapped.options
     else:
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
     given = {name: value for name, value in given.items() if name not in ("split", "count", "year")}
-    if "family" in given:
-        given["split"] = "test"
     given |= options
-    _, names = make_arms(1, **given)
-    tasks = [load_task(name) for name in names] or [as_task(given["task"])]
-
-    found = {} if policy is None else policy if isinstance(policy, Mapping) else {"policy": policy}
-
-    def robots(each: int) -> Arms:
-        arms, _ = make_arms(each * len(tasks), **given)
-        for row in range(each * len(tasks)):
-            arms.give(row, tasks[row // each])
-        arms.reset(np.ones(each * len(tasks), dtype=np.bool_))
-        return arms
-
-    first = robots(1)
-    entries = first.observation_space.shape
-    for name, each in found.items():
-        learned_on = getattr(getattr(each, "observation_space", None), "shape", entries)
-        if learned_on != entries:
+    if given.get("task") in shipped_families():
+        given = {"split": "test", **given}
+    setting = Robots(1, **given)
+    model, shape = setting.model, setting.observation_space.shape
+    tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
+    policies = policy if isinstance(policy, Mapping) else {"policy": policy}
+    policies = {name: each for name, each in policies.items() if each is not None}
+    for name, each in policies.items():
+        learned_on = getattr(getattr(each, "observation_space", None), "shape", shape)
+        if learned_on != shape:
             raise ValueError(
                 f"{name} was trained on observations of shape {learned_on}; "
-                f"those of {env if isinstance(env, str) else 'this environment'} have {entries}"
+                f"those of {env if isinstance(env, str) else 'this environment'} have {shape}"
             )
-    model = first.model
-    rng = np.random.default_rng(seed)
-    best = best_known(tasks) if model == PAPER else np.full(len(tasks), np.nan)
-    hands = [first.given_hands(task) or initial_hands(task, model=model) for task in tasks]
+
+    def run(act: Callable[[NDArray[np.float32]], ArrayLike], trials: int = 1) -> Array:
+        """Rewards of trials on each task, ``(K, trials)``; NaN where one failed."""
+        count = trials * len(tasks)
+        robots, rows, totals = Robots(count, **given), np.arange(count), np.zeros(count)
+        robots.begin(rows, rows // trials)
+        while len(rows):
+            rewards, ended = robots.step(act(robots.observe(rows)), rows)
+            totals[rows] += rewards
+            rows = rows[~ended]
+        return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
+
+    def solve(method: Method) -> Array:
+        """Rewards of its solutions, ``(K, 1)``; NaN where it has none."""
+        rewards = np.full((len(tasks), 1), np.nan)
+        for number, task in enumerate(tasks):
+            session = Session(task, seed, method.told, model=model, trusted=True)
+            with suppress(MethodError):
+                solution = method.solve(session).solution
+                rewards[number] = reward_of(execute(task, solution, model=model))
+        return rewards
+
+    entries, rng = setting.action_space.shape, np.random.default_rng(seed)
     alone = [
-        corrective_trial(task, each, model=model) for task, each in zip(tasks, hands, strict=True)
+        corrective_trial(each, initial_hands(each, model=model), model=model) for each in tasks
     ]
+    known = [best_shipped(each) if model == PAPER else None for each in tasks]
+    best = np.array([[np.nan if each is None else each.reward] for each in known])
     rewards = {
-        name: solve_all(tasks, each, seed, model)
-        if isinstance(each, Method)
-        else run_trials(robots(1), policy_of(each))[:, None]
-        for name, each in found.items()
-    }
-    guesses = robots(episodes)
-    size = guesses.action_space.shape
-    rewards["random actions"] = run_trials(
-        guesses, lambda seen: rng.uniform(-1, 1, (len(seen), *size))
-    ).reshape(len(tasks), episodes)
-    rewards["corrective process"] = np.array(
-        [[np.nan if trial.reward is None else trial.reward] for trial in alone]
-    )
-    rewards["best known"] = best[:, None]
+        **{name: solve(each) if isinstance(each, Method) else run(policy_of(each))
+           for name, each in policies.items()},
+        "random actions": run(lambda seen: rng.uniform(-1, 1, (len(seen), *entries)), episodes),
+        "corrective process": np.array([[reward_of(trial)] for trial in alone]),
+        "best known": best,
+    }  # fmt: skip
     rows = {name: summarise(each, best) for name, each in rewards.items()}
     rows["best known"]["completed"] = np.nan
-    table = pd.DataFrame.from_dict(rows, orient="index")
-    return table.rename_axis("policy")
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
+
+
+def reward_of(trial: Execution) -> float:
+    """Its reward; NaN where it failed."""
+    return np.nan if trial.reward is None else trial.reward
 
 
 def summarise(rewards: Array, best: Array) -> dict[str, float]:
     """Means over tasks of rewards ``(K, trials)``, NaN for those that failed."""
-    gaps = 100.0 * (best[:, None] - rewards) / np.abs(best[:, None])
-    values = gaps[0] if len(gaps) == 1 else mean_over(gaps, axis=1)
-    values = values[np.isfinite(values)]
-    mean, half = mean_over(values), np.nan
-    if len(values) > 2:
-        half = stdtrit(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+    gaps = pd.DataFrame(100.0 * (best - rewards) / np.abs(best))
+    values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
+    half = stdtrit(len(values) - 1, 0.975) * values.sem() if len(values) > 2 else np.nan
     return {
-        "reward": float(mean_over(mean_over(rewards, axis=1))),
-        "gap": float(mean),
-        "gap_low": float(mean - half),
-        "gap_high": float(mean + half),
+        "reward": pd.DataFrame(rewards).mean(axis=1).mean(),
+        "gap": values.mean(),
+        "gap_low": values.mean() - half,
+        "gap_high": values.mean() + half,
         "completed": float(np.isfinite(rewards).mean()),
     }
-
-
-def mean_over(values: Array, axis: int | None = None) -> Any:
-    """The mean of the numbers among these; NaN where there is none."""
-    count = np.isfinite(values).sum(axis=axis)
-    with np.errstate(invalid="ignore"):
-        return np.where(np.isfinite(values), values, 0.0).sum(axis=axis) / count
 
 
 def policy_of(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
@@ -513,44 +525,13 @@ def policy_of(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     return policy  # type: ignore[no-any-return]
 
 
-def run_trials(arms: Arms, policy: Callable[[NDArray[np.float32]], ArrayLike]) -> Array:
-    """Rewards of a trial of each robot, from its start, ``(N,)``; NaN where one failed."""
-    going = np.ones(len(arms.rows), dtype=np.bool_)
-    while going.any():
-        going &= ~arms.step(policy(arms.observations()), going)[1]
-    return np.where(np.isfinite(arms.trials.rewards), arms.trials.rewards, np.nan)
-
-
-def solve_all(tasks: Sequence[Task], method: Method, seed: int, model: MotionModel) -> Array:
-    """Rewards of a method's solutions, ``(K, 1)``; NaN where it has none."""
-    rewards = np.full((len(tasks), 1), np.nan)
-    for place, task in enumerate(tasks):
-        session = Session(task, seed, method.told, model=model, trusted=True)
-        with suppress(MethodError):
-            reward = execute(task, method.solve(session).solution, model=model).reward
-            rewards[place] = np.nan if reward is None else reward
-    return rewards
-
-
-def best_known(tasks: Sequence[Task]) -> Array:
-    """The best reward that is shipped of each task ``(K,)``; NaN where none is."""
-    shipped = map(best_shipped, tasks)
-    return np.array([np.nan if known is None else known.reward for known in shipped])
-
-
-TASKS = {
-    "Ascending": "ascending",
-    "Descending": "descending",
-    "TwoArmed1": "two-armed-1",
-    "TwoArmed2": "two-armed-2",
-    "Task": None,
+IDS: dict[str, dict[str, Any]] = {
+    "coartic/Ascending-v2": {"task": "ascending"},
+    "coartic/Descending-v2": {"task": "descending"},
+    "coartic/TwoArmed1-v2": {"task": "two-armed-1"},
+    "coartic/TwoArmed2-v2": {"task": "two-armed-2"},
+    "coartic/Task-v2": {},
 }
-
-
-IDS: dict[str, dict[str, Any]] = {"coartic/Family-v0": {"family": "two-armed/v1"}}
-for _name, _task in TASKS.items():
-    _given = {} if _task is None else {"task": _task}
-    IDS |= {f"coartic/{_name}-v0": _given, f"coartic/{_name}-v1": _given | WORKS}
 for _name, _given in IDS.items():
     if _name not in gymnasium.registry:
         gymnasium.register(

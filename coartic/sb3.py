@@ -25,7 +25,7 @@ class RobotEnvs(VecEnv):
     Parameters
     ----------
     envs : coartic.gym.TaskVectorEnv
-        The environment, of the mode ``"SameStep"``.
+        The environment.
     """
 
     def __init__(self, envs: Any) -> None:
@@ -49,7 +49,7 @@ class RobotEnvs(VecEnv):
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Make the next subtask of all trials."""
-        costs = np.array([self._cost(task) for task in self._envs.arms.rows["task"].tolist()])
+        costs = np.array([self._cost(task) for task in self._envs.robots.task.tolist()])
         observations, rewards, ended, _, seen = self._envs.step(self._actions)
         self._lost += rewards
         self._steps += 1
@@ -79,11 +79,10 @@ class RobotEnvs(VecEnv):
         """Whether each is wrapped: none is."""
         return [False] * self.num_envs
 
-    def _cost(self, place: int) -> float:
+    def _cost(self, number: int) -> float:
         """Ticks of the corrective process alone on a task, or of a failure."""
-        if place not in self._costs:
-            arms = self._envs.arms
-            hands = initial_hands(arms.tasks[place], model=arms.model)
-            reward = corrective_trial(arms.tasks[place], hands, model=arms.model).reward
-            self._costs[place] = float(FAILED if reward is None else -reward)
-        return self._costs[place]
+        if number not in self._costs:
+            task, model = self._envs.robots.task_at(number), self._envs.robots.model
+            reward = corrective_trial(task, initial_hands(task, model=model), model=model).reward
+            self._costs[number] = float(FAILED if reward is None else -reward)
+        return self._costs[number]

@@ -39,7 +39,6 @@ LIMITS = {  # iterations of the corrective process, spread of the targets
     "two-armed-2": (120, 0.3),
     "uneven": (120, 4.0),
 }
-SCALE = 32.0  # of actions: no target is outside of the box
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 
 
@@ -150,55 +149,6 @@ def by_objective(task, model, cases, many=False):
         yield {"reward": None if value == FAILED else -value}
 
 
-def by_environment(task, model, cases):
-    gym = pytest.importorskip("coartic.gym")
-    env = gym.TaskEnv(task, model=model, scale=SCALE)
-    for number, case in enumerate(cases):
-        if number % 2 and len(task.hands) == 1:  # the other arm moves
-            yield None
-            continue
-        env.reset()
-        total, ended, movements = 0.0, False, iter(case.solution)
-        while not ended:
-            movement = next(movements)
-            action = env.action_for(movement.hand, movement.target)
-            _, reward, ended, _, info = env.step(action)
-            total += reward
-        yield environment_facts(total, info["is_success"], info["corrections"])
-
-
-def environment_facts(total, success, corrections):
-    assert success == (total > -FAILED)
-    return {"reward": total if success else None, "corrections": corrections}
-
-
-def by_vector_environment(task, model, cases):
-    """All trials at once, around configurations that are no robot's."""
-    gym = pytest.importorskip("coartic.gym")
-    goals, count = len(task.goals), len(cases)
-    around = task.q0 + np.random.default_rng(0).normal(0, 0.1, (goals, task.robot.dof))
-    envs = gym.TaskVectorEnv(count, task, around=around, scale=SCALE, model=model)
-    envs.reset()
-    arms, total, found = envs.arms, np.zeros(count), [None] * count
-    for goal in range(goals):
-        actions = np.full((count, *arms.action_space.shape), np.nan)
-        for n, case in enumerate(cases):
-            movement = case.solution[goal]
-            if len(task.hands) == 2:
-                actions[n, 0] = {"left": -1, "right": 1}[movement.hand]
-            if movement.target is not None:
-                away = (movement.target - around[goal])[arms.free] / SCALE
-                actions[n, -len(arms.free) :] = away
-        _, rewards, ended, _, infos = envs.step(actions)
-        total += rewards
-        for n in np.flatnonzero(ended):
-            if found[n] is None:
-                success = infos["is_success"][n], infos["corrections"][n]
-                found[n] = environment_facts(total[n], *success)
-    skip = len(task.hands) == 1
-    return [None if skip and number % 2 else each for number, each in enumerate(found)]
-
-
 def by_first_trial_of_the_learner(task, model, cases):
     condition = "EC4" if len(task.hands) == 2 else "EC1"
     for case in cases:
@@ -262,8 +212,6 @@ DOORS = {
     "make_trials": by_make_trials,
     "objective": by_objective,
     "many points": functools.partial(by_objective, many=True),
-    "environment": by_environment,
-    "vector environment": by_vector_environment,
     "first trial": by_first_trial_of_the_learner,
 }
 

@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, drawing, load_task
 from coartic.analysis.figures.plot import save
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
@@ -17,6 +18,19 @@ from coartic.analysis.topics.paper.tables import hand_shares, published_differen
 from coartic.analysis.topics.tasks import draw_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
+
+
+def test_robots_and_goals_are_drawn_where_they_are():
+    task, axes = load_task("two-armed-1"), Figure().add_subplot()
+    circles = drawing.draw_goals(axes, task)
+    drawing.fill_goals(circles, [True, False, False, False])
+    assert [circle.get_fill() for circle in circles] == [True, False, False, False]
+    assert [circle.center for circle in circles] == [*map(tuple, task.goals)]
+    move = drawing.draw_robot(axes, task, task.q0)
+    move(task.q0 + 1.0)
+    for line, hand in zip(axes.lines, ("left", "right"), strict=True):
+        due = task.robot.joint_positions(task.q0 + 1.0, hand)
+        np.testing.assert_array_equal(line.get_xydata(), due)
 
 
 @pytest.fixture(scope="module")

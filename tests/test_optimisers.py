@@ -99,20 +99,6 @@ def test_an_optimum_gets_its_reward_through_every_door(name):
     cost = coartic.objective(task, entry.hands)
     assert cost(targets[cost.joints]) == -entry.reward
     assert execute(task, cost.solution).reward == entry.reward
-    gymnasium, door = pytest.importorskip("gymnasium"), pytest.importorskip("coartic.gym")
-    options = {"task": task, "around": entry.hands, "scale": 4.0, "hands": None}
-    env = gymnasium.make("coartic/Task-v1", **options)
-    env.reset()
-    actions, rewards = [], []
-    for movement, target in zip(solution, targets, strict=True):
-        actions.append(env.unwrapped.action_for(movement.hand, target))
-        rewards.append(env.step(actions[-1])[1])
-    assert sum(rewards) == entry.reward
-    assert env.unwrapped.arms.trials.completed.all()
-    several = door.TaskVectorEnv(3, **options)
-    several.reset()
-    totals = sum(several.step(np.tile(action, (3, 1)))[1] for action in actions)
-    assert totals.tolist() == [entry.reward] * 3
 
 
 def test_the_optima_that_need_a_goal_of_no_ticks_hold_one():

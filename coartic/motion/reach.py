@@ -229,13 +229,8 @@ def batch_for(robot: Robot) -> Batch:
     try:
         return _IDLE.setdefault(robot.most_links, []).pop()  # no other thread gets it
     except IndexError:
-        return new_batch(robot, LANES)
-
-
-def new_batch(robot: Robot, count: int) -> Batch:
-    """Arrays for the kernel to work on, for so many arms at a time, at most :data:`LANES`."""
-    flags = np.zeros((2, count), dtype=np.bool_)
-    return Batch(runs_for(count, robot), flags[0], flags[1], lanes_for(robot))
+        flags = np.zeros((2, LANES), dtype=np.bool_)
+        return Batch(runs_for(LANES, robot), flags[0], flags[1], lanes_for(robot))
 
 
 def reach_with(robot: Robot, arms: Requests, setup: Setup) -> Reached:
