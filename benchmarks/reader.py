@@ -6,8 +6,10 @@ of the process that runs suites.
 
 from __future__ import annotations
 
+import atexit
 import inspect
 import json
+import multiprocessing
 import os
 import re
 from collections.abc import Iterable, Iterator
@@ -17,28 +19,28 @@ from types import ModuleType
 from typing import Any
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.pool import start_process, worker_context
+from coartic.benchmarks.pool import WorkerProcess
 from coartic.errors import CoarticError
 from coartic.method import Information, Method
 from coartic.runs.card import MethodCard, answer, card_of, load_file, methods_in
 from coartic.text import LONGEST_LINE, error_line, plain
-from coartic.threads import begin_worker
+from coartic.threads import begin_worker, end_group
 
 _LIMIT_S = 300.0  # of an answer: libraries may take long to import
 _LONGEST_ANSWER = 2**24  # bytes
 
 
 class Reader:
-    """Asks a process that has imported a file; it ends with this one."""
+    """Asks a process that has imported a file; what that has started ends with this one."""
 
     def __init__(self, path: Path, shown: str) -> None:
-        context = worker_context()
         self._shown = shown
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(
+        self._pipe, theirs = multiprocessing.Pipe()
+        self._process = WorkerProcess(
             target=answer_questions, args=(theirs, str(path), shown), daemon=True
         )
-        start_process(self._process)
+        self._process.start()
+        atexit.register(end_group, self._process.pid)
         theirs.close()
 
     def __call__(self, method: str, question: str, *arguments: Any) -> Any:
@@ -46,7 +48,7 @@ class Reader:
         try:
             self._pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
             if not self._pipe.poll(_LIMIT_S):
-                self._process.kill()
+                end_group(self._process.pid)
                 raise CoarticError(f"{self._shown}: gives no answer within {_LIMIT_S:g} s")
             said = json.loads(self._pipe.recv_bytes(_LONGEST_ANSWER))
         except (OSError, EOFError):
@@ -60,10 +62,9 @@ class Reader:
 
 def answer_questions(pipe: Any, path: str, shown: str) -> None:
     """What the process does."""
-    if os.name == "posix":
-        nobody = os.open(os.devnull, os.O_RDWR)
-        for stream in range(3):
-            os.dup2(nobody, stream)
+    nobody = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nobody, stream)
     begin_worker()
     methods: dict[str, type[Method]] = {}
     while True:

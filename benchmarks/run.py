@@ -22,7 +22,6 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
-from coartic.interruption import unbroken
 from coartic.runs.plan import Plan, RunKey, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
@@ -144,11 +143,10 @@ def perform(
                         again = [run.key for run in runs if run.status not in _SURE]
                         alone += [Batch(batches[number].position, [key]) for key in again]
                         runs = [run for run in runs if run.status in _SURE]
-                    with unbroken:
-                        store.write(runs)
-                        for run in runs:
-                            progress.finish(run)
-                            watch(progress, f"{run.setting.task.name} {run.setting.method}")
+                    store.write(runs)
+                    for run in runs:
+                        progress.finish(run)
+                        watch(progress, f"{run.setting.task.name} {run.setting.method}")
             batches = alone
         wall_s = time.perf_counter() - clock
         return RunReport(folder, progress, wall_s, store.count() - plan.size)

@@ -19,7 +19,6 @@ Executions = Mapping[str, Execution | Exception]
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     """The runs of a job, also of one that failed. All their parts are executed side by side."""
-    outcomes = [check_rewards(outcome) for outcome in outcomes]
     parts = [(n, part) for n, outcome in enumerate(outcomes) for part in outcome.parts]
     solutions = [outcomes[n].parts[part] for n, part in parts]
     executions = execute_all(job.setting.task, solutions)
@@ -27,14 +26,6 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     for (n, part), execution in zip(parts, executions, strict=True):
         by_run[n][part] = execution
     return [score_run(job, *each) for each in zip(job.keys, outcomes, by_run, strict=True)]
-
-
-def check_rewards(outcome: Outcome) -> Outcome:
-    """The outcome, or a crash where the method changed the rewards of its trials or their count:
-    no file would be read that holds both."""
-    if len(outcome.rewards) <= (outcome.meter.trials if outcome.meter else 0):
-        return outcome
-    return Outcome("crashed", "it changed the rewards of its trials, or their number")
 
 
 def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run:

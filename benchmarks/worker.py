@@ -14,14 +14,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, PlainValidator, TypeAdapter
+from pydantic import Field, PlainValidator, TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.method import (
-    MOST_COUNT,
     BudgetError,
     Information,
     Meter,
@@ -37,7 +36,6 @@ from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import SEARCH, RunKey, Setting
 from coartic.runs.run import PARTS, Times
-from coartic.tasks.task import Task
 from coartic.text import error_line
 
 
@@ -64,13 +62,6 @@ def plain_movement(movement: Movement) -> Movement:
     )
 
 
-def check_meter(meter: Meter) -> Meter:
-    """A meter itself; ValueError where it counts what cannot be."""
-    if all(0 <= getattr(meter, name) <= MOST_COUNT for name in Meter.COUNTS):
-        return meter
-    raise ValueError("its meter counts what cannot be")
-
-
 _Movement = Annotated[Movement, PlainValidator(lambda parts: plain_movement(Movement(*parts)))]
 _Reward = Annotated[int, Field(gt=-(2**31), lt=2**31)]
 
@@ -86,7 +77,7 @@ class Outcome:
     bound: int | None = None
     details: dict[str, Any] = field(default_factory=dict)
     used: tuple[str, ...] = ()
-    meter: Annotated[Meter, AfterValidator(check_meter)] | None = None
+    meter: Meter | None = None
     """None where the worker died."""
     rewards: list[_Reward | None] = field(default_factory=list)
     times: Times = field(default_factory=Times)
@@ -174,19 +165,15 @@ def perform_job(job: Job) -> list[Outcome]:
     return [outcome_of(setting.method, result, session, times) for result, session in pairs]
 
 
-def prepare(tasks: Iterable[tuple[Task, bool]]) -> None:
-    """Compile the kernels for these tasks, or load them, on no run's clock; of each, whether the
-    learner is run on it, which has a kernel of its own, or something else."""
+def prepare(jobs: Iterable[Job]) -> None:
+    """Compile the kernels for these jobs, or load them, on no run's clock; the learner has one of
+    its own."""
     done = set()
-    for task, learns in tasks:
+    for job in jobs:
+        task, learns = job.setting.task, job.setting.method.startswith(METHOD_PREFIX)
         if (kernels := (links_for(task.robot), learns)) not in done:
             done.add(kernels)
             warm_up(task, "learner" if learns else "motion", "trials")
-
-
-def learns(method: str) -> bool:
-    """Whether a method is the learner, which has a kernel of its own."""
-    return method.startswith(METHOD_PREFIX)
 
 
 _seen: set[str] = set()

@@ -1,6 +1,6 @@
 """``coartic`` and ``python -m coartic``: the command line."""
 
-from coartic.interruption import catch_signals, wait_if_ending
+from coartic.interruption import catch_signals, end_if_interrupted
 
 
 def main() -> None:
@@ -10,8 +10,8 @@ def main() -> None:
         from coartic.cli import main as run_command
 
         run_command()
-    finally:
-        wait_if_ending()
+    finally:  # whatever libraries have made of the interruption
+        end_if_interrupted()
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,6 @@ from matplotlib.figure import Figure
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
 from coartic.files import check_output, write_output
-from coartic.interruption import temporary_folder
 
 if TYPE_CHECKING:
     from coartic.motion.ticks import Trajectory
@@ -81,7 +81,7 @@ def write_film(
     mp4 = path.suffix.lower() == ".mp4"
     writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
     try:
-        with temporary_folder() as folder:
+        with tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
                 for row in [*rows, *[rows[-1]] * held]:

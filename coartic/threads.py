@@ -11,7 +11,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from pathlib import Path
 
 from coartic.inputs import check_limits
 from coartic.interruption import ENDING
@@ -59,11 +59,6 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
             each.result()
 
 
-def one_thread_each() -> AbstractContextManager[None]:
-    """Workers that begin meanwhile have one thread for BLAS each."""
-    return environment(ONE_THREAD)
-
-
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Processes that begin meanwhile have these variables."""
@@ -84,30 +79,24 @@ def set_environment(variables: Mapping[str, str | None]) -> None:
             os.environ[name] = value
 
 
-def begin_worker(folder: str | None = None) -> None:
-    """Leave Ctrl-C to the parent, and end this process, whatever it does, when the parent has
-    ended. The server that it was forked from lives as long as any worker.
-
-    With ``folder``, the process leads a group of its own: the group ends with it, and the folder
-    with the group.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def begin_worker(folder: Path | None = None) -> None:
+    """Lead a group of processes, which ends with this one or when the parent has ended, and then
+    ``folder`` with it. The server that it was forked from lives as long as any worker."""
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
     if hasattr(signal, "pthread_sigmask"):  # see blocked_signals
         signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-    if folder is not None and hasattr(os, "setpgid"):
-        os.setpgid(0, 0)
     threading.Thread(target=end_with_parent, args=(folder,), daemon=True).start()
 
 
-def end_with_parent(folder: str | None) -> None:
+def end_with_parent(folder: Path | None) -> None:
     """Wait for the end of the process that this one works for."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
         if folder is not None:
             shutil.rmtree(folder, ignore_errors=True)
-            end_group(os.getpid())
-        os._exit(1)
+        end_group(os.getpid())
 
 
 def end_group(pid: int) -> None:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import interruptible, say, say_pairs, show_frame
+from coartic.cli.terminal import say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.text import counted, unknown
+from coartic.interruption import interruptible
+from coartic.text import counted, one_line, unknown
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
@@ -40,7 +41,7 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
 
     started = time.monotonic()
     study = load(folder)
-    with interruptible(lambda: f"{out} may be incomplete; repeat the command to finish it."):
+    with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
         files = write_report(study, out, for_paper=for_paper)
     tables = sum(name.endswith(".csv") for name in files)
     figures = len({Path(name).stem for name in files if name.startswith("figures/")})

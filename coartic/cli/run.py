@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from coartic.cli import arguments as given
 from coartic.cli.arguments import split_names
 from coartic.cli.read import answers_in_words
-from coartic.cli.terminal import Display, interruptible, say, say_pairs
+from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
-from coartic.text import counted, unknown
+from coartic.interruption import interruptible
+from coartic.text import counted, one_line, unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
@@ -71,7 +72,7 @@ def run(
 
     def saved() -> str:
         done = counted(display.done, "finished run")
-        return f"Saved in {out}: {done}; repeat the command to resume."
+        return one_line(f"Saved in {out}: {done}; repeat the command to resume.")
 
     with interruptible(saved), display:
         if beside:

@@ -6,11 +6,9 @@ import os
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, TextIO
 
-from coartic.interruption import explain
 from coartic.text import counted, one_line
 
 if TYPE_CHECKING:
@@ -75,11 +73,6 @@ def show_frame(frame: pd.DataFrame) -> None:
     for row in frame.astype(str).itertuples(index=False):
         table.add_row(*map(one_line, row))
     console().print(table)
-
-
-def interruptible(sentence: Callable[[], str]) -> AbstractContextManager[None]:
-    """What is said of the block where it is interrupted; made when that happens."""
-    return explain(lambda: one_line(sentence()))
 
 
 class Display:
