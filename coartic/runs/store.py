@@ -216,7 +216,6 @@ class Store:
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
         self._db = connection
-        self._file = identity(folder / RUNS_FILE)
 
     def __enter__(self) -> Store:
         return self
@@ -322,7 +321,7 @@ class Store:
     def transaction(self) -> Iterator[None]:
         """What is written in this block is there whole or not at all; it may stand within another.
 
-        Raises CoarticError where the disk does not take it.
+        Raises CoarticError where the disk does not take it, or the file is no longer there.
         """
         if self._db.in_transaction:
             yield
@@ -336,6 +335,11 @@ class Store:
                 if self._db.in_transaction:
                     self._db.rollback()
         except sqlite3.OperationalError as error:
+            if error.sqlite_errorname == "SQLITE_READONLY_DBMOVED":
+                raise CoarticError(
+                    f"{self.folder} was removed, renamed or replaced while the suite ran: put it "
+                    "back, or repeat the command to begin anew"
+                ) from None
             raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
         except sqlite3.DatabaseError as error:
             raise CoarticError(damage(self.folder / RUNS_FILE, error)) from None
@@ -372,12 +376,8 @@ class Store:
     def write(self, runs: Iterable[Run]) -> None:
         """Keep finished runs together, all of them or none; they replace earlier ones.
 
-        Raises CoarticError where the disk does not take them, or the tables a run. Raises it also
-        where the folder is no longer there, or another one: then they are saved beside it.
+        Raises CoarticError where the disk does not take them, or the tables a run.
         """
-        lost = self._file != identity(self.folder / RUNS_FILE)
-        if lost:
-            self._move()
         with self.transaction():
             for run in runs:
                 try:
@@ -386,13 +386,6 @@ class Store:
                     raise CoarticError(
                         f"run {run.key.id} of method {run.setting.method} cannot be stored: {error}"
                     ) from None
-
-        if lost:
-            raise CoarticError(
-                f"the results were removed, renamed or replaced while the suite ran; all "
-                f"{self.count()} runs that are finished are saved in {self.folder}: repeat the "
-                "command with this folder to go on"
-            )
 
     @explained
     def run(self, prefix: str) -> Run:
@@ -471,22 +464,6 @@ class Store:
                 yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
     # Inside.
-
-    def _move(self) -> None:
-        """Copy everything into a new folder beside the one that is lost, and go on there."""
-        names = (f"{self.folder.name}-saved-{number}" for number in itertools.count(1))
-        saved = next(f for f in map(self.folder.with_name, names) if not f.exists())
-        try:
-            saved.mkdir(parents=True)
-            with connect(str(saved / RUNS_FILE), _WAIT_S) as copy:
-                self._db.backup(copy)
-        except (OSError, sqlite3.Error) as error:
-            raise CoarticError(
-                f"{self.folder} was removed, renamed or replaced while the suite ran, and its "
-                f"runs cannot be saved in {saved}: {error}"
-            ) from None
-        self._db.close()
-        self.folder, self._db = saved, copy
 
     def _write_run(self, run: Run) -> None:
         """Put a run into the tables, in place of an earlier one of its id."""
@@ -741,15 +718,6 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
         yield is_ours
     finally:
         os.close(opened)
-
-
-def identity(path: Path) -> tuple[int, int] | None:
-    """Which file is at a path; None where there is none."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
 
 
 def check_place(folder: Path) -> None:
