@@ -61,7 +61,6 @@ _STARTS = 5  # processes in a row that may end before they begin a job
 _KILLED = (-9, 255)  # exit codes of a process that somebody has killed, or whose server
 _END_S = 1.0  # that a process which is killed has to end
 _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
-_APPEND = os.O_WRONLY | os.O_APPEND | os.O_CREAT
 Numbered = tuple[int, Job]
 
 
@@ -234,10 +233,10 @@ def perform_jobs(
 ) -> None:
     """What a process does, in a folder of its own."""
     set_environment(variables)
-    said = folder / _SAID
-    for stream, path, how in ((0, os.devnull, os.O_RDONLY), (1, said, _APPEND), (2, said, _APPEND)):
-        os.dup2(os.open(path, how, 0o600), stream)
     begin_worker(folder.parent)
+    said = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    for stream in (1, 2):
+        os.dup2(said, stream)
     bound_resources(workers)
     prepare(job for _, job in jobs)
     place = folder / "place"
@@ -247,7 +246,7 @@ def perform_jobs(
     (folder / _BEGUN).touch()
     process = os.getpid()
     for number, job in jobs:
-        os.truncate(said, 0)
+        os.truncate(folder / _SAID, 0)
         try:
             outcomes = list(map(plain_outcome, perform_within_limit(job)))
             text = json.dumps(outcomes)

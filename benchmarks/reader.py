@@ -10,7 +10,6 @@ import atexit
 import inspect
 import json
 import multiprocessing
-import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
@@ -62,9 +61,6 @@ class Reader:
 
 def answer_questions(pipe: Any, path: str, shown: str) -> None:
     """What the process does."""
-    nobody = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nobody, stream)
     begin_worker()
     methods: dict[str, type[Method]] = {}
     while True:

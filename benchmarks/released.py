@@ -26,13 +26,16 @@ _ENDING = ".sqlite.xz"
 def open_released(suite: str) -> Store:
     """The shipped results of a suite, unpacked in memory. Raises CoarticError where there are none,
     or they were changed."""
-    hashes = released_hashes()
+    path = _FOLDER / f"{suite}{_ENDING}"
+    try:
+        hashes = released_hashes()
+        content = path.read_bytes() if suite in hashes else b""
+    except (OSError, ValueError) as error:
+        raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
         raise CoarticError(
             f"no results of suite {suite!r} are released, but of {', '.join(hashes)}"
         )
-    path = _FOLDER / f"{suite}{_ENDING}"
-    content = path.read_bytes()
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
         raise CoarticError(f"{path} is not as it was released: install coartic again")
     return open_content(lzma.decompress(content), RELEASED)

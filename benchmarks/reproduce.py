@@ -92,7 +92,8 @@ def perform_some_again(
     folder: Path, count: int, registered: Registry
 ) -> Iterator[tuple[str, list[str]]]:
     """Perform ``count`` runs of a folder anew, spread over its cells, those of known methods; the
-    id of each, and in what it differs from the stored run."""
+    id of each, and in what it differs from the stored run. Raises CoarticError where there is
+    none."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
@@ -102,6 +103,8 @@ def perform_some_again(
             and registered[cell.method.name].code == cell.method.code
             for number in range(cell.runs)
         ]
+        if not ids:
+            raise CoarticError(f"{folder} has no run of a method whose code is the same here")
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
     for run in chosen:

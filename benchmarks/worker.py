@@ -229,12 +229,12 @@ def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
     if result.bound is not None and not method.startswith(SEARCH):
         raise SolutionError(f"it states a bound, which is for this project's methods {SEARCH}*")
     try:
-        session.check_solution(tuple(result.solution))
         parts = {
             part: [plain_movement(movement) for movement in getattr(result, part)]
             for part in PARTS
             if part == "solution" or getattr(result, part)
         }
+        session.check_solution(parts["solution"])
         details = plain_details(result.details)
         bound = None if result.bound is None else int(result.bound)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:

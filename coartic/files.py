@@ -32,10 +32,9 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
     Raises CoarticError, before anything is written, where another file is in the way.
     """
-    check_folder(folder, files)
+    make_folder(folder, files)
     with errors_in_words(folder):
         before = listed_files(folder)
-        folder.mkdir(parents=True, exist_ok=True)
         write_listing(folder, {*before, *files})  # whatever happens now, all of them are known
         for name, data in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -55,8 +54,9 @@ def check_inside(folder: Path, path: Path) -> None:
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
 
 
-def check_folder(folder: Path, names: Collection[str] = ()) -> None:
-    """Raises CoarticError where :func:`publish` would; for those who work long before."""
+def make_folder(folder: Path, names: Collection[str] = ()) -> None:
+    """Make a folder for :func:`publish`, for those who work long before. Raises CoarticError where
+    that would."""
     if os.path.lexists(folder) and not folder.is_dir():
         raise CoarticError(f"cannot write {folder}: what is there is no folder")
     ours = listed_files(folder)
@@ -70,6 +70,8 @@ def check_folder(folder: Path, names: Collection[str] = ()) -> None:
             f"{folder} holds {shown}{more}, which coartic did not write there. Move it away or "
             "choose another folder."
         )
+    with errors_in_words(folder):
+        folder.mkdir(parents=True, exist_ok=True)
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
@@ -112,7 +114,7 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 
 def listed_files(folder: Path) -> set[str]:
-    """What an earlier call wrote; names that lead elsewhere are none of it."""
+    """What an earlier call wrote; folders and names that lead elsewhere are none of it."""
     path = folder / LISTING
     if path.is_symlink() or not path.is_file():
         return set()
@@ -120,7 +122,8 @@ def listed_files(folder: Path) -> set[str]:
         names = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
         return set()
-    return {name for name in names if name and not Path(name).is_absolute() and ".." not in name}
+    inside = (name for name in names if name and not Path(name).is_absolute() and ".." not in name)
+    return {name for name in inside if not (folder / name).is_dir()}
 
 
 def write_listing(folder: Path, names: Iterable[str]) -> None:

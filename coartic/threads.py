@@ -80,8 +80,11 @@ def set_environment(variables: Mapping[str, str | None]) -> None:
 
 
 def begin_worker(folder: Path | None = None) -> None:
-    """Lead a group of processes, which ends with this one or when the parent has ended, and then
-    ``folder`` with it. The server that it was forked from lives as long as any worker."""
+    """Leave the terminal, and lead a group of processes. It ends with this one or when the parent
+    has ended, and then ``folder`` with it; the server of both lives as long as any worker."""
+    nobody = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nobody, stream)
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)
     if hasattr(signal, "pthread_sigmask"):  # see blocked_signals
@@ -100,9 +103,8 @@ def end_with_parent(folder: Path | None) -> None:
 
 
 def end_group(pid: int) -> None:
-    """End a worker that leads a group, and all processes in it."""
-    with contextlib.suppress(OSError):
-        if hasattr(os, "killpg"):
-            os.killpg(pid, signal.SIGKILL)
-        else:
-            os.kill(pid, signal.SIGTERM)
+    """End a worker, and all processes in its group, unless it does not lead one yet."""
+    for end in (getattr(os, "killpg", None), os.kill):
+        if end is not None:
+            with contextlib.suppress(OSError):
+                end(pid, getattr(signal, "SIGKILL", signal.SIGTERM))

@@ -198,6 +198,12 @@ def test_released_results(monkeypatch, tmp_path):
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
     with pytest.raises(CoarticError, match="not as it was released"):
         released.open_released("families")
+    (copy / "families.sqlite.xz").unlink()
+    with pytest.raises(CoarticError, match="families.sqlite.xz cannot be read: install"):
+        released.open_released("families")
+    (copy / "SHA256SUMS").write_text("something else\n\n")
+    with pytest.raises(CoarticError, match="cannot be read: install"):
+        released.open_released("comparison")
 
 
 def test_packed_results_say_the_same(parts, tmp_path):

@@ -5,8 +5,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
-import time
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -20,6 +19,7 @@ from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
 from tests.support.commands import call
+from tests.support.processes import all_end
 from tests.support.suites import BROKEN, ROOT, InProcess
 
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -119,6 +119,7 @@ def test_reproduce(coartic, tmp_path):
     code, text, _ = coartic("reproduce", first, "--in", out)
     assert code == 0
     assert text.splitlines()[-1] == "Performed again: identical."
+    assert "1 run performed again: none with another" in coartic("verify", out, "--again", 1)[1]
     with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
         change = "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?"
         plain_sql.execute(change, (second,))
@@ -131,45 +132,41 @@ def test_reproduce(coartic, tmp_path):
     code, _, error = coartic("reproduce", "", "--in", out)
     assert code == 2
     assert "is not a run id" in error
+    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
+        plain_sql.execute("UPDATE methods SET code = 'other'")
+    code, _, error = coartic("verify", out, "--again", 1)
+    assert code == 2
+    assert "has no run of a method whose code is the same here" in error
 
 
 INTERRUPTED = """
-import os, signal, subprocess, sys, threading, time
-from pathlib import Path
-from coartic import interruption
-from coartic.__main__ import main
+import os, sys, tempfile, threading, time
+import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 sys.argv[1:] = sys.argv[4:]
 
-def interrupt(*_):
+def interrupt():
     for _ in range(times):
         os.kill(os.getpid(), number)
         time.sleep(0.05)
 
-if moment.isdigit():  # milliseconds after it has begun to look for signals
-    import coartic.__main__
+def clean():
+    with tempfile.TemporaryDirectory():
+        try:
+            interrupt()
+        finally:
+            threading.Thread(target=interrupt).start()
+            time.sleep(0.5)
+
+if moment == "cleaning":  # which takes longer than the signals
+    import coartic.cli
+    coartic.cli.main = clean
+else:  # milliseconds after it has begun to look for signals
     begin = coartic.__main__.catch_signals
     timer = threading.Timer(int(moment) / 1000, interrupt)
     coartic.__main__.catch_signals = lambda: (begin(), timer.start())
-elif moment == "callback":  # where compiled code has called Python
-    import ctypes
-    call = ctypes.CFUNCTYPE(None)(interrupt)
-    run = interruption.catch_signals
-    interruption.catch_signals = lambda: (run(), call(), time.sleep(9))
-    import coartic.__main__
-    coartic.__main__.catch_signals = interruption.catch_signals
-elif moment == "stuck":
-    import coartic.cli
-    def stay():
-        threading.Timer(0.1, interrupt).start()
-        while True:
-            try:
-                time.sleep(9)
-            except BaseException:
-                pass
-    coartic.cli.main = stay
-main()
+coartic.__main__.main()
 """
 
 
@@ -182,32 +179,42 @@ main()
         ("1500", "SIGINT", 3),
         ("2500", "SIGTERM", 2),
         ("1800", "SIGHUP", 1),
-        ("callback", "SIGINT", 1),
-        ("stuck", "SIGINT", 3),
-        ("stuck", "SIGTERM", 1),
+        ("cleaning", "SIGINT", 3),
+        ("cleaning", "SIGTERM", 1),
     ],
 )
 def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, name, times):
     """Of a suite that would take minutes, whatever it is doing."""
     tmp_path = tmp_path_factory.mktemp("it")  # a short name
-    (tmp_path / "temporary").mkdir()
     number = getattr(signal, name)
     command = ("run", "paper", "--runs", "500", "--trials", "30000", "--jobs", "2", "--out", "out")
+    code = [sys.executable, "-c", INTERRUPTED, moment, str(int(number)), str(times), *command]
+    status, said = call_apart(tmp_path, code)
+    assert status == (130 if name == "SIGINT" else 143), said
+    assert said.startswith("Interrupted.")
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the file starts a program of POSIX")
+def test_what_a_method_file_starts_ends_with_the_command(tmp_path):
+    (tmp_path / "mine.py").write_text("import subprocess\nsubprocess.Popen(['sleep', '999'])\n")
+    command = ["-m", "coartic", "list", "--method-file", "mine.py"]
+    status, said = call_apart(tmp_path, [sys.executable, *command])
+    assert status == 2, said
+
+
+def call_apart(place, command):
+    """Exit code and standard error of a command that leaves no process and no temporary folder."""
+    (place / "temporary").mkdir()
     done = subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED, moment, str(int(number)), str(times), *command],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
-        env=os.environ | {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(ROOT)},
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=place,
+        env=os.environ | {"TMPDIR": str(place / "temporary"), "PYTHONPATH": str(ROOT)},
         start_new_session=True,
     )  # fmt: skip
-    _, said = done.communicate(timeout=60)
-    assert done.returncode == (130 if name == "SIGINT" else 143), said
-    assert said.count("Interrupted.") == 1
-    assert len(said.splitlines()) == 1
-    assert not list((tmp_path / "temporary").iterdir())
-    ended_s = time.monotonic() + 5
-    while time.monotonic() < ended_s and processes_of_session(done.pid):
-        time.sleep(0.1)
-    assert not processes_of_session(done.pid)
+    _, said = done.communicate()
+    assert not list((place / "temporary").iterdir())
+    assert all_end(done.pid)
+    return done.returncode, said
 
 
 def test_a_temporary_folder_of_a_long_name(tmp_path):
@@ -221,16 +228,6 @@ def test_a_temporary_folder_of_a_long_name(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert not list(place.iterdir())
-
-
-def processes_of_session(number):
-    """Which processes there are in a session, where the system tells."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            state, _, _, session = place.read_text().rpartition(") ")[2].split()[:4]
-            found += [place.parent.name] * (int(session) == number and state != "Z")
-    return found
 
 
 def test_modules_in_the_working_folder_are_not_imported(tmp_path):

@@ -1,5 +1,6 @@
 """The conformance kit: every built-in method passes, every broken one fails its law."""
 
+import multiprocessing
 import re
 from concurrent.futures import ProcessPoolExecutor
 
@@ -8,7 +9,6 @@ import pytest
 from coartic import load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.pool import worker_context
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
 from coartic.runs.plan import RunKey, Setting
@@ -70,7 +70,7 @@ def methods():
 @pytest.fixture(scope="module")
 def another_process():
     """One for all methods: each of them would take long to begin its."""
-    with ProcessPoolExecutor(1, mp_context=worker_context()) as pool:
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         yield pool
 
 

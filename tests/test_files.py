@@ -1,11 +1,13 @@
 """Files for users: written whole, and never over what is not ours."""
 
 import os
+import sys
+from pathlib import Path
 
 import pytest
 
 from coartic import CoarticError
-from coartic.files import LISTING, check_folder, publish, write_atomically, write_output
+from coartic.files import LISTING, make_folder, publish, write_atomically, write_output
 
 
 def content(folder):
@@ -27,9 +29,22 @@ def test_a_folder_holds_what_was_published_last(tmp_path):
     assert not (folder / "figures").exists()
 
 
+def test_a_listing_that_names_folders_removes_none(tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / LISTING).write_text(".\ntables\n")
+    publish(tmp_path, {"a.txt": b"1"})
+    assert (tmp_path / "tables").is_dir()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="nobody writes into /proc")
+def test_a_folder_that_cannot_be_is_refused_before_the_work():
+    with pytest.raises(CoarticError, match="cannot write /proc/x: "):
+        make_folder(Path("/proc/x"))
+
+
 def test_what_is_not_ours_is_in_the_way_before_anything_is_written(tmp_path):
     (tmp_path / "b.txt").write_text("mine")
-    for what in (publish, check_folder):
+    for what in (publish, make_folder):
         with pytest.raises(CoarticError, match=r"b.txt, which coartic did not write.*another"):
             what(tmp_path, {"a.txt": b"1", "b.txt": b"2"})
     assert content(tmp_path) == {"b.txt": b"mine"}
@@ -52,7 +67,7 @@ def test_nothing_is_written_or_removed_by_way_of_links(tmp_path, listed):
     (folder / "report.html").symlink_to(mine / "report.html")
     (folder / LISTING).write_text(f"{listed}\n../mine/thesis.tex\n{mine}/thesis.tex\n")
     before = content(mine)
-    for what in (publish, check_folder):
+    for what in (publish, make_folder):
         with pytest.raises(CoarticError, match=r"by a link|did not write there"):
             what(folder, {"tables/b.csv": b"1", "report.html": b"2"})
     assert content(mine) == before

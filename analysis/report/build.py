@@ -28,7 +28,7 @@ from coartic.analysis.section import Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.sentences import mostly_undecided, papers_claims
 from coartic.analysis.words import NONE, number
-from coartic.files import check_folder, check_inside, publish
+from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
@@ -81,7 +81,7 @@ def write_report(
         )
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
-    check_folder(folder, ["report.html"])
+    make_folder(folder, ["report.html"])
     files = report_files(study, for_paper=for_paper)
     publish(folder, files)
     return list(files)

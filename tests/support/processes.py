@@ -1,0 +1,32 @@
+"""Processes as Linux shows them; none elsewhere."""
+
+import contextlib
+import os
+import time
+from pathlib import Path
+
+
+def processes():
+    """Parent, session, working folder and command of each, by id; without those that have ended."""
+    found = {}
+    for place in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            state, parent, _, session = (place / "stat").read_text().rpartition(") ")[2].split()[:4]
+            if state != "Z":
+                folder, command = os.readlink(place / "cwd"), (place / "cmdline").read_text()
+                found[int(place.name)] = int(parent), int(session), folder, command
+    return found
+
+
+def folders_of_session(number):
+    """Where the processes of a session are."""
+    return [folder for _, session, folder, _ in processes().values() if session == number]
+
+
+def all_end(number):
+    """Whether all processes of a session end, within a minute."""
+    for _ in range(600):
+        if not folders_of_session(number):
+            return True
+        time.sleep(0.1)
+    return False
