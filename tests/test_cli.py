@@ -140,7 +140,7 @@ def test_reproduce(coartic, tmp_path):
 
 
 INTERRUPTED = """
-import os, sys, tempfile, threading, time
+import contextlib, os, sys, tempfile, threading, time
 import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -152,20 +152,16 @@ def interrupt():
         time.sleep(0.05)
 
 def clean():
-    with tempfile.TemporaryDirectory():
-        try:
-            interrupt()
-        finally:
-            threading.Thread(target=interrupt).start()
-            time.sleep(0.5)
+    with tempfile.TemporaryDirectory(), contextlib.ExitStack() as stack:
+        stack.callback(time.sleep, 0.5)
+        stack.callback(threading.Thread(target=interrupt).start)
+        interrupt()
 
 if moment == "cleaning":  # which takes longer than the signals
     import coartic.cli
     coartic.cli.main = clean
-else:  # milliseconds after it has begun to look for signals
-    begin = coartic.__main__.catch_signals
-    timer = threading.Timer(int(moment) / 1000, interrupt)
-    coartic.__main__.catch_signals = lambda: (begin(), timer.start())
+else:  # milliseconds after it has begun
+    threading.Timer(int(moment) / 1000, interrupt).start()
 coartic.__main__.main()
 """
 
@@ -174,7 +170,6 @@ coartic.__main__.main()
 @pytest.mark.parametrize(
     ("moment", "name", "times"),
     [
-        ("1", "SIGINT", 1),
         ("300", "SIGINT", 2),
         ("1500", "SIGINT", 3),
         ("2500", "SIGTERM", 2),
