@@ -96,17 +96,18 @@ class Local:
         by_method: dict[Any, list[Numbered]] = {}
         for number, job in enumerate(jobs):
             by_method.setdefault(job.method.key, []).append((number, job))
-        waiting, crew = deque(by_method.values()), list[Worker]()
+        shares = (
+            of_method[first :: self.workers]  # each has some of every cell
+            for of_method in by_method.values()
+            for first in range(min(self.workers, len(of_method)))
+        )
+        waiting, crew = deque(shares), list[Worker]()
         lost, repeated = 0, set[int]()
         with tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True) as folder:
             try:
                 while waiting or crew:
                     while waiting and len(crew) < self.workers:
-                        of_method = waiting.popleft()
-                        share = math.ceil(len(of_method) / self.workers)
-                        if of_method[share:]:
-                            waiting.appendleft(of_method[share:])
-                        crew.append(Worker(folder, of_method[:share], self.workers))
+                        crew.append(Worker(folder, waiting.popleft(), self.workers))
                         crew[-1].start()
                     connection.wait([s for worker in crew for s in worker.sentinels], _POLL_S)
                     for worker in tuple(crew):
