@@ -24,7 +24,6 @@ from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
 from coartic.motion.solution import Movement
-from coartic.motion.ticks import spell_out
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import PARTS, execute_all, movements_by_run
@@ -32,6 +31,7 @@ from coartic.runs.store import RUNS_FILE, explain_errors, open_store
 from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of
 from coartic.text import counted, unknown
+from coartic.trajectories import spell_out
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its name with its variant."""

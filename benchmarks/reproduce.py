@@ -14,10 +14,10 @@ from coartic.benchmarks.worker import Job
 from coartic.errors import CoarticError, SolutionError
 from coartic.inputs import brief_value
 from coartic.method import Meter
-from coartic.motion.ticks import Trajectory, trajectory
 from coartic.runs.run import PARTS, Run, execute_all
 from coartic.runs.store import RUNS_FILE, open_store
 from coartic.text import plain, unknown
+from coartic.trajectories import Trajectory, trajectory
 
 
 def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:

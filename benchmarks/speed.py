@@ -29,9 +29,10 @@ from coartic.gym import TaskVectorEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
+from coartic.model import PAPER
 from coartic.motion.lanes import LANES
-from coartic.motion.reach import batch_for, blank, reach_goals
-from coartic.motion.trials import Bench, hand_codes, movements_of
+from coartic.motion.reach import Requests, batch_for, bench_of, blank, reach_goals
+from coartic.motion.trials import hand_codes, movements_of
 from coartic.robot import Array
 
 
@@ -73,10 +74,12 @@ def trials_a_second() -> dict[str, float]:
     many = TaskVectorEnv(1000, task)
     actions = np.random.default_rng(0).uniform(-0.1, 0.1, (4, *many.action_space.shape))
     many.reset()
-    bench, codes = Bench(task), hand_codes(task, hands, 1000)
+    bench, codes = bench_of(task, PAPER), hand_codes(task, hands, 1000)
 
     def arguments(targets: Array) -> tuple[Any, ...]:
-        arms = bench.arms(codes[: len(targets)], targets.copy())
+        ends, asked = np.array([0, len(targets)]), targets[:, :, None].copy()
+        starts, stops = np.tile(bench.start, (len(targets), 1)), np.ones(asked.shape[:3], np.bool_)
+        arms = Requests(starts, codes[: len(targets)], asked, stops, ends, bench.goals)
         return arms, bench.setup, blank(arms), batch_for(task.robot)
 
     together, *alone = map(arguments, (targets, *targets[:100, None]))

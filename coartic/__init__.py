@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from coartic.motion.initial import corrective_trial, hand_sequences, initial_hands
     from coartic.motion.movement import MoveResult, move
     from coartic.motion.solution import Execution, Movement, execute
-    from coartic.motion.ticks import Trajectory, trajectory
     from coartic.motion.trials import movements_of
     from coartic.optimisers import Objective, Optimiser, objective, problems
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
+    from coartic.trajectories import Trajectory, trajectory
 
 __version__ = "1.1.0"
 
@@ -86,12 +86,12 @@ _HOMES = {
     "motion.initial": ("corrective_trial", "hand_sequences", "initial_hands"),
     "motion.movement": ("MoveResult", "move"),
     "motion.solution": ("Execution", "Movement", "execute"),
-    "motion.ticks": ("Trajectory", "trajectory"),
     "motion.trials": ("movements_of",),
     "optimisers": ("Objective", "Optimiser", "objective", "problems"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),
+    "trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
 """Where each name of the API is."""

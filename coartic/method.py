@@ -28,8 +28,9 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands, too_many_sequences
 from coartic.motion.outside import inside, note_trials
-from coartic.motion.solution import Execution, Movement, execute
-from coartic.motion.trials import Bench, HandSequences, Trials, check_targets, hand_codes
+from coartic.motion.reach import Bench, bench_of, reach_all
+from coartic.motion.solution import Execution, Movement, execute_many
+from coartic.motion.trials import HandSequences, Trials, check_targets, hand_codes, trials_on
 from coartic.robot import Array, Hand
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
@@ -369,12 +370,10 @@ class Session:
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
         self._affordable(1)
-        execution = self._bench.execute(solution)
-        if execution is not None:
-            note_trials(0 if self._of_run else 1)
-        else:
-            with inside(self._of_run):
-                execution = execute(self._task, solution, model=self.model)
+        with inside(self._of_run):
+            (execution,) = execute_many(self._bench, [solution])
+        if isinstance(execution, Exception):
+            raise execution
         spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
         self._count(pack_rewards([execution.reward]), *spent)
         if Information.CORRECTIVE_PROCESS in self._told:
@@ -430,7 +429,7 @@ class Session:
 
     @cached_property
     def _bench(self) -> Bench:
-        return Bench(self._task, self.model)
+        return bench_of(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> NDArray[np.int64]:
         """Hands of trials as indices into HANDS, shape ``(count, G)``; ValueError where they do
@@ -443,7 +442,7 @@ class Session:
         """:meth:`trials` with hands ``(N, G)`` as indices into HANDS and with ``targets`` that are
         its own: joints without one are filled in."""
         note_trials(0 if self._of_run else len(targets))
-        trials = self._bench.make(codes, targets)
+        trials = trials_on(self._bench, codes, targets)
         if until is not None:
             better = trials.rewards > np.asarray(until)[: len(targets)]
             if better.any():
@@ -456,7 +455,7 @@ class Session:
     def unchecked_trial(self, codes: NDArray[np.int64], targets: Array) -> int | None:
         """The reward of one trial, None where it fails; as :meth:`unchecked_trials` for N = 1."""
         note_trials(0 if self._of_run else 1)
-        reached = self._bench.reach(codes, targets)
+        reached = reach_all(self._bench, codes, targets[:, :, None])
         completed = bool(reached.hit[0, -1])
         ticks, corrections, iterations, evaluations = (
             sum(each[0].tolist())

@@ -22,6 +22,7 @@ from coartic import (
 from coartic.analysis import verify as checker
 from coartic.method import Meter, MethodError, Session
 from coartic.motion.lanes import LANES
+from coartic.motion.reach import bench_of
 from coartic.motion.solution import execute_many, other_arm_travel
 from coartic.motion.trials import make_trials
 from coartic.optimisers import FAILED, TOLD, explored_joints
@@ -94,7 +95,7 @@ def by_execute(task, model, cases):
 
 def by_execute_many(task, model, cases):
     solutions = [case.solution for case in cases]
-    return [facts(execution) for execution in execute_many(task, solutions, model=model)]
+    return [facts(execution) for execution in execute_many(bench_of(task, model), solutions)]
 
 
 def by_trial(task, model, cases):
@@ -326,7 +327,7 @@ def test_a_trial_does_not_notice_its_neighbours(name):
             np.testing.assert_array_equal(field[chosen], same)
     kinds = [case.solution for case in rich_cases("two-armed-1", 0)]
     broken = [kinds[0][:-1], [*kinds[0], "nonsense"], 5, kinds[0][::-1]]
-    many = execute_many(TASKS["two-armed-1"], [*broken, *kinds], model=OTHERS[0])
+    many = execute_many(bench_of(TASKS["two-armed-1"], OTHERS[0]), [*broken, *kinds])
     for solution, execution in zip([*broken, *kinds], many, strict=True):
         if isinstance(execution, Exception):  # one movement less may still be a solution
             with pytest.raises(type(execution), match=re.escape(str(execution))):

@@ -88,22 +88,23 @@ def animate(
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
-    from coartic.film import check_film, write_film
+    from coartic.film import Panel, check_film, write_film
 
     check_film(out, replace=replace)
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
-    panels = []
+    movements = []
     for name in (run,) if other is None else (run, other):
         run_id = name if task is None else median_run(folder, name, task)
         place, found = find_run(run_id, folder)
         movement, number = trajectory_of(place, found), found.key.number
         title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
-        panels.append((title, movement))
+        movements.append((title, movement))
     if initial:
-        on = panels[0][1].task
+        on = movements[0][1].task
         initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
-        panels.insert(0, (f"{on.label}: initial solution", initial_solution))
+        movements.insert(0, (f"{on.label}: initial solution", initial_solution))
+    panels = [Panel(title, m.task, m.hands, m.configurations, m.hits) for title, m in movements]
     frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 

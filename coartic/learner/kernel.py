@@ -32,10 +32,9 @@ from coartic.motion.compiled import (
     inner,
     record_type,
 )
-from coartic.motion.corrective import correct_lanes
-from coartic.motion.lanes import LANES, Lanes, board, depart, lanes_for, runs_for, width_of
-from coartic.motion.movement import move_lanes
-from coartic.motion.problem import arm_of, goal_of
+from coartic.motion.lanes import LANES, Lanes, lanes_for, runs_for, width_of
+from coartic.motion.movement import Goal
+from coartic.motion.reach import LOOK, MOVE, STAY, arm_of, attempt, correct_missed
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
@@ -101,11 +100,12 @@ TENTHS = 10
 
 
 class Work(NamedTuple):
-    """What the trials of the runs work on, each now at the same goal of the same trial."""
+    """What the trials of the runs work on, each now at the same goal of the same trial: a
+    :class:`coartic.motion.reach.Batch`, and what the learner needs besides."""
 
     runs: Any  # (N,) records: see runs_for
-    trials: Any  # (N,) records: see _TRIAL
     lanes: Lanes
+    trials: Any  # (N,) records: see _TRIAL
     xs: Any  # (n + 1,) for the longer arm: positions of its joints
     ys: Any
 
@@ -159,11 +159,7 @@ def empty_log(runs: int, task: Task) -> Log:
 
 _TRIAL = record_type(
     {
-        "hand": np.int64,  # chosen for this goal
         "previous": np.int64,  # hand of the goal before
-        "stored": np.bool_,  # whether the hand has a stored target
-        "aimed": np.bool_,  # whether it moves to a target of its own before A acts
-        "going": np.bool_,  # whether the trial has not failed
         "ticks": np.int64,
         "counts": (np.int64, len(COUNT)),  # of all trials of the run
     }
@@ -176,22 +172,22 @@ def work_for(runs: int, task: Task) -> Work:
         raise ValueError(f"{runs} runs at once; there are {LANES} lanes")
     return Work(
         runs=runs_for(runs, task.robot),
-        trials=np.zeros(runs, _TRIAL),
         lanes=lanes_for(task.robot),
+        trials=np.zeros(runs, _TRIAL),
         xs=np.empty(task.robot.most_links + 1),
         ys=np.empty(task.robot.most_links + 1),
     )
 
 
 @inlined
-def distance_to_goal(n: int, number: int, hand: int, problem: Any, work: Any) -> float:
+def distance_to_goal(n: int, goal: Any, hand: int, setup: Any, work: Any) -> float:
     """How far a hand of run ``n`` is from the centre of a goal, length unit."""
-    arm = arm_of(problem, hand)
+    arm = arm_of(setup, hand)
     joint_chain(work.runs[n].q, arm, work.xs, work.ys)
-    work.trials[n].counts[COUNT.evaluations] += 1
+    work.runs[n].evaluations += 1
     tip = len(arm.links)
-    dx = problem.goals[number, 0] - work.xs[tip]
-    dy = problem.goals[number, 1] - work.ys[tip]
+    dx = goal.x - work.xs[tip]
+    dy = goal.y - work.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
 
 
@@ -212,13 +208,13 @@ def random_hand(hands: Any, rng: Any) -> int:
 
 
 @inlined
-def closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: Any) -> int:
+def closest_hand(n: int, goal: Any, setup: Any, rules: Any, rng: Any, work: Any) -> int:
     """The hand closest to a goal, a random one of equally close ones."""
     nearest = rules.hands[0]
-    nearest_distance = distance_to_goal(n, number, nearest, problem, work)
+    nearest_distance = distance_to_goal(n, goal, nearest, setup, work)
     tie = False
     for hand in rules.hands[1:]:
-        distance = distance_to_goal(n, number, hand, problem, work)
+        distance = distance_to_goal(n, goal, hand, setup, work)
         tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
@@ -226,25 +222,17 @@ def closest_hand(n: int, number: int, problem: Any, rules: Any, rng: Any, work: 
 
 
 @inlined
-def choose_hands(
-    number: int, explore: bool, problem: Any, rules: Any, tables: Any, rngs: Any, work: Any
-) -> None:
-    """The hand of every run: greedy, or with probability ε an explored one."""
-    for n in range(len(work.trials)):
-        trial = work.trials[n]
-        if not trial.going:
-            continue
-        hand = -1
-        if explore and rules.exploration != 0:
-            rng = generator_at(rngs, n)
-            if rng.random() < rules.epsilon:
-                if rules.exploration == 1:
-                    hand = random_hand(rules.hands, rng)
-                else:
-                    hand = closest_hand(n, number, problem, rules, rng, work)
-        if hand < 0:
-            hand = greedy_hand(tables[n, number, trial.previous], rules.hands)
-        trial.hand = hand
+def choose_hand(
+    n: int, goal: Any, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
+) -> int:
+    """The hand of a run: greedy, or with probability ε an explored one."""
+    if explore and rules.exploration != 0:
+        rng = generator_at(rngs, n)
+        if rng.random() < rules.epsilon:
+            if rules.exploration == 1:
+                return random_hand(rules.hands, rng)
+            return closest_hand(n, goal, setup, rules, rng, work)
+    return greedy_hand(entries, rules.hands)
 
 
 @inlined
@@ -260,98 +248,66 @@ def set_target(
 
 @inlined
 def aim(
+    n: int,
     number: int,
-    first: bool,
+    goal: Any,
     explore: bool,
-    first_targets: Any,
-    problem: Any,
+    setup: Any,
     rules: Any,
     tables: Any,
     rngs: Any,
     work: Any,
 ) -> None:
-    """Where a target is planned or learned, set it; elsewhere see whether the goal is hit."""
-    for n in range(len(work.runs)):
-        run, trial = work.runs[n], work.trials[n]
-        run.acting = False
-        if not trial.going:
-            continue
-        hand = trial.hand
-        if first and not math.isnan(first_targets[number, 0]):
-            trial.stored, trial.aimed, run.acting = False, True, True
-            fill_row(run.target, first_targets[number])
-            continue
-        learned = tables[n, number, trial.previous, hand]
-        trial.stored = trial.aimed = learned.value > -math.inf
-        if not trial.stored:
-            run.hit = distance_to_goal(n, number, hand, problem, work) <= problem.radius
-            continue
-        set_target(run.target, run.q, learned.target, hand, explore, rules, generator_at(rngs, n))
-        run.acting = True
+    """Choose the hand of a run; where it has a stored target, set it."""
+    run = work.runs[n]
+    entries = tables[n, number, work.trials[n].previous]
+    run.hand = choose_hand(n, goal, entries, explore, setup, rules, rngs, work)
+    learned = entries[run.hand]
+    if learned.value > -math.inf:
+        rng = generator_at(rngs, n)
+        set_target(run.target, run.q, learned.target, run.hand, explore, rules, rng)
+        run.how = MOVE
 
 
 @inlined
-def record_movement(
-    log: Any, n: int, number: int, hand: int, kind: int, ticks: int, q: Any
-) -> None:
+def aim_first(n: int, number: int, first_hands: Any, first_targets: Any, work: Any) -> None:
+    """Set hand and target of a run in trial 0."""
+    run = work.runs[n]
+    run.hand = first_hands[number]
+    if not math.isnan(first_targets[number, 0]):
+        fill_row(run.target, first_targets[number])
+        run.how = MOVE
+
+
+@inlined
+def record_movement(log: Any, n: int, number: int, kind: int, run: Any, trial: Any) -> None:
     """Log a movement of run ``n``."""
     movement = log.movements[n, log.count[n]]
     movement.goal = number
-    movement.hand = hand
+    movement.hand = run.hand
     movement.kind = kind
-    movement.ticks = ticks
-    fill_row(movement.target, q)
+    movement.ticks = run.ticks
+    fill_row(movement.target, run.target)
     log.count[n] += 1
+    trial.ticks += run.ticks
+    trial.counts[COUNT.ticks] += run.ticks
 
 
 @inlined
-def move_runs(number: int, kind: int, problem: Any, log: Any, work: Any) -> None:
-    """Move the acting runs to their targets and log it."""
-    count = 0
-    for n in range(len(work.runs)):
-        run = work.runs[n]
-        if run.acting:
-            arm = arm_of(problem, work.trials[n].hand)
-            depart(work.lanes.at, count, n, run.q, run.target, arm)
-            count += 1
-    goal = goal_of(problem, number)
-    move_lanes(work.lanes, count, goal, kind == LEARNED, problem.model, work.runs)
-    for n in range(len(work.runs)):
-        run, trial = work.runs[n], work.trials[n]
-        if run.acting:
-            trial.ticks += run.ticks
-            trial.counts[COUNT.ticks] += run.ticks
-            record_movement(log, n, number, trial.hand, kind, run.ticks, run.target)
-
-
-@inlined
-def correct_runs(number: int, problem: Any, rules: Any, log: Any, work: Any) -> None:
-    """Set the targets of runs that missed to what **A** finds; trials fail where it does not."""
-    count = 0
-    for n in range(len(work.runs)):
-        run, trial = work.runs[n], work.trials[n]
-        run.acting = False
-        if not trial.going:
-            continue
-        if run.hit:
-            if not trial.aimed:
-                record_movement(log, n, number, trial.hand, CORRECTIVE, 0, run.q)
-        elif trial.stored and not rules.corrects:
-            trial.counts[COUNT.failed] += 1
-            trial.going = False
-        else:
-            fill_row(run.target, run.q)
-            board(work.lanes.at, count, n, run.q, arm_of(problem, trial.hand))
-            count += 1
-            run.acting = True
-    goal = goal_of(problem, number)
-    correct_lanes(work.lanes, count, goal, problem.corrector, problem.model, work.runs)
-    for n in range(len(work.runs)):
-        run, trial = work.runs[n], work.trials[n]
-        if run.acting:
-            trial.counts[COUNT.iterations] += run.iterations
-            trial.counts[COUNT.corrections if run.converged else COUNT.failed] += 1
-            run.acting = trial.going = run.converged
+def note_goal(n: int, number: int, log: Any, work: Any) -> None:
+    """Log and count what **A** has done for a goal; a trial fails where it was missed."""
+    run, trial = work.runs[n], work.trials[n]
+    trial.counts[COUNT.iterations] += run.iterations
+    trial.counts[COUNT.corrections] += run.converged
+    if run.converged or (run.hit and run.how == LOOK):
+        record_movement(log, n, number, CORRECTIVE, run, trial)
+    run.going = run.hit
+    if run.going:
+        hit = log.hits[n, number]
+        hit.hand = trial.previous = run.hand
+        fill_row(hit.q, run.q)
+    else:
+        trial.counts[COUNT.failed] += 1
 
 
 @inner
@@ -360,7 +316,9 @@ def make_trial(
     explore: bool,
     first_hands: Any,
     first_targets: Any,
-    problem: Any,
+    start: Any,
+    goals: Any,
+    setup: Any,
     rules: Any,
     tables: Any,
     log: Any,
@@ -368,32 +326,36 @@ def make_trial(
     work: Any,
 ) -> None:
     """One trial of every run into ``log``; the ``first`` one with ``first_hands`` and targets."""
-    for n in range(len(work.runs)):
+    runs = len(work.runs)
+    for n in range(runs):
         run, trial = work.runs[n], work.trials[n]
-        fill_row(run.q, problem.start)
+        fill_row(run.q, start)
         run.evaluations = 0
+        run.going = True
         trial.previous = NO_HAND
-        trial.going = True
         trial.ticks = 0
         log.count[n] = 0
-    for number in range(len(problem.goals)):
-        if first:
-            for n in range(len(work.trials)):
-                work.trials[n].hand = first_hands[number]
-        else:
-            choose_hands(number, explore, problem, rules, tables, rngs, work)
-        aim(number, first, explore, first_targets, problem, rules, tables, rngs, work)
-        for kind in range(2):
-            if kind == CORRECTIVE:
-                correct_runs(number, problem, rules, log, work)
-            move_runs(number, kind, problem, log, work)
-        for n in range(len(work.runs)):
-            trial = work.trials[n]
-            if trial.going:
-                hit = log.hits[n, number]
-                hit.hand = trial.previous = trial.hand
-                fill_row(hit.q, work.runs[n].q)
-    for n in range(len(work.runs)):
+    for number in range(len(goals)):
+        goal = Goal(goals[number, 0], goals[number, 1], setup.radius)
+        for n in range(runs):
+            run = work.runs[n]
+            fill_row(run.target, run.q)
+            run.how, run.hit = LOOK if run.going else STAY, False
+            if run.going and first:
+                aim_first(n, number, first_hands, first_targets, work)
+            elif run.going:
+                aim(n, number, goal, explore, setup, rules, tables, rngs, work)
+        attempt(runs, goal, setup, work)
+        for n in range(runs):
+            run = work.runs[n]
+            run.corrects = rules.corrects or first or run.how != MOVE
+            if run.how == MOVE:
+                record_movement(log, n, number, LEARNED, run, work.trials[n])
+        correct_missed(runs, goal, setup, work)
+        for n in range(runs):
+            if work.runs[n].going:
+                note_goal(n, number, log, work)
+    for n in range(runs):
         work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
 
 
@@ -450,8 +412,8 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
         kept.corrections[n, part] = trial.counts[COUNT.corrections]
         reward = -trial.ticks
         kept.rewards[n, earlier] = reward
-        kept.completed[n, earlier] = trial.going
-        if not trial.going:
+        kept.completed[n, earlier] = work.runs[n].going
+        if not work.runs[n].going:
             continue
         if earlier == 0:
             copy_movements(n, log, kept.first)
@@ -466,7 +428,9 @@ def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work:
 def learn_kernel(
     first_hands: Any,
     first_targets: Any,
-    problem: Any,
+    start: Any,
+    goals: Any,
+    setup: Any,
     rules: Any,
     tables: Any,
     kept: Any,
@@ -487,11 +451,12 @@ def learn_kernel(
             fill_row(kept.counts[n], work.trials[n].counts)
         first = trial == 0
         make_trial(
-            first, not replay, first_hands, first_targets, problem, rules, tables, log, rngs, work
-        )
+            first, not replay, first_hands, first_targets, start, goals, setup, rules, tables, log,
+            rngs, work,
+        )  # fmt: skip
         if not replay:
             learn_from(trial, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
-        kept.replayed[n] = work.trials[n].going
+        kept.replayed[n] = work.runs[n].going
         kept.replay_rewards[n] = -work.trials[n].ticks
         copy_movements(n, log, kept.replay)

@@ -34,7 +34,7 @@ from coartic.motion.initial import initial_hands
 from coartic.motion.lanes import LANES, links_for, width_of
 from coartic.motion.movement import move
 from coartic.motion.outside import note_trials
-from coartic.motion.problem import problem_of
+from coartic.motion.reach import bench_of
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS
@@ -227,13 +227,13 @@ def learn_together(
     """
     runs, dof = len(seeds), task.robot.dof
     first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
-    for number, movements in movements_by_goal(task, start) if start else ():
-        first_targets[number - 1] = 0.0  # beyond the joints of a smaller robot
-        first_targets[number - 1, :dof] = movements[0].target
+    for g, movements in enumerate(movements_by_goal(task, start) if start else ()):
+        first_targets[g] = 0.0  # beyond the joints of a smaller robot
+        first_targets[g, :dof] = movements[0].target
     codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
     if len(codes) != len(task.goals):
         raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
-    tables = empty_tables(runs, task)
+    bench, tables = bench_of(task, model), empty_tables(runs, task)
     kept = Kept(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
@@ -250,7 +250,9 @@ def learn_together(
     arguments = (
         np.array(codes, dtype=np.int64),
         first_targets,
-        problem_of(task, model),
+        bench.start,
+        bench.goals[0],
+        bench.setup,
         rules_of(task, condition),
         tables,
         kept,

@@ -63,6 +63,10 @@ def run_type(width: int) -> np.dtype[np.void]:
     fields = {
         "q": (np.float64, width),  # where the robot is
         "target": (np.float64, width),  # where it is to go, or what a correction has found
+        "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
+        "how": np.int64,  # it acts next: see coartic.motion.reach
+        "corrects": np.bool_,  # whether the corrective process finishes what it misses
+        "going": np.bool_,  # whether it has missed no goal so far
         "acting": np.bool_,  # whether the run is among those that are moved or corrected next
         "hit": np.bool_,  # whether the hand is within the goal's radius
         "converged": np.bool_,  # whether the corrective process did

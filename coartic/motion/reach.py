@@ -1,9 +1,10 @@
-"""Reaching for a goal: the one thing that trials and executions are reached of.
+"""Reaching for a goal: the rule that every trial, execution and learner follows.
 
-An arm first moves towards its target, if it has one. Where that misses the goal, the corrective
-process **A** looks for a configuration that hits it, and the arm moves there (paper, sections
-*Generating Movement for Each Goal* and *The Corrective Process*). Many arms do so side by side;
-what one gives depends neither on the others nor on their number.
+The first movement for a goal is made. Where there is none, the hand may be in the goal already.
+Further movements are made while the goal is missed, and in the end the corrective process **A**
+looks for a configuration that hits it, and the arm moves there (paper, sections *Generating
+Movement for Each Goal* and *The Corrective Process*). Many arms reach side by side; what one gives
+depends neither on the others nor on their number.
 """
 
 from __future__ import annotations
@@ -15,14 +16,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, fill_row, inlined, inner
 from coartic.motion.corrective import Corrector, correct_lanes
 from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
-from coartic.motion.movement import Goal, move_lanes
-from coartic.motion.problem import arm_of
+from coartic.motion.movement import Goal, check_goal, configuration, move_lanes
 from coartic.robot import Array, Robot
+from coartic.tasks.task import Task
 from coartic.threads import in_parts
+
+STAY, LOOK, MOVE, REPEAT = range(4)
+"""How a run acts next: not at all; it looks whether its hand is in the goal; it moves to its target
+and ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the target."""
 
 
 class Reached(NamedTuple):
@@ -34,8 +39,9 @@ class Reached(NamedTuple):
     """Whether its hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
     """Control ticks of its movements, shape ``(N,)``."""
-    correcting: NDArray[np.int64]
-    """Control ticks of the corrective movement among them."""
+    moved: NDArray[np.int64]
+    """Control ticks of each movement to a given target among them, shape ``(N, M)``; 0 where it
+    was not made."""
     corrected: Array
     """Target of its corrective movement, shape ``(N, dof)``; NaN where none was reached."""
     corrections: NDArray[np.int64]
@@ -47,12 +53,12 @@ class Reached(NamedTuple):
 
 
 class Requests(NamedTuple):
-    """What the kernel reads: N arms in K groups, each to G goals in turn."""
+    """What the kernel reads: N arms in K groups, each to G goals in turn by M movements each."""
 
     starts: Any  # (N, dof)
     hands: Any  # (N, G)
-    targets: Any  # (N, G, dof), in which the kernel fills in joints without a target
-    stops: Any  # (N, G) whether the movement to the target ends on arrival
+    targets: Any  # (N, G, M, dof), in which the kernel fills in joints without a target
+    stops: Any  # (N, G, M) whether the movement to the target ends on arrival
     bounds: Any  # (K + 1,) first arm of each group, and the one after the last
     goals: Any  # (K, G, 2)
 
@@ -73,9 +79,58 @@ class Batch(NamedTuple):
     """What a lot of arms works on, each now at the same goal."""
 
     runs: Any  # records: see runs_for
-    going: Any  # whether no goal was missed so far
-    aims: Any  # whether the arm has a target
     lanes: Any
+
+
+@inlined
+def arm_of(setup: Any, hand: int) -> Any:
+    """The arm of a hand: 0 left, 1 right."""
+    return setup.left if hand == 0 else setup.right
+
+
+@inner
+def move_acting(count: int, goal: Any, stops: bool, setup: Any, batch: Any) -> None:
+    """Move the acting arms to their targets."""
+    lane = 0
+    for i in range(count):
+        run = batch.runs[i]
+        if run.acting:
+            depart(batch.lanes.at, lane, i, run.q, run.target, arm_of(setup, run.hand))
+            lane += 1
+    if lane > 0:
+        move_lanes(batch.lanes, lane, goal, stops, setup.model, batch.runs)
+
+
+@inlined
+def attempt(count: int, goal: Any, setup: Any, batch: Any) -> None:
+    """Let each run act as it is to; one that does not move takes no ticks."""
+    for stops in (True, False):
+        for i in range(count):
+            run = batch.runs[i]
+            # A movement to where an arm is tells whether it hits; it needs no other end.
+            run.acting = run.how == MOVE if stops else run.how == LOOK or run.how == REPEAT
+        move_acting(count, goal, stops, setup, batch)
+    for i in range(count):
+        if batch.runs[i].how < MOVE:
+            batch.runs[i].ticks = 0
+
+
+@inlined
+def correct_missed(count: int, goal: Any, setup: Any, batch: Any) -> None:
+    """Have **A** finish what was missed; then ``target`` and ``ticks`` are those of that."""
+    lane = 0
+    for i in range(count):
+        run = batch.runs[i]
+        run.acting, run.converged = run.corrects and run.going and not run.hit, False
+        run.ticks, run.iterations = 0, 0
+        if run.acting:
+            fill_row(run.target, run.q)
+            board(batch.lanes.at, lane, i, run.q, arm_of(setup, run.hand))
+            lane += 1
+    correct_lanes(batch.lanes, lane, goal, setup.corrector, setup.model, batch.runs)
+    for i in range(count):
+        batch.runs[i].acting = batch.runs[i].converged
+    move_acting(count, goal, False, setup, batch)
 
 
 @inner
@@ -88,82 +143,16 @@ def is_empty(target: Any) -> bool:
 
 
 @inlined
-def set_targets(first: int, count: int, g: int, arms: Any, batch: Any) -> None:
-    """Set the targets; an arm without one stays where it is."""
-    for i in range(count):
-        run, target = batch.runs[i], arms.targets[first + i, g]
-        run.hit = False
-        run.evaluations = 0
-        fill_row(run.target, run.q)
-        batch.aims[i] = batch.going[i] and not is_empty(target)
-        if batch.aims[i]:
-            for j in range(len(target)):
-                if not math.isnan(target[j]):
-                    run.target[j] = target[j]
-            fill_row(target, run.target)
-
-
-@inner
-def move_acting(
-    first: int, count: int, g: int, goal: Any, stops: bool, arms: Any, setup: Any, batch: Any
-) -> None:
-    """Move the acting arms to their targets."""
-    lane = 0
-    for i in range(count):
-        run = batch.runs[i]
-        if run.acting:
-            depart(
-                batch.lanes.at, lane, i, run.q, run.target, arm_of(setup, arms.hands[first + i, g])
-            )
-            lane += 1
-    if lane > 0:
-        move_lanes(batch.lanes, lane, goal, stops, setup.model, batch.runs)
-
-
-@inlined
-def attempt(
-    first: int, count: int, g: int, goal: Any, arms: Any, setup: Any, reached: Any, batch: Any
-) -> None:
-    """Move to the targets; see whether arms without one are in the goal already."""
-    for stops in (True, False):
-        for i in range(count):
-            aims = batch.aims[i]
-            # A movement to where an arm is tells whether it hits; it needs no other end.
-            needed = batch.going[i] and (aims or setup.looks)
-            batch.runs[i].acting = needed and (aims and arms.stops[first + i, g]) == stops
-        move_acting(first, count, g, goal, stops, arms, setup, batch)
-        for i in range(count):
-            if batch.runs[i].acting and batch.aims[i]:
-                reached.ticks[first + i, g] = batch.runs[i].ticks
-
-
-@inlined
-def correct_missed(
-    first: int, count: int, g: int, goal: Any, arms: Any, setup: Any, reached: Any, batch: Any
-) -> None:
-    """Have **A** finish what was missed."""
-    lane = 0
-    for i in range(count):
-        run = batch.runs[i]
-        run.acting = batch.going[i] and not run.hit
-        if run.acting:
-            fill_row(run.target, run.q)
-            board(batch.lanes.at, lane, i, run.q, arm_of(setup, arms.hands[first + i, g]))
-            lane += 1
-    correct_lanes(batch.lanes, lane, goal, setup.corrector, setup.model, batch.runs)
-    for i in range(count):
-        run = batch.runs[i]
-        if run.acting:
-            reached.iterations[first + i, g] = run.iterations
-            run.acting = run.converged
-            if run.converged:
-                reached.corrections[first + i, g] = 1
-                fill_row(reached.corrected[first + i, g], run.target)
-    move_acting(first, count, g, goal, False, arms, setup, batch)
-    for i in range(count):
-        if batch.runs[i].acting:
-            reached.correcting[first + i, g] = batch.runs[i].ticks
-            reached.ticks[first + i, g] += batch.runs[i].ticks
+def set_target(run: Any, target: Any, stops: bool, is_first: bool, looks: bool) -> None:
+    """Set how a run acts, and where it moves to; a joint without a target stays where it is."""
+    fill_row(run.target, run.q)
+    run.how = LOOK if is_first and looks and run.going else STAY
+    if run.going and (is_first or not run.hit) and not is_empty(target):
+        run.how = MOVE if stops else REPEAT
+        for j in range(len(target)):
+            if not math.isnan(target[j]):
+                run.target[j] = target[j]
+        fill_row(target, run.target)
 
 
 @inlined
@@ -171,10 +160,25 @@ def clear(n: int, reached: Any) -> None:
     """Note that an arm has not done anything yet."""
     for g in range(reached.hit.shape[1]):
         reached.hit[n, g] = False
-        reached.ticks[n, g] = reached.correcting[n, g] = reached.corrections[n, g] = 0
+        reached.ticks[n, g] = reached.corrections[n, g] = 0
         reached.iterations[n, g] = reached.evaluations[n, g] = 0
+        for m in range(reached.moved.shape[2]):
+            reached.moved[n, g, m] = 0
         for j in range(reached.q.shape[2]):
             reached.q[n, g, j] = reached.corrected[n, g, j] = math.nan
+
+
+@inlined
+def note(n: int, g: int, run: Any, reached: Any) -> None:
+    """Note what came of the goal of an arm, which goes on where it was hit."""
+    fill_row(reached.q[n, g], run.q)
+    reached.hit[n, g] = run.going = run.hit
+    reached.iterations[n, g] = run.iterations
+    reached.evaluations[n, g] = run.evaluations
+    if run.converged:
+        reached.ticks[n, g] += run.ticks
+        reached.corrections[n, g] = 1
+        fill_row(reached.corrected[n, g], run.target)
 
 
 @inlined
@@ -185,18 +189,27 @@ def reach_lot(
     for i in range(count):
         clear(first + i, reached)
         fill_row(batch.runs[i].q, arms.starts[first + i])
-        batch.going[i] = True
+        batch.runs[i].going = True
     for g in range(arms.goals.shape[1]):
         goal = Goal(arms.goals[group, g, 0], arms.goals[group, g, 1], setup.radius)
-        set_targets(first, count, g, arms, batch)
-        attempt(first, count, g, goal, arms, setup, reached, batch)
-        if setup.corrects:
-            correct_missed(first, count, g, goal, arms, setup, reached, batch)
         for i in range(count):
-            if batch.going[i]:
-                fill_row(reached.q[first + i, g], batch.runs[i].q)
-                reached.hit[first + i, g] = batch.going[i] = batch.runs[i].hit
-                reached.evaluations[first + i, g] = batch.runs[i].evaluations
+            run = batch.runs[i]
+            run.hand, run.corrects = arms.hands[first + i, g], setup.corrects
+            run.hit, run.evaluations = False, 0
+        for m in range(arms.targets.shape[2]):
+            for i in range(count):
+                n = first + i
+                target, stops = arms.targets[n, g, m], arms.stops[n, g, m]
+                set_target(batch.runs[i], target, stops, m == 0, setup.looks)
+            attempt(count, goal, setup, batch)
+            for i in range(count):
+                if batch.runs[i].going:
+                    reached.moved[first + i, g, m] = batch.runs[i].ticks
+                    reached.ticks[first + i, g] += batch.runs[i].ticks
+        correct_missed(count, goal, setup, batch)
+        for i in range(count):
+            if batch.runs[i].going:
+                note(first + i, g, batch.runs[i], reached)
 
 
 @entry
@@ -217,11 +230,10 @@ _ONLY = np.zeros(1, dtype=np.int64)
 
 def blank(arms: Requests) -> Reached:
     """Arrays for what comes of arms, to be filled."""
-    count, goals, dof = arms.targets.shape
-    places, counts = np.empty((2, count, goals, dof)), np.empty((5, count, goals), dtype=np.int64)
-    hit = np.empty((count, goals), dtype=np.bool_)
-    ticks, correcting, *others = counts
-    return Reached(places[0], hit, ticks, correcting, places[1], *others)
+    *shape, moves, dof = arms.targets.shape
+    places, counts = np.empty((2, *shape, dof)), np.empty((4, *shape), dtype=np.int64)
+    hit, moved = np.empty(shape, dtype=np.bool_), np.empty((*shape, moves), dtype=np.int64)
+    return Reached(places[0], hit, counts[0], moved, places[1], *counts[1:])
 
 
 def batch_for(robot: Robot) -> Batch:
@@ -229,8 +241,7 @@ def batch_for(robot: Robot) -> Batch:
     try:
         return _IDLE.setdefault(robot.most_links, []).pop()  # no other thread gets it
     except IndexError:
-        flags = np.zeros((2, LANES), dtype=np.bool_)
-        return Batch(runs_for(LANES, robot), flags[0], flags[1], lanes_for(robot))
+        return Batch(runs_for(LANES, robot), lanes_for(robot))
 
 
 def reach_with(robot: Robot, arms: Requests, setup: Setup) -> Reached:
@@ -312,8 +323,8 @@ def reach_unchecked(
     requests = Requests(
         starts=q[order],
         hands=hands[order, None],
-        targets=given[order, None],
-        stops=np.broadcast_to(stops, count)[order, None],
+        targets=given[order, None, None],
+        stops=np.broadcast_to(stops, count)[order, None, None],
         bounds=np.append(bounds, count),
         goals=goals[order[bounds], None],
     )
@@ -322,3 +333,46 @@ def reach_unchecked(
     )
     reached = reach_with(robot, requests, setup)
     return Reached._make(field[back, 0] for field in reached)
+
+
+class Bench(NamedTuple):
+    """A task as the kernel reads it (:func:`bench_of`)."""
+
+    task: Task
+    start: Array  # (dof,)
+    goals: Array  # (1, G, 2)
+    setup: Setup
+
+    def __reduce__(self) -> tuple[Any, tuple[Task, MotionModel]]:
+        """For copies and other processes, which make theirs anew: arrays of a copy can be written
+        to, and for those the kernel would be compiled again."""
+        return bench_of, (self.task, self.setup.model)
+
+
+def bench_of(task: Task, model: MotionModel) -> Bench:
+    """A task for the kernel. Raises ValueError for a task or a model that no trial can be made
+    with: a copy of a task with changed fields is unchecked."""
+    check_model(model, radius=task.radius)
+    goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
+    setup = setup_for(task.robot, float(task.radius), locked_base=task.locked_base, model=model)
+    return Bench(
+        task, configuration(task.robot, task.q0), np.array([goals], dtype=np.float64), setup
+    )
+
+
+def reach_all(
+    bench: Bench, hands: NDArray[np.int64], targets: Array, stops: NDArray[np.bool_] | None = None
+) -> Reached:
+    """What comes of the goals of N trials from the start, of shape ``(N, G, ...)``.
+
+    Nothing is checked. ``hands`` has shape ``(N, G)``, indices into HANDS. ``targets`` has shape
+    ``(N, G, M, dof)``, in which joints without one are filled in; the first movement for a goal is
+    made, further ones where it is still missed. ``stops``, of the shape of ``targets`` without the
+    last axis: whether a movement ends on arrival, too; each does by default.
+    """
+    starts = np.empty((len(hands), len(bench.start)))
+    starts[:] = bench.start
+    if stops is None:
+        stops = np.ones(targets.shape[:3], dtype=np.bool_)
+    arms = Requests(starts, hands, targets, stops, np.array([0, len(hands)]), bench.goals)
+    return reach_with(bench.task.robot, arms, bench.setup)

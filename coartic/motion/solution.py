@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import takewhile
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from coartic.errors import SolutionError
 from coartic.inputs import brief_value
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.movement import check_goal, configuration, follow
+from coartic.model import PAPER, MotionModel
+from coartic.motion.movement import LARGEST_ENTRY, configuration, follow
 from coartic.motion.outside import note_trials
-from coartic.motion.reach import Reached, Requests, reach_with, setup_for
+from coartic.motion.reach import Bench, Reached, bench_of, reach_all
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
 from coartic.text import short_repr
@@ -161,35 +163,36 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    (execution,) = execute_many(as_task(task), [solution], model=model)
+    (execution,) = execute_many(bench_of(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
     return execution
 
 
 def execute_many(
-    task: Task, solutions: Iterable[Iterable[Movement]], *, model: MotionModel = PAPER
+    bench: Bench, solutions: Iterable[Iterable[Movement]]
 ) -> list[Execution | Refused]:
     """:func:`execute` solutions of one task side by side, which takes a fraction of the time.
 
     In their order, each as if it were alone; in place of an execution, the error that
-    :func:`execute` raises for such a solution. Raises ValueError for a model that no movement
-    can be made with.
+    :func:`execute` raises for such a solution.
     """
-    check_model(model, radius=task.radius)
-    runs: list[SolutionRun | Refused] = []
+    plans: list[Plan | Refused] = []
     for solution in solutions:
         try:
-            runs.append(SolutionRun(task, solution))
+            plans.append(movements_by_goal(bench.task, solution))
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
-            runs.append(error)
-    note_trials(len(runs))
-    going = [run for run in runs if isinstance(run, SolutionRun)]
-    for number in range(1, len(task.goals) + 1):
-        going = [run for run in going if not run.reason]
-        if going:
-            try_goal(task, number, going, model)
-    return [run.outcome() if isinstance(run, SolutionRun) else run for run in runs]
+            plans.append(error)
+    note_trials(len(plans))
+    straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
+    executions = iter(execute_straight(bench, straight))
+    found: list[Execution | Refused] = []
+    for plan in plans:
+        if not isinstance(plan, list):
+            found.append(plan)
+        else:
+            found.append(execute_paths(bench, plan) if has_path(plan) else next(executions))
+    return found
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
@@ -211,161 +214,166 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     return travel
 
 
-class SolutionRun:
-    """An execution while it goes on."""
+Plan = list[list[Movement]]
+"""The movements of a solution, goal by goal."""
+Slots = list[Movement | None]
+"""Movements to targets for a goal as the kernel takes them: None first where none is made at once,
+but the hand may be in the goal already."""
 
-    def __init__(self, task: Task, solution: Iterable[Movement]) -> None:
-        self.task = task
-        # The corrective process has the last word.
-        self.due = [
-            [*movements, Movement(number, movements[0].hand, "corrective")]
-            for number, movements in movements_by_goal(task, solution)
+
+class Subtask(NamedTuple):
+    """What came of a goal."""
+
+    made: list[Movement]
+    q: Array
+    hit: bool
+    iterations: int
+    evaluations: int
+    """Without a look before the first movement, which :func:`execution_of` counts."""
+
+
+def has_path(plan: Plan) -> bool:
+    """Whether a movement follows a path."""
+    return any(movement.kind == "path" for movements in plan for movement in movements)
+
+
+def before_correction(movements: list[Movement]) -> list[Movement]:
+    """The movements of a goal up to the first that **A** finds, which is the last to be made."""
+    return list(takewhile(lambda movement: movement.target is not None, movements))
+
+
+def slots_for(movements: list[Movement]) -> Slots:
+    """Straight movements of a goal as the kernel takes them."""
+    made_at_once = bool(movements) and movements[0].kind != "corrective"
+    return [*movements] if made_at_once else [None, *movements]
+
+
+def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> list[list[Subtask]]:
+    """Make the straight movements of solutions side by side: what came of each goal attempted."""
+    if not plans:
+        return []
+    hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
+    most = max(len(slots) for of_plan in asked for slots in of_plan)
+    targets = np.full((*hands.shape, most, len(bench.start)), np.nan)
+    stops = np.ones(targets.shape[:3], dtype=np.bool_)
+    for n, of_plan in enumerate(asked):
+        for g, slots in enumerate(of_plan):
+            for m, movement in enumerate(slots):
+                if movement is not None:
+                    targets[n, g, m] = movement.target
+                    stops[n, g, m] = movement.kind != "corrective"
+    reached, looks = reach_all(bench, hands, targets, stops), bench.setup.looks
+    return [
+        subtasks_of(plan, asked[n], targets[n], Reached._make(f[n] for f in reached), looks)
+        for n, plan in enumerate(plans)
+    ]
+
+
+def execute_straight(bench: Bench, plans: list[Plan]) -> list[Execution]:
+    """Execute solutions without paths side by side."""
+    asked = [[slots_for(before_correction(movements)) for movements in plan] for plan in plans]
+    made = make_straight(bench, plans, asked)
+    return [execution_of(*each) for each in zip(plans, made, strict=True)]
+
+
+def execute_paths(bench: Bench, plan: Plan) -> Execution:
+    """Execute a solution in which movements follow paths: one movement after the other."""
+    task, model, subtasks, q = bench.task, bench.setup.model, list[Subtask](), bench.start
+    for g, movements in enumerate(plan):
+        done = Subtask([], q, False, 0, 0)
+        for m, movement in enumerate([*before_correction(movements), None]):  # None: A
+            if done.hit:
+                break
+            if movement is not None and movement.waypoints is not None:
+                where = movement.waypoints, movement.hand, task.goals[g], task.radius
+                moved = follow(task.robot, done.q, *where, model=model)
+                made = [replace(movement, ticks=moved.ticks)]
+                part = Subtask(made, moved.q, moved.hit, 0, moved.evaluations)
+            else:
+                setup = bench.setup._replace(looks=m == 0, corrects=movement is None)
+                goal = bench.goals[:, g : g + 1]
+                here = bench._replace(start=done.q, goals=goal, setup=setup)
+                slots = slots_for([] if movement is None else [movement])
+                ((part,),) = make_straight(here, [[movements]], [[slots]])
+            iterations = done.iterations + part.iterations
+            evaluations = done.evaluations + part.evaluations
+            done = Subtask(done.made + part.made, part.q, part.hit, iterations, evaluations)
+        subtasks.append(done)
+        q = done.q
+        if not done.hit:
+            break
+    return execution_of(plan, subtasks)
+
+
+def subtasks_of(
+    plan: Plan, asked: list[Slots], targets: Array, reached: Reached, looks: bool
+) -> list[Subtask]:
+    """What came of the goals of one trial that were attempted, by straight movements alone."""
+    hit, ticks, corrections, iterations, evaluations, moved = (
+        each.tolist()
+        for each in (
+            reached.hit, reached.ticks, reached.corrections, reached.iterations,
+            reached.evaluations, reached.moved,
+        )
+    )  # fmt: skip
+    subtasks = []
+    for g, (movements, slots) in enumerate(zip(plan, asked, strict=True)):
+        made = [
+            Movement(movement.goal, movement.hand, movement.kind, target, spent)
+            for movement, target, spent in zip(slots, targets[g], moved[g], strict=False)
+            if movement is not None and spent
         ]
-        self.q = configuration(task.robot, task.q0)
-        self.hit = False
-        self.movements: list[Movement] = []
-        self.configurations: list[Array] = []
-        self.corrections = self.iterations = self.evaluations = 0
-        self.reason = ""
+        if corrections[g]:
+            first, target, spent = movements[0], reached.corrected[g], ticks[g] - sum(moved[g])
+            made.append(Movement(first.goal, first.hand, "corrective", target, spent))
+        evaluated = evaluations[g] - (looks and slots[0] is None)
+        subtasks.append(Subtask(made, reached.q[g], hit[g], iterations[g], evaluated))
+        if not hit[g]:
+            break
+    return subtasks
 
-    def next(self, number: int, place: int) -> Movement | None:
-        """The movement at a place among those for a goal, if it is to be made."""
-        due = self.due[number - 1]
-        if place >= len(due) or self.reason:
-            return None
-        needed = not self.hit or (place == 0 and due[0].kind != "corrective")
-        return due[place] if needed else None
 
-    def take(self, movement: Movement, q: Array, ticks: int, hit: bool) -> None:
-        """Note a movement that was made, and where it ended."""
-        self.q, self.hit = q, hit
-        self.corrections += movement.kind == "corrective"
-        target = np.array(movement.target, dtype=np.float64)
-        self.movements.append(replace(movement, target=target, ticks=ticks))
-
-    def end_goal(self, number: int) -> None:
-        """Note what came of the goal."""
-        if self.reason:
-            return
-        if not self.hit:
-            self.reason = f"goal {number}: the corrective movement ended outside the goal"
-            return
-        if not self.movements or self.movements[-1].goal != number:  # hit on the way: show the hand
-            hand = self.due[number - 1][0].hand
-            self.movements.append(Movement(number, hand, "corrective", np.array(self.q), 0))
-        self.configurations.append(np.array(self.q))
-
-    def outcome(self) -> Execution:
-        """What has happened so far."""
-        return Execution(
-            movements=tuple(self.movements),
-            configurations=np.array(self.configurations).reshape(-1, len(self.q)),
-            ticks=sum(movement.ticks or 0 for movement in self.movements),
-            corrections=self.corrections,
-            iterations=self.iterations,
-            evaluations=self.evaluations,
-            reason=self.reason,
+def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
+    """An execution of the goals that were attempted."""
+    made: list[Movement] = []
+    for movements, subtask in zip(plan, subtasks, strict=False):
+        goal, hand = movements[0].goal, movements[0].hand
+        if subtask.hit and not subtask.made:  # hit on the way: show the hand
+            made.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
+        made += subtask.made
+    hits = [subtask.q for subtask in subtasks if subtask.hit]
+    reason = ""
+    if len(hits) < len(subtasks):
+        reason = (
+            f"goal {goal}: the corrective process did not converge with the {hand} hand in "
+            f"{subtasks[-1].iterations} iterations"
         )
-
-
-Due = list[tuple[SolutionRun, Movement]]
-How = Literal["look", "move", "correct"]
-
-
-def try_goal(task: Task, number: int, runs: list[SolutionRun], model: MotionModel) -> None:
-    """Make the movements of one goal, in each run as many as are needed."""
-    seen = reach_goal(task, number, [(run, run.due[number - 1][0]) for run in runs], "look", model)
-    for n, run in enumerate(runs):
-        run.hit = bool(seen.hit[n])
-        # A movement, which this has always been counted as, also asks where its target is.
-        run.evaluations += int(seen.evaluations[n]) + 1
-    for place in range(max(len(run.due[number - 1]) for run in runs)):
-        due = [(run, movement) for run in runs if (movement := run.next(number, place)) is not None]
-        for run, movement in due:
-            if movement.kind == "path":
-                follow_path(task, run, movement, model)
-        straight = [(run, movement) for run, movement in due if movement.kind != "path"]
-        move_straight(
-            task, number, [(r, m) for r, m in straight if m.target is not None], "move", model
-        )
-        move_straight(
-            task, number, [(r, m) for r, m in straight if m.target is None], "correct", model
-        )
-    for run in runs:
-        run.end_goal(number)
-
-
-def follow_path(task: Task, run: SolutionRun, movement: Movement, model: MotionModel) -> None:
-    """Make a movement along its path."""
-    assert movement.waypoints is not None
-    goal = task.goals[movement.goal - 1]
-    result = follow(
-        task.robot, run.q, movement.waypoints, movement.hand, goal, task.radius, model=model
+    return Execution(
+        movements=tuple(made),
+        configurations=np.array(hits).reshape(-1, len(subtasks[0].q)),
+        ticks=sum(movement.ticks or 0 for movement in made),
+        corrections=sum(movement.kind == "corrective" and movement.ticks != 0 for movement in made),
+        iterations=sum(subtask.iterations for subtask in subtasks),
+        # And for each goal a look before the first movement, and one at where that leads.
+        evaluations=sum(subtask.evaluations + 2 for subtask in subtasks),
+        reason=reason,
     )
-    run.evaluations += result.evaluations
-    run.take(movement, result.q, result.ticks, result.hit)
 
 
-def move_straight(task: Task, number: int, due: Due, how: How, model: MotionModel) -> None:
-    """Make straight movements, a run each: to given targets, or to those that **A** finds."""
-    if not due:
-        return
-    result = reach_goal(task, number, due, how, model)
-    for n, (run, movement) in enumerate(due):
-        iterations = int(result.iterations[n])
-        run.iterations += iterations
-        run.evaluations += int(result.evaluations[n])
-        if how == "correct":
-            if not result.corrections[n]:
-                run.reason = (
-                    f"goal {number}: the corrective process did not converge "
-                    f"with the {movement.hand} hand in {iterations} iterations"
-                )
-                continue
-            movement = replace(movement, target=result.corrected[n])
-        run.take(movement, result.q[n], int(result.ticks[n]), bool(result.hit[n]))
-
-
-def reach_goal(task: Task, number: int, due: Due, how: How, model: MotionModel) -> Reached:
-    """Let each run look whether it has hit the goal, move to its target, or be corrected."""
-    targets = np.full((len(due), 1, task.robot.dof), np.nan)
-    if how == "move":
-        targets[:, 0] = [movement.target for _, movement in due]
-    ends = [movement.kind != "corrective" for _, movement in due]
-    arms = Requests(
-        starts=np.array([run.q for run, _ in due]),
-        hands=np.array([[HANDS.index(movement.hand)] for _, movement in due]),
-        targets=targets,
-        stops=np.array(ends)[:, None],
-        bounds=np.array([0, len(due)]),
-        goals=np.array([[check_goal(task.goals[number - 1], task.radius)[:2]]]),
-    )
-    setup = setup_for(
-        task.robot,
-        float(task.radius),
-        locked_base=task.locked_base,
-        model=model,
-        corrects=how == "correct",
-        looks=how == "look",
-    )
-    reached = reach_with(task.robot, arms, setup)
-    return Reached._make(field[:, 0] for field in reached)
-
-
-def movements_by_goal(task: Task, solution: Iterable[Movement]) -> list[tuple[int, list[Movement]]]:
+def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """The movements grouped by goal, checked against the task."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
             "movements"
         )
-    groups: list[tuple[int, list[Movement]]] = []
+    plan: Plan = []
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
-        if not groups or groups[-1][0] != movement.goal:
-            groups.append((movement.goal, []))
-        of_goal = groups[-1][1]
+        if not plan or plan[-1][0].goal != movement.goal:
+            plan.append([])
+        of_goal = plan[-1]
         where = f"task {task.name!r}, goal {movement.goal}"
         if movement.hand not in task.hands:
             raise SolutionError(
@@ -374,40 +382,55 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> list[tuple[in
             )
         if of_goal and movement.hand != of_goal[0].hand:
             raise SolutionError(f"{where}: two hands for one goal")
-        of_goal.append(check_movement(task, movement, where))
-    wanted = list(range(1, len(task.goals) + 1))
-    if [goal for goal, _ in groups] != wanted:
-        given = [goal for goal, _ in groups]
+        of_goal.append(check_movement(movement, where))
+    check_points(task, plan)
+    given, wanted = [each[0].goal for each in plan], list(range(1, len(task.goals) + 1))
+    if given != wanted:
         raise SolutionError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
-    return groups
+    return plan
 
 
-def check_movement(task: Task, movement: Movement, where: str) -> Movement:
-    """A movement that has what its kind needs and leads to configurations that the task allows; a
-    path with its target. Raises SolutionError, which begins with ``where``."""
+def check_movement(movement: Movement, where: str) -> Movement:
+    """A movement that has what its kind needs; a path with its target. Raises SolutionError, which
+    begins with ``where``."""
     if movement.kind not in KINDS:
         raise SolutionError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
-    points: list[Array] = []
     if movement.kind == "path":
-        points = [] if movement.waypoints is None else list(movement.waypoints)
-        if not points:
+        if movement.waypoints is None or len(movement.waypoints) == 0:
             raise SolutionError(f"{where}: a path needs waypoints")
-        end = np.array(points[-1], dtype=np.float64)
-        if movement.target is not None and not np.array_equal(movement.target, end):
+        way = np.array(movement.waypoints, dtype=np.float64)
+        if movement.target is not None and not np.array_equal(movement.target, way[-1]):
             raise SolutionError(f"{where}: a path's target is its last waypoint")
-        movement = replace(movement, target=end, waypoints=np.array(points, dtype=np.float64))
-    elif movement.waypoints is not None:
+        return replace(movement, target=way[-1], waypoints=way)
+    if movement.waypoints is not None:
         raise SolutionError(f"{where}: a {movement.kind} movement has no waypoints")
-    elif movement.target is not None:
-        points = [movement.target]
-    elif movement.kind != "corrective":
+    if movement.target is None and movement.kind != "corrective":
         raise SolutionError(f"{where}: a {movement.kind} movement needs a target")
+    return movement
+
+
+def check_points(task: Task, plan: Plan) -> None:
+    """Raises SolutionError for a target or waypoint that is no configuration of the robot, or that
+    moves a locked base coordinate."""
+    points: list[Array] = []
+    goals: list[int] = []
+    for movements in plan:
+        for movement in movements:
+            way = [] if movement.target is None else [movement.target]
+            points += way if movement.waypoints is None else list(movement.waypoints)
+            goals += [movement.goal] * (len(points) - len(goals))
     locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
-    for point in points:
+    with suppress(ValueError):  # of rows of different lengths
+        array = np.array(points)
+        if array.dtype == np.float64 and array.shape == (len(points), task.robot.dof):
+            within = (np.abs(array) <= LARGEST_ENTRY).all()
+            if within and all((array[:, k] == task.q0[k]).all() for k in locked):
+                return
+    for goal, point in zip(goals, points, strict=True):
+        where = f"task {task.name!r}, goal {goal}"
         try:
             checked = configuration(task.robot, point)
         except ValueError as error:
             raise SolutionError(f"{where}: {error}") from None
         if np.any(checked[locked] != task.q0[locked]):
             raise SolutionError(f"{where}: the target moves a locked base coordinate")
-    return movement

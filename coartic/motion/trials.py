@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.inputs import brief_value, real_array
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.movement import LARGEST_ENTRY, check_goal, configuration
+from coartic.model import PAPER, MotionModel
+from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.outside import note_trials
-from coartic.motion.reach import Reached, Requests, reach_with, setup_for
-from coartic.motion.solution import Execution, Movement
+from coartic.motion.reach import Bench, bench_of, reach_all
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_misfit, hands_of, letters_of
 
@@ -52,116 +52,24 @@ class Trials(NamedTuple):
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
-class Bench:
-    """A task on which trials are made: checked once, with what all of them share."""
+def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
+    """Make N trials of a task that is checked, as nothing else is.
 
-    def __init__(self, task: Task, model: MotionModel = PAPER) -> None:
-        """Raises ValueError for a task or a model that no trial can be made with."""
-        check_model(model, radius=task.radius)
-        self.task = task
-        self.start = configuration(task.robot, task.q0)
-        goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
-        self.goals = np.array([goals], dtype=np.float64)
-        self.setup = setup_for(
-            task.robot, float(task.radius), locked_base=task.locked_base, model=model
-        )
-        self._latest = self._at_start(1)
-        self._still = np.tile(self.start, (1, len(task.goals), 1))
-        self._hands = {hand: HANDS.index(hand) for hand in task.hands}
-        self._locked = ["xy".index(coordinate) for coordinate in task.locked_base]
-
-    def __reduce__(self) -> tuple[type[Bench], tuple[Task, MotionModel]]:
-        """For copies and other processes, which make theirs anew."""
-        return Bench, (self.task, self.setup.model)
-
-    def _at_start(self, count: int) -> Requests:
-        """So many arms at the start, without hands and targets."""
-        starts = np.empty((count, len(self.start)))
-        starts[:] = self.start
-        stops = np.ones((count, self.goals.shape[1]), dtype=np.bool_)
-        return Requests(starts, None, None, stops, np.array([0, count]), self.goals)
-
-    def arms(self, hands: NDArray[np.int64], targets: Array) -> Requests:
-        """The arms of N trials for the kernel; nothing is checked.
-
-        ``hands`` has shape ``(N, G)``, indices into HANDS, ``targets`` ``(N, G, dof)``, in which
-        joints without one are filled in.
-        """
-        arms = self._latest  # most calls make as many trials as the one before
-        if len(arms.starts) != len(hands):
-            arms = self._latest = self._at_start(len(hands))
-        return Requests(arms.starts, hands, targets, arms.stops, arms.bounds, arms.goals)
-
-    def reach(self, hands: NDArray[np.int64], targets: Array) -> Reached:
-        """What comes of the goals of N trials, of shape ``(N, G, ...)``; see :meth:`arms`."""
-        return reach_with(self.task.robot, self.arms(hands, targets), self.setup)
-
-    def make(self, hands: NDArray[np.int64], targets: Array) -> Trials:
-        """Make N trials; see :meth:`arms`."""
-        reached = self.reach(hands, targets)
-        if not reached.hit.all():
-            reached.q[~reached.hit] = np.nan
-        return Trials(
-            ticks=np.einsum("ng->n", reached.ticks),  # a sum in a third of the time
-            completed=reached.hit[:, -1].copy(),
-            corrections=np.einsum("ng->n", reached.corrections),
-            iterations=np.einsum("ng->n", reached.iterations),
-            evaluations=np.einsum("ng->n", reached.evaluations),
-            targets=targets,
-            reached=reached.q,
-        )
-
-    def execute(self, solution: Sequence[Movement]) -> Execution | None:
-        """:func:`coartic.execute` in a tenth of the time, for a solution of one straight movement
-        for each goal that completes the task. None for any other, of which nothing is said."""
-        targets, codes, missing = self._still.copy(), [], []
-        if not isinstance(solution, tuple | list) or len(solution) != targets.shape[1]:
-            return None
-        for n, given in enumerate(solution):
-            if type(given) is not Movement or given.goal != n + 1 or given.waypoints is not None:
-                return None
-            hand, kind, target = given.hand, given.kind, given.target
-            if hand not in self._hands:
-                return None
-            codes.append(self._hands[hand])
-            if target is None and kind == "corrective":
-                missing.append(n)
-                continue
-            if kind not in ("learned", "planned") or not isinstance(target, np.ndarray):
-                return None
-            if target.dtype != self.start.dtype or target.shape != self.start.shape:
-                return None
-            targets[0, n] = target
-        for k in self._locked:
-            if set(targets[0, :, k].tolist()) != {self.start[k]}:
-                return None
-        flat = targets.reshape(-1)
-        if not flat @ flat <= LARGEST_ENTRY:  # one is NaN, infinite or far away
-            return None
-        targets[0, missing] = np.nan
-        hands = np.array([codes])
-        reached = self.reach(hands, targets)
-        if not reached.hit[0, -1]:
-            return None
-        ticks, correcting = reached.ticks[0].tolist(), reached.correcting[0].tolist()
-        corrections, evaluations = reached.corrections[0].tolist(), reached.evaluations[0].tolist()
-        q, made = reached.q[0], []
-        for n, (given, total, end) in enumerate(zip(solution, ticks, correcting, strict=True)):
-            if given.target is not None:
-                # The look before it, and one at the place where its target is.
-                evaluations.append(1)
-                made.append(Movement(n + 1, given.hand, given.kind, targets[0, n], total - end))
-            if corrections[n] or given.target is None:
-                target = reached.corrected[0, n] if corrections[n] else q[n].copy()
-                made.append(Movement(n + 1, given.hand, "corrective", target, end))
-        return Execution(
-            movements=tuple(made),
-            configurations=q,
-            ticks=sum(ticks),
-            corrections=sum(corrections),
-            iterations=sum(reached.iterations[0].tolist()),
-            evaluations=sum(evaluations) + len(ticks),
-        )
+    ``hands`` has shape ``(N, G)``, indices into HANDS, ``targets`` ``(N, G, dof)``, in which joints
+    without one are filled in.
+    """
+    reached = reach_all(bench, hands, targets[:, :, None])
+    if not reached.hit.all():
+        reached.q[~reached.hit] = np.nan
+    return Trials(
+        ticks=np.einsum("ng->n", reached.ticks),  # a sum in a third of the time
+        completed=reached.hit[:, -1].copy(),
+        corrections=np.einsum("ng->n", reached.corrections),
+        iterations=np.einsum("ng->n", reached.iterations),
+        evaluations=np.einsum("ng->n", reached.evaluations),
+        targets=targets,
+        reached=reached.q,
+    )
 
 
 def make_trials(
@@ -174,9 +82,9 @@ def make_trials(
     Raises ValueError for a wrong shape, for targets that are infinite or beyond
     ``LARGEST_ENTRY``, for ones that move a locked base, and for hands the robot does not have.
     """
-    bench, given = Bench(task, model), check_targets(task, targets)
+    bench, given = bench_of(task, model), check_targets(task, targets)
     note_trials(len(given))
-    return bench.make(hand_codes(task, hands, len(given)), given)
+    return trials_on(bench, hand_codes(task, hands, len(given)), given)
 
 
 def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:

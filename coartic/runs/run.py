@@ -16,6 +16,7 @@ from coartic.learner.kernel import TENTHS
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
+from coartic.motion.reach import bench_of
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.task import Task
@@ -299,7 +300,7 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(task, short))
+    executions = iter(execute_many(bench_of(task, PAPER), short))
     return [next(executions) if error is None else error for error in errors]
 
 

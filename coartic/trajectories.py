@@ -168,10 +168,11 @@ class Trajectory:
         CoarticError
             The file cannot be written.
         """
-        from coartic.film import write_film
+        from coartic.film import Panel, write_film
 
         title = f"{self.task.name}, {self.execution.hands}"
-        write_film([(title, self)], Path(path), width=width, replace=replace)
+        panel = Panel(title, self.task, self.hands, self.configurations, self.hits)
+        write_film([panel], Path(path), width=width, replace=replace)
 
     def compare(
         self, *others: str | Trajectory, runs: int = 10, trials: int = 10_000
