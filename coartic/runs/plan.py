@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import Field, TypeAdapter
 
+from coartic.inputs import MOST_RUNS
+from coartic.model import PAPER
 from coartic.runs.card import MethodCard
-from coartic.runs.earlier import MODEL, parameters_then
-from coartic.tasks.task import Task
+from coartic.runs.earlier import MODEL, parameters_now, parameters_then
+from coartic.tasks.task import Task, parse_task
 
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
@@ -30,7 +33,7 @@ class Cell:
     """The parameters that the suite sets."""
     complete: dict[str, Any] = field(default_factory=dict)
     """All parameters, once the cell is part of a plan."""
-    runs: int = 1
+    runs: Annotated[int, Field(ge=0, le=MOST_RUNS)] = 1
 
     @property
     def variant(self) -> str:
@@ -88,6 +91,32 @@ class Setting:
             }
         )
 
+    def to_row(self) -> dict[str, Any]:
+        """Its row of table ``settings``."""
+        return {
+            "asked": self.asked,
+            "code": self.code,
+            "task": self.task.name,
+            "definition": self.definition,
+            "method": self.method,
+            "parameters": json.dumps(self.parameters, ensure_ascii=False, sort_keys=True),
+            "model": PAPER._asdict(),
+            "trial_budget": self.trial_budget,
+            "told": ", ".join(self.told),
+        }
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any], source: str) -> Setting:
+        """A setting from its row. Raises TaskError, which names the ``source``."""
+        return cls(
+            task=parse_task(json.loads(row["definition"]), source),
+            method=row["method"],
+            code=row["code"],
+            told=tuple(filter(None, row["told"].split(", "))),
+            parameters=parameters_now(row["method"], json.loads(row["parameters"])),
+            trial_budget=row["trial_budget"],
+        )
+
     def key(self, suite_seed: int, number: int) -> RunKey:
         """The key of a run: its id is a hash of what was asked for, then that of the code."""
         text = f"{self.asked} {suite_seed} {number}"
@@ -105,7 +134,7 @@ class Plan:
     """Runs of a cell, where the suite does not say otherwise and the seed matters."""
     trials: int
     """Most trials of a run."""
-    time_limit_s: float | None
+    time_limit_s: Annotated[float, Field(allow_inf_nan=False)] | None
     """CPU time of one run."""
     trial_budget: int | None
     """Physical trials of one run."""
@@ -141,9 +170,61 @@ class Plan:
             for cell in self.cells
         )
 
+    def to_rows(self) -> dict[str, list[dict[str, Any]]]:
+        """Its rows by table; that of a cell has the setting itself in place of its number."""
+        cells = [
+            {"setting": setting, **{name: getattr(cell, name) for name in _OF_CELL}}
+            for cell, setting in zip(self.cells, self.settings, strict=True)
+        ]
+        definitions = {setting.task.name: setting.definition for setting in self.settings}
+        return {
+            "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
+            "tasks": [{"name": name, "definition": d} for name, d in definitions.items()],
+            "methods": [{n: getattr(m, n) for n in _OF_METHOD} for m in self.methods.values()],
+            "cells": [{"position": position, **row} for position, row in enumerate(cells)],
+        }
+
+    @classmethod
+    def from_rows(cls, rows: Mapping[str, Sequence[Mapping[str, Any]]], source: str) -> Plan:
+        """A plan from its rows by table; those of cells with the columns of their settings, whose
+        parameters are ``complete``. Raises ValueError for what no plan has, and TaskError, which
+        names the ``source``."""
+        tasks = {
+            row["name"]: parse_task(json.loads(row["definition"]), source) for row in rows["tasks"]
+        }
+        methods = {
+            row["name"]: {**row, **{name: json.loads(row[name]) for name in _JSON}}
+            for row in rows["methods"]
+        }
+        (suite,) = rows["suite"]
+        asked = {"suite": suite["name"], **{name: suite[name] for name in _OF_SUITE}}
+        asked["cells"] = [
+            {"task": tasks[row["task"]], "method": methods[row["method"]], "runs": row["runs"]}
+            | {
+                n: parameters_now(row["method"], json.loads(row[n]))
+                for n in ("parameters", "complete")
+            }
+            for row in rows["cells"]
+        ]
+        plan: Plan = TypeAdapter(cls).validate_python(asked)
+        for row, cell, setting in zip(rows["cells"], plan.cells, plan.settings, strict=True):
+            if row["variant"] != cell.variant:
+                raise ValueError(f"variant {row['variant']!r} is not that of its parameters")
+            if json.loads(row["definition"]) != setting.definition:
+                raise ValueError(f"task {setting.task.name} is not the one of its runs")
+        if len({row["setting"] for row in rows["cells"]}) < len(plan.cells):
+            raise ValueError("two cells have one setting")
+        return plan
+
     def key(self, position: int, number: int) -> RunKey:
         """The key of a run of the cell at this position."""
         return self.settings[position].key(self.seed, number)
+
+
+_OF_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
+_OF_CELL = ("variant", "parameters", "runs")
+_OF_METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
+_JSON = ("told", "secondary", "defaults")  # of methods
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:

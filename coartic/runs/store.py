@@ -19,24 +19,20 @@ import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import fields
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, Json, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
-from coartic.model import PAPER
+from coartic.inputs import MOST_TRIALS, explain_inline
 from coartic.robot import Array
-from coartic.runs.card import MethodCard
-from coartic.runs.earlier import other_reading, parameters_now
-from coartic.runs.plan import Cell, Plan, Setting, hash_of
+from coartic.runs.earlier import other_reading
+from coartic.runs.plan import Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
-from coartic.tasks.task import parse_task
 from coartic.text import counted, one_line, plain
 
 if TYPE_CHECKING:
@@ -115,52 +111,21 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
 """
 
 
-class _Stored(BaseModel):
-    """What is read of a row. The file may be from somebody else, or damaged."""
+class Commit(BaseModel):
+    """The commit of a checkout."""
 
-    model_config = ConfigDict(allow_inf_nan=False)
-
-
-class _Method(_Stored):
-    name: str
-    title: str
-    citation: str
-    told: Json[tuple[str, ...]]
-    secondary: Json[tuple[str, ...]]
-    stochastic: bool
-    defaults: Json[dict[str, Any]]
-    origin: str
-    code: str
-
-
-class _Suite(_Stored):
-    name: str
-    seed: int
-    runs: int
-    trials: int
-    time_limit_s: float | None
-    trial_budget: int | None
-    command: Json[list[str]]
-    date: str
-
-
-class _Cell(_Stored):
-    task: str
-    method: str
-    parameters: Json[dict[str, Any]]
-    complete: Json[dict[str, Any]]
-    runs: int = Field(ge=0, le=MOST_RUNS)
-
-
-class _Commit(_Stored):
     id: str
     dirty: bool
 
 
-class _Environment(_Stored):
+class MadeWith(BaseModel):
+    """With what a suite was run."""
+
+    command: list[str]
+    date: str
     coartic: str
     model_code: str
-    commit: _Commit | None
+    commit: Commit | None
     python: str
     packages: dict[str, str]
     platform: str
@@ -181,8 +146,6 @@ _ROWS = 2_000  # that are read at once
 _WAIT_S = 1.0  # for another program, before more is done about it
 _LOCK_TRIES = 20
 
-_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
-_METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
 _WAYPOINT = ("result_id", "order", "waypoint")
 
@@ -239,73 +202,36 @@ class Store:
                     )
             for table in ("suite", "tasks", "methods", "cells"):
                 self._db.execute(f"DELETE FROM {table}")
-            self._insert("suite", {
-                "name": plan.suite,
-                **{key: getattr(plan, key) for key in _SUITE},
+            rows = plan.to_rows()
+            rows["suite"][0] |= {
                 "readings": [],  # of versions 1.0 and 1.1
                 "command": command,
                 "date": date,
                 "environment": self._environment(environment),
-            })  # fmt: skip
-            for method in plan.methods.values():
-                self._insert("methods", {name: getattr(method, name) for name in _METHOD})
-            for position, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
-                self._insert("cells", {
-                    "position": position,
-                    "setting": self._setting(setting),
-                    "variant": cell.variant,
-                    "parameters": cell.parameters,
-                    "runs": cell.runs,
-                })  # fmt: skip
-            definitions = {setting.task.name: setting.definition for setting in plan.settings}
-            for name, definition in definitions.items():
-                self._insert("tasks", {"name": name, "definition": definition})
+            }
+            for row in rows["cells"]:
+                row["setting"] = self._setting(row["setting"])
+            for table, content in rows.items():
+                for row in content:
+                    self._insert(table, row)
             robots = [task.robot for task in plan.tasks.values()]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
 
     @explained
     def plan(self) -> Plan:
         """What was asked for last. Raises CoarticError where nothing was yet."""
-        row = self._one("SELECT * FROM suite")
-        if row is None:
-            raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
-        suite = _Suite.model_validate(dict(row))
-        methods = {}
-        for method in self._db.execute("SELECT * FROM methods"):
-            card = MethodCard(**_Method.model_validate(dict(method)).model_dump())
-            methods[card.name] = card
-        tasks = {
-            name: parse_task(json.loads(definition), str(self.folder / RUNS_FILE))
-            for name, definition in self._db.execute("SELECT name, definition FROM tasks")
-        }
-        rows = self._db.execute(
-            "SELECT task, method, cells.parameters, settings.parameters AS complete, runs, "
-            "variant, setting, definition FROM cells JOIN settings ON settings.id = setting "
-            "ORDER BY position"
-        ).fetchall()
-        asked = [_Cell.model_validate(dict(each)) for each in rows]
-        plan = Plan(
-            **{key: getattr(suite, key) for key in _SUITE},
-            suite=suite.name,
-            cells=tuple(
-                Cell(
-                    tasks[c.task],
-                    methods[c.method],
-                    parameters_now(c.method, c.parameters),
-                    parameters_now(c.method, c.complete),
-                    c.runs,
-                )
-                for c in asked
-            ),
+        cells = (
+            "cells.*, settings.task, method, definition, settings.parameters AS complete "
+            "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
         )
-        for each, cell, setting in zip(rows, plan.cells, plan.settings, strict=True):
-            if each["variant"] != cell.variant:
-                raise ValueError(f"variant {each['variant']!r} is not that of its parameters")
-            if json.loads(each["definition"]) != setting.definition:
-                raise ValueError(f"task {setting.task.name} is not the one of its runs")
-        if len({each["setting"] for each in rows}) < len(rows):
-            raise ValueError("two cells have one setting")
-        return plan
+        tables = {table: f"* FROM {table}" for table in ("suite", "tasks", "methods")}
+        rows = {
+            table: self._db.execute(f"SELECT {text}").fetchall()
+            for table, text in {**tables, "cells": cells}.items()
+        }
+        if not rows["suite"]:
+            raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
+        return Plan.from_rows(rows, str(self.folder / RUNS_FILE))
 
     @explained
     def made_with(self) -> dict[str, Any]:
@@ -313,9 +239,10 @@ class Store:
         row = self._one(
             "SELECT content, command, date FROM suite JOIN environments ON id = environment"
         )
-        _Environment.model_validate_json(row["content"])
         how = {"command": json.loads(row["command"]), "date": row["date"]}
-        return {**json.loads(row["content"]), **how}
+        made_with = json.loads(row["content"]) | how
+        MadeWith.model_validate(made_with)
+        return dict(made_with)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -395,14 +322,7 @@ class Store:
             raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs in {self.folder}")
         row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
         asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
-        setting = Setting(
-            task=parse_task(json.loads(asked["definition"]), str(self.folder / RUNS_FILE)),
-            method=asked["method"],
-            code=asked["code"],
-            told=tuple(filter(None, asked["told"].split(", "))),
-            parameters=parameters_now(asked["method"], json.loads(asked["parameters"])),
-            trial_budget=asked["trial_budget"],
-        )
+        setting = Setting.from_row(asked, str(self.folder / RUNS_FILE))
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
         movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
@@ -529,18 +449,7 @@ class Store:
         return self._insert(table, row) if stored is None else int(stored["id"])
 
     def _setting(self, setting: Setting) -> int:
-        row = {
-            "asked": setting.asked,
-            "code": setting.code,
-            "task": setting.task.name,
-            "definition": setting.definition,
-            "method": setting.method,
-            "parameters": to_json(setting.parameters, sort_keys=True),
-            "model": PAPER._asdict(),
-            "trial_budget": setting.trial_budget,
-            "told": ", ".join(setting.told),
-        }
-        return self._id_of("settings", row, "asked", "code")
+        return self._id_of("settings", setting.to_row(), "asked", "code")
 
     def _environment(self, content: dict[str, Any]) -> int:
         commit = content.get("commit")
