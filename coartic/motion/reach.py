@@ -275,12 +275,11 @@ def setup_for(
     *,
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
-    corrects: bool = True,
     looks: bool = True,
 ) -> Setup:
     """Robot, constants and options for the kernel; see :func:`reach_unchecked`."""
     free = Corrector("x" not in locked_base, "y" not in locked_base)
-    return Setup(robot.arm("left"), robot.arm("right"), radius, free, model, corrects, looks)
+    return Setup(robot.arm("left"), robot.arm("right"), radius, free, model, True, looks)
 
 
 def reach_unchecked(
@@ -291,8 +290,6 @@ def reach_unchecked(
     radius: float,
     targets: Array | None = None,
     *,
-    stops: bool | NDArray[np.bool_] = True,
-    corrects: bool = True,
     looks: bool = True,
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
@@ -302,12 +299,10 @@ def reach_unchecked(
     Nothing is checked. ``q`` has shape ``(N, dof)``, length unit (base) and rad (joints); ``hands``
     ``(N,)``, indices into HANDS; ``goals`` ``(N, 2)`` and ``radius`` is that of them all, length
     unit. ``targets`` has shape ``(N, dof)``: where a joint's target is NaN, the joint keeps its
-    value, and an arm whose row is NaN has none. ``stops``, of each or of all: whether the movement
-    to the target ends, too, where the hand has arrived (a learned or planned one), or on a hit
-    alone (a corrective one that is reached again). ``corrects``: whether **A** finishes what is
-    missed. ``looks``: whether an arm without a target may be in its goal already; else **A** begins
-    at once. ``locked_base`` holds ``"x"`` and/or ``"y"``; **A** leaves these as they are. Source:
-    paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
+    value, and an arm whose row is NaN has none. ``looks``: whether such an arm may be in its goal
+    already; else **A** begins at once. ``locked_base`` holds ``"x"`` and/or ``"y"``; **A** leaves
+    these as they are. Source: paper, sections *Generating Movement for Each Goal* and *The
+    Corrective Process*.
     """
     count = len(q)
     order = back = bounds = _ONLY
@@ -324,13 +319,11 @@ def reach_unchecked(
         starts=q[order],
         hands=hands[order, None],
         targets=given[order, None, None],
-        stops=np.broadcast_to(stops, count)[order, None, None],
+        stops=np.ones((count, 1, 1), dtype=np.bool_),
         bounds=np.append(bounds, count),
         goals=goals[order[bounds], None],
     )
-    setup = setup_for(
-        robot, radius, locked_base=locked_base, model=model, corrects=corrects, looks=looks
-    )
+    setup = setup_for(robot, radius, locked_base=locked_base, model=model, looks=looks)
     reached = reach_with(robot, requests, setup)
     return Reached._make(field[back, 0] for field in reached)
 

@@ -37,7 +37,10 @@ def parameters_then(method: str, parameters: Mapping[str, Any]) -> dict[str, Any
 
 
 def parameters_now(method: str, stored: Mapping[str, Any]) -> dict[str, Any]:
-    """Stored parameters of a method, without those that it no longer has."""
+    """Stored parameters of a method, without those that it no longer has. Raises TypeError for what
+    is no table."""
+    if not isinstance(stored, Mapping):
+        raise TypeError(f"parameters are {stored!r}")
     return {name: value for name, value in stored.items() if name not in _fixed(method)}
 
 
