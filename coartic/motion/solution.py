@@ -185,7 +185,9 @@ def execute_many(
             plans.append(error)
     note_trials(len(plans))
     straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
-    executions = iter(execute_straight(bench, straight))
+    asked = [[slots_for(movements) for movements in plan] for plan in straight]
+    made = make_straight(bench, straight, asked)
+    executions = (execution_of(*each) for each in zip(straight, made, strict=True))
     found: list[Execution | Refused] = []
     for plan in plans:
         if not isinstance(plan, list):
@@ -237,15 +239,11 @@ def has_path(plan: Plan) -> bool:
     return any(movement.kind == "path" for movements in plan for movement in movements)
 
 
-def before_correction(movements: list[Movement]) -> list[Movement]:
-    """The movements of a goal up to the first that **A** finds, which is the last to be made."""
-    return list(takewhile(lambda movement: movement.target is not None, movements))
-
-
 def slots_for(movements: list[Movement]) -> Slots:
-    """Straight movements of a goal as the kernel takes them."""
+    """Straight movements of a goal as the kernel takes them, up to the first that **A** finds."""
+    given = takewhile(lambda movement: movement.target is not None, movements)
     made_at_once = bool(movements) and movements[0].kind != "corrective"
-    return [*movements] if made_at_once else [None, *movements]
+    return [*given] if made_at_once else [None, *given]
 
 
 def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> list[list[Subtask]]:
@@ -269,35 +267,29 @@ def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> 
     ]
 
 
-def execute_straight(bench: Bench, plans: list[Plan]) -> list[Execution]:
-    """Execute solutions without paths side by side."""
-    asked = [[slots_for(before_correction(movements)) for movements in plan] for plan in plans]
-    made = make_straight(bench, plans, asked)
-    return [execution_of(*each) for each in zip(plans, made, strict=True)]
-
-
 def execute_paths(bench: Bench, plan: Plan) -> Execution:
     """Execute a solution in which movements follow paths: one movement after the other."""
     task, model, subtasks, q = bench.task, bench.setup.model, list[Subtask](), bench.start
     for g, movements in enumerate(plan):
         done = Subtask([], q, False, 0, 0)
-        for m, movement in enumerate([*before_correction(movements), None]):  # None: A
-            if done.hit:
-                break
-            if movement is not None and movement.waypoints is not None:
+        for m, movement in enumerate(
+            [*movements, Movement(g + 1, movements[0].hand, "corrective")]
+        ):
+            if movement.waypoints is not None:
                 where = movement.waypoints, movement.hand, task.goals[g], task.radius
                 moved = follow(task.robot, done.q, *where, model=model)
                 made = [replace(movement, ticks=moved.ticks)]
                 part = Subtask(made, moved.q, moved.hit, 0, moved.evaluations)
             else:
-                setup = bench.setup._replace(looks=m == 0, corrects=movement is None)
+                setup = bench.setup._replace(looks=m == 0, corrects=movement.target is None)
                 goal = bench.goals[:, g : g + 1]
                 here = bench._replace(start=done.q, goals=goal, setup=setup)
-                slots = slots_for([] if movement is None else [movement])
-                ((part,),) = make_straight(here, [[movements]], [[slots]])
+                ((part,),) = make_straight(here, [[movements]], [[slots_for([movement])]])
             iterations = done.iterations + part.iterations
             evaluations = done.evaluations + part.evaluations
             done = Subtask(done.made + part.made, part.q, part.hit, iterations, evaluations)
+            if done.hit or movement.target is None:
+                break
         subtasks.append(done)
         q = done.q
         if not done.hit:
