@@ -13,7 +13,7 @@ from typing import Any
 
 from coartic import CoarticError, __version__
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.analysis.words import slugs
+from coartic.analysis.words import latex, slugs
 from coartic.runs.card import BUILT_IN, MethodCard
 from coartic.text import did_you_mean, one_line
 
@@ -21,15 +21,6 @@ THE_PAPER = "shah2013"
 STATISTICS = (
     *("efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"),
 )
-SPECIAL = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "{": r"\textbraceleft{}",  # braces that BibTeX counts, with a backslash or without
-    "}": r"\textbraceright{}",
-    **{sign: f"\\{sign}" for sign in "%&#_$"},
-}
-"""Signs that TeX reads otherwise, and how they are written."""
 
 
 @cache
@@ -56,7 +47,7 @@ def software(made_with: Mapping[str, Any] | None = None) -> str:
         title="coartic: a comparative benchmark of coarticulation in motor skill acquisition",
         year="2026",
         howpublished="Computer software",
-        note=escaped(note),
+        note=latex(note),
     )
 
 
@@ -66,10 +57,10 @@ def results_of_version(released: Mapping[str, str]) -> str:
     return misc(
         "coartic-results",
         author="{The coartic developers}",
-        title=escaped(f"Results of coartic {__version__}: suites {' and '.join(released)}"),
+        title=latex(f"Results of coartic {__version__}: suites {' and '.join(released)}"),
         year="2026",
         howpublished="Data shipped with the software",
-        note=escaped(f"SHA-256: {files}"),
+        note=latex(f"SHA-256: {files}"),
     )
 
 
@@ -120,9 +111,9 @@ def declared_entry(name: str, method: MethodCard, key: str) -> str:
         return comment(f"{name}: it declares no citation; ask its authors what to cite")
     ours = method.origin == BUILT_IN
     whose = "built in, without a row in methods.toml" if ours else "a method of others"
-    title = escaped(" ".join(method.title.split()) or name)
+    title = latex(" ".join(method.title.split()) or name)
     words = comment(f"{name}, {whose}, cites: {citation}")
-    return f"{words}\n{misc(key, title=title, note=escaped(citation))}"
+    return f"{words}\n{misc(key, title=title, note=latex(citation))}"
 
 
 def misc(key: str, **fields: str) -> str:
@@ -134,8 +125,3 @@ def misc(key: str, **fields: str) -> str:
 def comment(text: str) -> str:
     """A line that BibTeX skips: between entries it skips everything but an @."""
     return f"% {one_line(text)}".replace("@", "(at)")
-
-
-def escaped(text: str) -> str:
-    """A text as TeX shows it."""
-    return "".join(SPECIAL.get(sign, sign) for sign in one_line(text))

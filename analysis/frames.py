@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.statistics.estimates import interval, mean
+from coartic.analysis.statistics import running_times
+from coartic.analysis.statistics.estimates import Estimate, interval, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 
@@ -140,11 +141,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     for method, of_method in frame.groupby("method", sort=False):
         solved = of_method[of_method.gap.notna()]
         by_task = {str(task): runs.gap.to_numpy() for task, runs in solved.groupby("task")}
-        mean = task_mean(by_task) if by_task and set(by_task) == every else None
+        solved_all = by_task and set(by_task) == every
         rows[method] = {
-            "gap": np.nan if mean is None else mean.value,
-            "gap_low": np.nan if mean is None else mean.low,
-            "gap_high": np.nan if mean is None else mean.high,
+            **interval("gap", task_mean(by_task) if solved_all else Estimate(np.nan)),
             "tasks": len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),
@@ -192,16 +191,11 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     frame = frame.assign(gap=gaps(frame))
     rows = []
     for method, of_method in frame.groupby("method", sort=False):
-        tasks = of_method.groupby("task")
-        reached = []  # trials, and the weight of the pair of run and target
-        for _, of_task in tasks:
-            runs = of_task.groupby("run")
-            for _, run in runs:
-                for target in targets:
-                    first = run.trials[run.gap <= target].min()
-                    if pd.notna(first):
-                        reached.append((first, 1 / (len(tasks) * len(runs) * len(targets))))
-        pairs = pd.DataFrame(reached, columns=["trials", "share"], dtype=np.float64)
-        steps = pairs.groupby("trials").share.sum().cumsum().reset_index()
-        rows.append(steps.assign(method=method)[["method", "trials", "share"]])
+        times = [
+            np.array([[run.trials[run.gap <= target].min() for target in targets]
+                      for _, run in of_task.groupby("run")], dtype=np.float64)
+            for _, of_task in of_method.groupby("task")
+        ]  # fmt: skip
+        trials, share = running_times.ecdf(times)
+        rows.append(pd.DataFrame({"method": method, "trials": trials, "share": share}))
     return pd.concat(rows, ignore_index=True)

@@ -71,7 +71,7 @@ def interval(row: Mapping[Any, Any], column: str, digits: int = 1, scale: float 
     >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100)
     '7.8 [7.3, 8.1]'
     """
-    return interval_in_words(row, column, digits=digits, scale=scale)
+    return interval_in_words(row, column, digits, scale)
 
 
 def expect(holds: bool, what: str) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis import methods as known
-from coartic.analysis.optima import locks_base
-from coartic.analysis.study import Study, load
-from coartic.analysis.topics.comparison import scores
-from coartic.analysis.topics.comparison.running_times import SPENDS, TARGETS, ecdf, times_of
+from coartic.analysis.statistics.running_times import ecdf
+from coartic.analysis.study import CellRuns, Study, load
+from coartic.analysis.topics import scores
+from coartic.analysis.topics.costs import SPENDS, TARGETS, times_of
 from coartic.errors import CoarticError
 from coartic.robot import Array
 from coartic.text import id_named, unknown
@@ -67,42 +67,46 @@ def runtimes(
         raise CoarticError(f"targets are {list(targets)}: needed are numbers above 0 and up to 1")
     if by is not None and by not in get_args(By):
         raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
-    by_method = scores.labels_by_task(study)
-    called = {name: known.name_of(name) for name in by_method}
-    asked = [methods] if isinstance(methods, str) else methods
-    methods = [id_named(name, called) for name in asked]
+    cells = {
+        method: {task: study.cells[task, label] for task, label in labels.items()}
+        for method, labels in scores.labels_by_task(study).items()
+    }
+    called = {name: known.name_of(name) for name in cells}
+    methods = [
+        id_named(name, called) for name in ([methods] if isinstance(methods, str) else methods)
+    ]
     for name in methods:
-        if name not in by_method:
-            raise CoarticError(unknown("method", name, by_method, called))
+        if name not in cells:
+            raise CoarticError(unknown("method", name, cells, called))
     groups: dict[str, list[str]] = {}
-    for name in scores.initial_and_optimum(study):
-        group = {None: EVERYTHING, "task": name, "family": study.tasks[name].family or name}[by]
-        groups.setdefault(group, []).append(name)
-    if not groups:
+    for task in scores.initial_and_optimum(study):
+        if all(task in cells[name] for name in methods):
+            family = study.tasks[task].family or task
+            groups.setdefault({None: EVERYTHING, "task": task, "family": family}[by], []).append(
+                task
+            )
+    if not scores.initial_and_optimum(study):
         raise CoarticError("no task has a known optimum that is better than its initial solution")
-    if methods:
-        groups = {
-            group: [task for task in tasks if all(task in by_method[name] for name in methods)]
-            for group, tasks in groups.items()
-        }
-        groups = {group: tasks for group, tasks in groups.items() if tasks}
-        if not groups:
-            raise CoarticError(f"no task has runs of all of {', '.join(methods)}")
-    compared = [name for name in by_method if scores.is_compared(study, name)]
-    rows: list[tuple[str, str, str, float, float]] = []
+    if not groups:
+        raise CoarticError(f"no task has runs of all of {', '.join(methods)}")
+    compared = {name: cells[name] for name in methods} or scores.compared(study)
+    rows = []
     for group, tasks in groups.items():
-        for name in known.in_order(methods or compared):
-            labels = by_method[name]
-            if not labels.keys() >= set(tasks):
+        for name in known.in_order(compared):
+            if not compared[name].keys() >= {*tasks}:
                 continue
-            cells = [study.cells[task, labels[task]] for task in tasks]
-            repeated = name not in (used := {cell.label for cell in cells}) and len(used) == 1
-            if not methods and (repeated or any(locks_base(cell.runs) for cell in cells)):
+            of_group = [compared[name][task] for task in tasks]
+            if not methods and is_single_condition(name, of_group):
                 continue
             for spend in SPENDS:
-                times = [times_of(study, cell, spend, shares) for cell in cells]
+                times = [times_of(study, cell, spend, shares) for cell in of_group]
                 if all(map(len, times)):
-                    steps = list(zip(*map(np.ndarray.tolist, ecdf(times)), strict=True))
-                    steps = steps or [(np.inf, 0.0)]
-                    rows += [(group, name, spend, budget, share) for budget, share in steps]
+                    budgets, reached = map(np.ndarray.tolist, ecdf(times))
+                    steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
+                    rows += [(group, name, spend, *step) for step in steps]
     return pd.DataFrame(rows, columns=["group", "method", "spend", "budget", "share"])
+
+
+def is_single_condition(method: str, cells: Sequence[CellRuns]) -> bool:
+    """Whether a method is the learner's conditions together, and on these cells one of them."""
+    return method.startswith(known.TOGETHER) and len({cell.label for cell in cells}) == 1

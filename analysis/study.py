@@ -23,7 +23,6 @@ from coartic.analysis.trajectories import Trajectories
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
-from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
 from coartic.runs.run import PARTS, execute_all, movements_by_run
@@ -132,6 +131,7 @@ class Study:
     ``family``, ``split``, ``goals`` (their number) and ``best_known``; its parameters by their
     names; ``gap`` to the best known reward, as a share."""
     _computed: dict[Callable[..., Any], Any] = field(init=False, default_factory=dict)
+    _kept: dict[tuple[str, str, str], Trajectories] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
         runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
@@ -184,17 +184,6 @@ class Study:
         """One row a movement of each run's solution."""
         return self._frame("solutions")
 
-    def movements(self, task: str, label: str) -> dict[str, tuple[Movement, ...]]:
-        """The solutions of a cell, by run id: of the runs that :meth:`trajectories` executes."""
-        return self._movements((task, label), "solution")
-
-    def _movements(self, key: CellKey, part: str) -> dict[str, tuple[Movement, ...]]:
-        ids = set(_executed_of(self.cells[key]))
-        rows, paths = self._frame(part), self._frame("paths")
-        rows, paths = rows[rows.run_id.isin(ids)], paths[paths.run_id.isin(ids)]
-        with explain_errors(self.folder):
-            return movements_by_run(self.tasks[key[0]], rows, paths)
-
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs that made trials, each with the reward of every trial, NaN where it failed."""
         with open_store(self.folder) as store:
@@ -206,20 +195,14 @@ class Study:
         The first 500 runs that solved the task: signatures say no more with thousands, which
         would fill the memory.
         """
-        key = task, label
-        if key not in self._trajectories:
-            self._trajectories[key] = self._executed(key, "solution")
-        return self._trajectories[key]
+        return self._executed(task, label, "solution")
 
     def replays(self, task: str, label: str) -> Trajectories:
         """The same for the noiseless trials after learning, of the runs that have one.
 
         For a learner whose solution is its best trial, they say what is learned without selection.
         """
-        key = task, label
-        if key not in self._replays:
-            self._replays[key] = self._executed(key, "replay")
-        return self._replays[key]
+        return self._executed(task, label, "replay")
 
     def postures(self, task: str, label: str, *, replay: bool = False) -> Array:
         """Postures in which the solved runs of a method hit the goals of a task.
@@ -266,17 +249,24 @@ class Study:
             values[here] = SIGNS[name].each(executed)
         return values
 
-    def _executed(self, key: CellKey, part: str) -> Trajectories:
-        cell, task = self.cells[key], self.tasks[key[0]]
-        executions = self._executions(key, part)
-        runs = tuple(spell_out(task, each) for each in executions.values())
-        return Trajectories(task, cell.method, cell.variant, runs, run_ids=tuple(executions))
+    def _executed(self, task: str, label: str, part: str) -> Trajectories:
+        key = task, label, part
+        if key not in self._kept:
+            cell, executions = self.cells[task, label], self._executions((task, label), part)
+            runs = tuple(spell_out(self.tasks[task], each) for each in executions.values())
+            self._kept[key] = Trajectories(
+                self.tasks[task], cell.method, cell.variant, runs, run_ids=tuple(executions)
+            )
+        return self._kept[key]
 
     def _executions(self, key: CellKey, part: str) -> dict[str, Execution]:
-        cell, task = self.cells[key], self.tasks[key[0]]
-        solutions = self._movements(key, part)
-        ids = [run_id for run_id in _executed_of(cell) if run_id in solutions]
+        task, wanted = self.tasks[key[0]], _executed_of(self.cells[key])
+        rows, paths = (
+            frame[frame.run_id.isin(wanted)] for frame in (self._frame(part), self._frame("paths"))
+        )
         with explain_errors(self.folder):
+            solutions = movements_by_run(task, rows, paths)
+            ids = [run_id for run_id in wanted if run_id in solutions]
             executions = execute_all(task, [solutions[run_id] for run_id in ids])
             executed = {}
             for run_id, execution in zip(ids, executions, strict=True):
@@ -288,14 +278,6 @@ class Study:
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 executed[run_id] = execution
         return executed
-
-    @cached_property
-    def _trajectories(self) -> dict[CellKey, Trajectories]:
-        return {}
-
-    @cached_property
-    def _replays(self) -> dict[CellKey, Trajectories]:
-        return {}
 
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:

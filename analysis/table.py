@@ -17,8 +17,6 @@ Rows = Iterator[tuple[str, Row]]
 """Rows of a table with their names."""
 SHORT_ID = 8
 """Characters of a run's id that people see: commands take its beginning."""
-TABLES: dict[str, Callable[[Study], pd.DataFrame]] = {}
-"""Every table of the report by its id: the name of its function, with dashes."""
 
 
 class Column(NamedTuple):
@@ -57,7 +55,6 @@ def table(
             made.attrs["methods"] = names_of_settings(study)
             return made
 
-        TABLES[rows.__name__.replace("_", "-")] = frame
         return frame
 
     return as_table

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coartic.text import one_line
+
 if TYPE_CHECKING:
     from coartic import Task
     from coartic.analysis.statistics.estimates import Estimate
@@ -17,6 +19,16 @@ NONE = "–"
 """Shown where there is no value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not print the goals of this task; ours are a reconstruction."
+_LATEX = str.maketrans(
+    {
+        **{sign: f"\\{sign}" for sign in "&%$#_"},
+        **{"~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "\\": "\\textbackslash{}"},
+        **{"{": "\\textbraceleft{}", "}": "\\textbraceright{}"},  # BibTeX counts braces
+        **{"†": "$\\dagger$", "−": "$-$", "–": "--", "∞": "$\\infty$", "±": "$\\pm$"},
+        **{"Δ": "$\\Delta$", "σ": "$\\sigma$", "ε": "$\\epsilon$", "↳": "", NARROW_SPACE: "\\,"},
+        **{"“": "``", "”": "''", "<": "$<$", ">": "$>$", "×": "$\\times$"},
+    }
+)
 LONGEST_SLUG = 80
 """Characters of a slug before its number, since names of files must not be too long."""
 
@@ -81,9 +93,9 @@ def estimate(value: Estimate, digits: int | None = None, unit: str = "") -> str:
 
 
 def interval_in_words(
-    row: Mapping[Any, Any], name: str, unit: str = "", *, digits: int = 1, scale: float = 1.0
+    row: Mapping[Any, Any], name: str, digits: int = 1, scale: float = 1.0, unit: str = ""
 ) -> str:
-    """A value of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
+    """A number of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
     value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
@@ -132,3 +144,8 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
             slug = f"{base}-{count}"
         taken.setdefault(name, slug)
     return taken
+
+
+def latex(text: object) -> str:
+    """Text with everything escaped that LaTeX and BibTeX would read as their own."""
+    return one_line(str(text)).translate(_LATEX)

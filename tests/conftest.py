@@ -68,7 +68,7 @@ def traced(tmp_path_factory):
 @pytest.fixture(scope="session")
 def report(traced, tmp_path_factory):
     """The folder of a report on those results, as a user gets it."""
-    from coartic.analysis.report import build
+    from coartic.analysis.report import about, build
     from tests.support.suites import made_once
 
     def make(folder):
@@ -76,8 +76,7 @@ def report(traced, tmp_path_factory):
             patch.setattr(
                 build, "picture", lambda figure, ending: b""
             )  # drawn for the page already
-            patch.setattr(build, "visible_sections", lambda study: build.SECTIONS)  # all
-            patch.setattr(build, "mostly_undecided", lambda entries: False)
+            patch.setattr(about, "visible_sections", lambda study: build.SECTIONS)  # all
             build.write_report(traced, folder / "report", for_paper=False)
 
     return made_once(tmp_path_factory, "traced-report", make) / "report"

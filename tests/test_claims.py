@@ -17,12 +17,12 @@ from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader
-from coartic.analysis.report.contents import TABLES
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
+from coartic.analysis.tables import TABLES
 from coartic.analysis.topics.families.claims import in_every_family
-from coartic.analysis.topics.paper import sentences
+from coartic.analysis.topics.paper import verdicts
 from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of
 from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.analysis.trajectories import Trajectories
@@ -125,13 +125,15 @@ def test_claims_are_counted_by_verdict():
     ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
     assert counts(entries.verdict) == numbers
-    central = {"supported": ["the posture depends on the next goal"],
-               "undecided": ["the reward for the whole task makes the difference"]}  # fmt: skip
-    assert sentences.central_claims(entries) == central
-    others = sentences.counts_of_others(entries)
-    assert sentences.in_numbers(others) == "0 are supported, 1 is not, 1 is undecided"
-    assert sentences.mostly_undecided(entries)  # two of four
-    assert not sentences.mostly_undecided(entries[:-1])
+    assert verdicts.mostly_undecided(entries)  # two of four
+    assert not verdicts.mostly_undecided(entries[:-1])
+    assert verdicts.in_words(entries[:-1]) == (
+        "Supported: the posture depends on the next goal. Undecided: the reward for the whole task "
+        "makes the difference. Of 1 other claim: not supported 1."
+    )
+    assert verdicts.in_words(entries[:1]) == (
+        "In its main point, yes: the posture depends on the next goal."
+    )
 
 
 def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():

@@ -11,10 +11,11 @@ from coartic.analysis.figures.plot import save
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
-from coartic.analysis.report.contents import FIGURES
+from coartic.analysis.sections import FIGURES
 from coartic.analysis.study import typical_run
-from coartic.analysis.topics.comparison.figures import learning_curves
-from coartic.analysis.topics.paper.tables import hand_shares, published_differences
+from coartic.analysis.topics.learning import learning_curves
+from coartic.analysis.topics.paper.hands import hand_shares
+from coartic.analysis.topics.paper.rewards import published_differences
 from coartic.analysis.topics.tasks import draw_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write

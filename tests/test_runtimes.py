@@ -7,7 +7,7 @@ import pytest
 
 import coartic
 from coartic import CoarticError, load_task
-from coartic.analysis.topics.comparison.running_times import SPENDS
+from coartic.analysis.topics.costs import SPENDS
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "nullspace-qp/none"

@@ -17,7 +17,7 @@ from coartic.analysis.signatures.manifold import motor_equivalence, movable, sub
 from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.topics.coarticulation import placebo, sentences, tables
+from coartic.analysis.topics.coarticulation import placebo, postures, tables
 from coartic.analysis.trajectories import Trajectories, best_sequences
 from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -407,7 +407,7 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_t
 @pytest.mark.parametrize(
     ("made_up", "seen", "answer"),
     [
-        ({"apart": 2.0}, True, "Yes: at the same goal 1 the posture"),
+        ({"apart": 2.0}, True, "Yes: depending on the next goal"),
         ({"apart": 0.5}, False, "Not shown:"),
         ({"apart": 0.5, "of_placebo": 2.0}, False, "Not shown:"),
         ({"apart": 0.0}, False, "No significant difference:"),
@@ -422,7 +422,7 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
     assert found.contexts.method == EC1
     assert found.contexts.apart == pytest.approx(made_up["apart"])
     assert found.seen == seen
-    assert sentences.answer_contexts(study).startswith(answer)
+    assert postures.next_goal(study).startswith(answer)
     if found.placebo is not None:
         assert found.placebo.apart == pytest.approx(made_up.get("of_placebo", 0.5))
         assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)

@@ -5,7 +5,6 @@ apart. The learner's runs on ascending differ, all else has no spread.
 """
 
 import math
-from operator import itemgetter
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,11 +12,11 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.report.contents import TABLES
+from coartic.analysis.tables import TABLES
+from coartic.analysis.topics import costs, ranking
 from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation
-from coartic.analysis.topics.comparison import sentences
-from coartic.analysis.topics.comparison.scores import BY_FORMULA, BY_TRIAL
+from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -140,8 +139,8 @@ def test_runtimes(study):
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
     assert len(table) == 3
-    assert [row.method for row in sentences.learner_and_rival(study)] == [BOTH, CMA]
-    assert sentences.ratios(study) == {"trials_to_quarter": 200 / 10, "trials_to_half": 1000 / 10}
+    assert costs.learner_and_rival(study).index.tolist() == [BOTH, CMA]
+    assert "1000 [200, 1000] trials, CMA-ES 10: a ratio of 100" in costs.what_it_costs(study)
 
 
 def test_learning(study):
@@ -187,18 +186,21 @@ def test_contexts(study, monkeypatch):
 @pytest.mark.parametrize(
     ("learner", "said"),
     [
-        (7.9, "is last of the 3 that learn, at 7.9 %, ahead of random guesses (12.3 %)."),
-        (2.0, "is second of the 3 that learn, at 2.0 %, ahead of random guesses (12.3 %)."),
-        (15.0, "is last of the 3 that learn, at 15.0 %, behind random guesses (12.3 %)."),
-        (0.1, ""),
+        (-310, "last, at 6.2 %; random guesses at 9.6 %."),
+        (-297, "number 2, at 1.7 %; random guesses at 9.6 %."),
+        (-330, "last, at 13.0 %; random guesses at 9.6 %."),
+        (-292, ""),
     ],
 )
 def test_methods_that_only_try_do_not_count_among_those_that_learn(learner, said):
-    gaps = {"cma-es/bandit": 0.5, "random-search/climbing": 6.3, "dual-process/EC1": learner}
-    gaps |= {"placebo/guesses": 12.3, "corrective-alone/every": 13.9}
-    rows = [
-        SimpleNamespace(method=label, gap=gap, low=math.nan, high=math.nan)
-        for label, gap in sorted(gaps.items(), key=itemgetter(1))
-    ]
-    text = sentences.place_of_learner(rows)
-    assert text.removeprefix("The paper's learner ") == said
+    """On ascending, to an optimum of -292: the learner among CMA-ES, hill climbing and guesses."""
+    rewards = {CMA: -293, "random-search/climbing": -305, EC1: learner, "placebo/guesses": -320,
+               "corrective-alone/every": -319}  # fmt: skip
+    rows = [row(method, reward, task=ONE, run=k, seed=k)
+            for method, reward in rewards.items() for k in range(2)]  # fmt: skip
+    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    alone = MadeUp(study_of(frame, [load_task(ONE)]), optima=made_up_optima(ONE))
+    text = ranking.nearest(alone)
+    assert ("The paper's learner" in text) == bool(said)
+    assert said in text
+    assert "Of the 3 algorithms that learn from rewards alone" in text

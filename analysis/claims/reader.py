@@ -16,7 +16,7 @@ from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.families.instances import signs
 from coartic.analysis.topics.paper.published import (
-    PrintedNumber,
+    Printed,
     published_cell,
     published_exhaustive,
     published_initial,
@@ -187,7 +187,7 @@ def who_is(label: str) -> str:
     return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
 
 
-def in_words(printed: PrintedNumber | None) -> str:
+def in_words(printed: Printed | None) -> str:
     """A number that the paper prints; empty where it prints none."""
     return printed.in_words if printed else ""
 

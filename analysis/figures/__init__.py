@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.analysis.figures.plot import FIGURES, Plot, picture, save
+    from coartic.analysis.figures.plot import Plot, picture, save
     from coartic.analysis.figures.style import (
         COVERAGE,
         GREY,
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
         panels,
         styled,
     )  # fmt: skip
+    from coartic.analysis.sections import FIGURES
 
+_HOMES = {"FIGURES": "sections"} | dict.fromkeys(("Plot", "picture", "save"), "figures.plot")
 __all__ = [
     "COVERAGE", "FIGURES", "GREY", "ONE", "PALETTE", "TWO", "Plot", "legend", "letters", "means",
     "panels", "picture", "save", "styled",
@@ -30,11 +32,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """What is asked for; the report's figures once every topic has named its own."""
+    """What is imported when it is asked for: not every study needs all of it."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    if name == "FIGURES":
-        import_module("coartic.analysis.report.contents")
-    plot = ("FIGURES", "Plot", "picture", "save")
-    home = "plot" if name in plot else "style"
-    return getattr(import_module(f"coartic.analysis.figures.{home}"), name)
+    home = _HOMES.get(name, "figures.style")
+    return getattr(import_module(f"coartic.analysis.{home}"), name)

@@ -67,9 +67,6 @@ class Plot:
         return picture(self.figure, ".png")
 
 
-FIGURES: dict[str, Callable[[Study], Plot]] = {}
-"""Every figure by its id: a function of a study. It raises CoarticError where the folder's runs do
-not allow its figure."""
 Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 """A figure, the table that it shows, its alternative text, and the tasks that it is about."""
 
@@ -90,7 +87,6 @@ def figure(
             return Plot(name, title, caption + dagger(tasks), alt, drawing, data)
 
         plot.__doc__ = draw.__doc__
-        FIGURES[name] = plot
         return plot
 
     return as_figure

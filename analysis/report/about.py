@@ -1,4 +1,4 @@
-"""The runs of a folder: how many, made with what and when, and what they cannot show."""
+"""What a folder answers, what its runs cannot show, and what they were made with."""
 
 from __future__ import annotations
 
@@ -8,10 +8,36 @@ from shlex import quote
 from typing import Any
 
 from coartic.analysis.methods import LEARNER, LEARNERS
+from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.paper.published import RUNS
-from coartic.analysis.words import RECONSTRUCTED, listed, marked
+from coartic.analysis.words import NO_BREAK, RECONSTRUCTED, listed, marked
 from coartic.learner.learning import TRIALS
+from coartic.text import one_line
+
+
+def shown(text: str) -> str:
+    """Text as one printable line, which does not break before a per cent sign."""
+    return one_line(text).replace(" %", f"{NO_BREAK}%")
+
+
+def visible_sections(study: Study) -> list[Section]:
+    """Sections but those about single tasks where these are many."""
+    return [section for section in SECTIONS if one_by_one(study) or not section.single]
+
+
+@cached
+def sentences(study: Study) -> dict[str, str]:
+    """What was found, by the section's id; without sections whose runs say nothing."""
+    visible = visible_sections(study)
+    texts = {each.id: each.sentence(study) for each in visible if each.sentence is not None}
+    return {name: shown(text) for name, text in texts.items() if text}
+
+
+def answers(study: Study) -> list[tuple[Section, str]]:
+    """Sections whose sentences are the answers of the first screen, with these."""
+    found = sentences(study)
+    return [(each, found[each.id]) for each in SECTIONS if each.answer and each.id in found]
 
 
 @cached
@@ -21,26 +47,20 @@ def limits(study: Study) -> dict[str, Any]:
     failed = runs[runs.status != "ok"]
     learners = [cell for cell in study.cells.values() if cell.method.startswith(LEARNER)]
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
-    of_paper = [len(cell.runs) for cell in learners if cell.method in LEARNERS]
-    fewest = min(of_paper, default=0)
-    tasks = {name: study.tasks[name] for name in study.tasks if name in one_by_one(study)}
-    optima = {name: study.optima.get(name) for name in tasks}
+    fewest = min((len(cell.runs) for cell in learners if cell.method in LEARNERS), default=RUNS)
+    tasks = [task for name, task in study.tasks.items() if name in one_by_one(study)]
+    optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
     return {
         "runs": len(runs),
         "failed": len(failed),
         "reasons": [f"{count} × {reason}" for reason, count in reasons],
-        "reconstructed": [task.label for task in tasks.values() if task.reconstructed],
-        "incumbent": tasks["two-armed-1"].label if "two-armed-1" in tasks else "",
+        "reconstructed": [task.label for task in tasks if task.reconstructed],
         "trials": sorted(trials) if trials != {TRIALS} else [],
-        "paper_trials": TRIALS,
         "few": fewest if fewest < RUNS else 0,
-        "paper_runs": RUNS,
         "seed": study.plan.seed,
-        "unproven": [
-            marked(tasks[name]) for name, best in optima.items() if best and not best.proven
-        ],
-        "unknown": [tasks[name].label for name, best in optima.items() if best is None],
+        "unproven": [marked(task) for task, best in optima if best and not best.proven],
+        "unknown": [task.label for task, best in optima if best is None],
         "side_by_side": bool(runs.together.fillna(1).max() > 1) if "together" in runs else False,
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],

@@ -1,33 +1,30 @@
-"""A report: one page, its tables and figures, numbers for a paper, and a summary.
+"""A report: one page, its tables and figures, and a summary.
 
 ``report.html`` stands alone; ``summary.md`` is its first screen, for code hosts; ``tables/`` has
-every table as CSV and LaTeX, ``figures/`` every figure as SVG and PDF, and ``numbers.tex`` the
-headline numbers as macros.
+every table as CSV and LaTeX, and ``figures/`` every figure as SVG and PDF.
 """
 
 from __future__ import annotations
 
 import os
 import re
+from functools import cache
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
-import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
-from coartic.analysis.report import about, text
-from coartic.analysis.report.contents import FIGURES, SECTIONS, TABLES
-from coartic.analysis.report.numbers import numbers_tex
+from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
-from coartic.analysis.report.text import answers, templates
-from coartic.analysis.section import Section
-from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.topics.paper.sentences import mostly_undecided, papers_claims
-from coartic.analysis.words import NONE, number
+from coartic.analysis.sections import FIGURES, SECTIONS
+from coartic.analysis.study import Study, cached
+from coartic.analysis.tables import TABLES
+from coartic.analysis.words import NONE, listed, number
 from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
@@ -55,7 +52,6 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
                 notes = about.notes_of(study, frame.columns)
                 files[f"tables/{name}.tex"] = latex_table(frame, name, caption, notes).encode()
     files["tables/notes.txt"] = about.notes_on_tables(study).encode()
-    files["numbers.tex"] = numbers_tex(study).encode()
     for name in FIGURES if for_paper else plots(study):
         if plot := plots(study).get(name) or draw_figure(study, name):
             for ending in (".svg", ".pdf") if for_paper else (".svg",):
@@ -98,39 +94,21 @@ def draw_figure(study: Study, name: str) -> Plot | None:
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    ids = [section.figure for section in visible_sections(study) if section.figure]
+    ids = [section.figure for section in about.visible_sections(study) if section.figure]
     return {name: plot for name in ids if (plot := draw_figure(study, name)) is not None}
 
 
-def visible_sections(study: Study) -> list[Section]:
-    """Sections but those about single tasks where these are many, and claims if none is decided."""
-    alone, claims = one_by_one(study), TABLES["claims"](study)
-    decided = ((claims.verdict != "undecided") & (claims.run_ids != "")).any()
-    return [
-        section
-        for section in SECTIONS
-        if (alone or not section.single) and (decided or section.id != "claims")
-    ]
-
-
-def finding(section: Section, study: Study) -> str:
-    """The sentence of a section; empty where the runs say nothing."""
-    return "" if section.finding is None else text.shown(section.finding(study))
-
-
-@cached
 def sections(study: Study) -> list[dict[str, Any]]:
     """Sections that the runs allow, as the template wants them.
 
     With their ``finding``; figure or table is None where the runs do not allow it.
     """
     allowed = []
-    for section in visible_sections(study):
-        plot = plots(study).get(section.figure)
-        frame = TABLES[section.table](study) if section.table else pd.DataFrame()
+    for section in about.visible_sections(study):
+        plot, frame = plots(study).get(section.figure), TABLES[section.table](study)
         if plot is None and not len(frame):
             continue
-        table = {
+        rows = {
             "html": html_table(frame, section.table, section.caption),
             "searched": len(frame) > SEARCHED,
             "long": len(frame) > LONG,
@@ -143,16 +121,35 @@ def sections(study: Study) -> list[dict[str, Any]]:
             "wide": inches > _PHONE,
             "width": f"{MAGNIFIED * inches * 72 / 12:.0f}",
         }
-        words = {"finding": finding(section, study), "rows": table, "figure": figure}
-        allowed.append({**vars(section), **words})
+        words = {
+            "finding": about.sentences(study).get(section.id, ""),
+            "rows": rows,
+            "figure": figure,
+        }
+        allowed.append(vars(section) | words)
     return allowed
+
+
+@cache
+def templates(*, escape: bool) -> Environment:
+    """The templates beside this file; ``escape``: for HTML."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        autoescape=escape,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        finalize=lambda value: about.shown(value) if type(value) is str else value,
+    )
+    environment.filters |= {"number": number, "listed": listed, "inert": inert}
+    return environment
 
 
 def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
     template = templates(escape=True).get_template("page.html.jinja")
-    ids = {section.id for section in visible_sections(study)}
     scripts = [(here / name).read_text("utf-8") for name in ("page.js", "address.js")]
     try:
         links = metadata("coartic").get_all("Project-URL") or []
@@ -160,11 +157,11 @@ def page(study: Study) -> str:
         links = []
     return template.render(
         title=title(study),
-        description=" ".join(answer["text"] for answer in answers(study)),
+        description=" ".join(text for _, text in about.answers(study)),
         styles=(here / "page.css").read_text("utf-8") + text_of("play.css"),
         player=player(study),
         script="\n".join(f"{{\n{script}}}" for script in scripts),
-        answers=[answer for answer in answers(study) if answer["id"] in ids],
+        answers=about.answers(study),
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
@@ -177,14 +174,15 @@ def page(study: Study) -> str:
 
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
-    texts = templates(escape=False)
-    texts.filters["inert"] = inert
-    template = texts.get_template("summary.md.jinja")
-    return template.render(
-        title=title(study),
-        answers=answers(study),
-        provenance=about.provenance(study),
-        figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
+    return (
+        templates(escape=False)
+        .get_template("summary.md.jinja")
+        .render(
+            title=title(study),
+            answers=about.answers(study),
+            provenance=about.provenance(study),
+            figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
+        )
     )
 
 
@@ -202,9 +200,6 @@ def claims_for_page(study: Study) -> list[dict[str, str]]:
     """Claims as the template wants them, by verdict."""
     order = get_args(Verdict)
     rows = TABLES["claims"](study).reset_index(names="id")
-    judged = papers_claims(study)
-    if len(judged) and mostly_undecided(judged):  # they lack their runs
-        rows = rows[(rows.verdict != "undecided") | (rows.run_ids != "")]
     return [
         {
             **{

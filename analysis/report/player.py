@@ -15,8 +15,7 @@ from coartic import Movement, Trajectory, execute
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
-from coartic.analysis.topics.comparison.scores import labels_by_task
-from coartic.analysis.topics.comparison.sentences import most_improved
+from coartic.analysis.topics.scores import labels_by_task
 from coartic.analysis.trajectories import postures
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS, Array
@@ -30,8 +29,7 @@ def player(study: Study) -> str:
     """The figure as HTML; empty where no run has a solution.
 
     Of each task it has, for each method of figures that moves straight, the run nearest its median
-    reward. It begins with one goal before two others if two tasks share one, else where the learner
-    gains most.
+    reward. It begins with one goal before two others if two tasks share one.
     """
     tasks = [name for name in study.tasks if name in one_by_one(study)]
     presets, first = [], ""
@@ -47,9 +45,6 @@ def player(study: Study) -> str:
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
     if not presets:
         return ""
-    if not first and (most := most_improved(study)) is not None and most[0][0] in alone:
-        (task, first), *_ = most
-        presets.sort(key=lambda preset: preset is not alone[task])
     ids = [run["id"] for run in presets[0]["runs"]]
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return figure(

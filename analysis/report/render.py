@@ -9,14 +9,13 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
-from string import ascii_lowercase
 from typing import Any
 
 import pandas as pd
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.table import COLUMNS, Column
-from coartic.analysis.words import NARROW_SPACE, NONE, RECONSTRUCTED, in_brackets, number
+from coartic.analysis.words import NARROW_SPACE, NONE, RECONSTRUCTED, in_brackets, latex, number
 from coartic.text import one_line
 
 _COMPANIONS = ("_low", "_high", "_sd")
@@ -29,19 +28,10 @@ TONES = {
     "depends on the goals": "open",
 }
 """Class of a verdict on the page, by its words."""
-PACKAGES = "% needs \\usepackage{booktabs} and \\usepackage[T1]{fontenc}"
+PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
-MOST_IN_A_COLUMN = 4
-"""Tasks of a ranking as wide as a journal's column."""
-_LATEX = str.maketrans(
-    {
-        **{sign: f"\\{sign}" for sign in "&%$#_{}"},
-        **{"~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "\\": "\\textbackslash{}"},
-        **{"†": "$\\dagger$", "−": "$-$", "–": "--", "∞": "$\\infty$", "±": "$\\pm$"},
-        **{"Δ": "$\\Delta$", "σ": "$\\sigma$", "ε": "$\\epsilon$", "↳": "", "\u202f": "\\,"},
-        **{"“": "``", "”": "''", "<": "$<$", ">": "$>$", "×": "$\\times$"},
-    }
-)
+FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
+"""Makes what follows as wide as the text where it is wider."""
 
 
 def column_of(name: str) -> Column:
@@ -86,23 +76,17 @@ def is_number(values: pd.Series) -> bool:
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
-def figures_of(frame: pd.DataFrame, name: str) -> list[float]:
-    """Numbers of a column as they are shown, NaN where there are none."""
-    values = pd.to_numeric(frame.get(name, pd.Series(math.nan, frame.index)))
-    return values.astype("Float64").to_numpy(float, na_value=math.nan).tolist()
-
-
 def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
     """The values of a column as text, with SDs and intervals that belong to them."""
     column = column_of(name)
     if not is_number(frame[name]):
         known = frame.attrs.get("methods", {}) if column.method else {}
         return [known.get(value) or word(value, column) for value in frame[name]]
+    columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
+    numbers = frame.reindex(columns=columns).apply(pd.to_numeric).astype("Float64")
+    scaled = (100.0 if column.percent else 1.0) * numbers.to_numpy(float, na_value=math.nan)
     texts = []
-    columns = (figures_of(frame, f"{name}{ending}") for ending in ("", "_low", "_high", "_sd"))
-    for values in zip(*columns, strict=True):
-        scale = 100.0 if column.percent else 1.0
-        value, low, high, sd = (scale * value for value in values)
+    for value, low, high, sd in scaled.tolist():
         spread = "" if math.isnan(sd) else f" ± {number(sd, column.digits)}"
         interval = in_brackets(low, high, column.digits)
         texts.append(f"{digits(value, column)}{spread} {interval}".strip())
@@ -168,20 +152,14 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
     """A table for a paper, with booktabs: what the page shows, numbers to the right.
 
-    ``notes`` stand below it, with what a dagger means where there is one. A ranking has the width
-    of a column (:func:`ranking_in_a_column`).
+    It is made smaller where it is wider than the text. ``notes`` stand below it, with what a dagger
+    means where there is one.
     """
-    groups: list[str] = []
-    if name == "ranking":
-        groups, frame, more = ranking_in_a_column(frame)
-        notes = [*more, *notes]
     columns = columns_of(frame)
     cells = {column: list(map(latex, texts_of(frame, column))) for column in columns}
-    shown = pd.DataFrame(cells).set_axis(list(columns.values()), axis="columns")
-    styler = shown.style.hide(axis="index").format_index(latex, axis="columns")
+    shown = pd.DataFrame(cells).set_axis(list(map(latex, columns.values())), axis="columns")
     sides = ["r" if is_number(frame[column]) else "l" for column in columns]
-    sides[:1] = ["p{40mm}"] if groups else sides[:1]
-    body = styler.to_latex(
+    body = shown.style.hide(axis="index").to_latex(
         hrules=True,
         column_format=f"@{{}}{''.join(sides)}@{{}}",
         caption=latex(caption),
@@ -189,49 +167,14 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
         position="tp",
         position_float="centering",
     )
-    if groups:
-        head, middle, rest = body.partition("\\midrule\n")
-        lines = rest.split("\n")
-        for place in reversed(range(len(groups))):
-            if groups[place] not in groups[:place]:
-                words = f"\\emph{{{latex(groups[place])}}}"
-                lines.insert(place, f"\\multicolumn{{{len(sides)}}}{{@{{}}l}}{{{words}}} \\\\")
-        body = head + middle + "\n".join(lines)
     if "$\\dagger$" in body or any("†" in note for note in notes):
         notes = [*notes, RECONSTRUCTED]
-    end, below = "\\end{tabular}", " ".join(map(latex, dict.fromkeys(notes)))
+    begin, end, below = "\\begin{tabular}", "\\end{tabular}", " ".join(map(latex, notes))
     if below:
         below = f"\n\n\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {below}}}"
-    small = "\\centering\n\\footnotesize\n\\setlength{\\tabcolsep}{2pt}"
-    body = body.replace("\\centering", small, 1).replace(end, f"{end}{below}", 1)
+    body = body.replace(begin, f"\\footnotesize\n{FITS}{begin}", 1)
+    body = body.replace(end, f"{end}}}{below}", 1)
     return f"{PACKAGES}\n{body}"
-
-
-def ranking_in_a_column(frame: pd.DataFrame) -> tuple[list[str], pd.DataFrame, list[str]]:
-    """A ranking as wide as a journal's column: the group of each row, the rows, and notes.
-
-    Methods with a gap over all tasks by their use of the reward. Tasks go by letters, and the
-    notes have runs.
-    """
-    rows = frame[frame.gap.notna()] if frame.gap.notna().any() else frame
-    groups = list(dict.fromkeys(rows.knows))
-    rows = rows.sort_values("knows", key=lambda uses: uses.map(groups.index), kind="stable")
-    tasks = [name for name in rows.columns if name.startswith("on ")]
-    tasks = tasks if len(tasks) <= MOST_IN_A_COLUMN else []
-    letters = dict(zip(tasks, ascii_lowercase, strict=False))
-    narrow = rows[["method", "gap", "gap_low", "gap_high", *tasks]].copy()
-    narrow.attrs = {**frame.attrs, "headers": {"gap": "gap", **letters}}
-    least, most = rows.runs.min(), rows.runs.max()
-    known = frame.attrs.get("tasks", {})
-    of_tasks = "; ".join(f"{k}: {known.get(name[3:], name[3:])}" for name, k in letters.items())
-    over = f"Mean over tasks; {of_tasks}." if of_tasks else "Mean over tasks."
-    n = number(least) if least == most else f"{number(least)} to {number(most)}"
-    return list(rows.knows), narrow, [over, f"n = {n} runs of each method."]
-
-
-def latex(text: object) -> str:
-    """Text with everything escaped that LaTeX would read as its own."""
-    return one_line(str(text)).translate(_LATEX)
 
 
 def csv_table(frame: pd.DataFrame) -> str:

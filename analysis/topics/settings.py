@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
-import numpy as np
-import pandas as pd
-
-from coartic.analysis.section import Section
 from coartic.analysis.settings import compares_settings, name_in, varied
 from coartic.analysis.statistics.estimates import LEVEL, interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.words import interval_in_words, marked, number, plural
+from coartic.analysis.words import interval_in_words, marked, number
 
 MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
@@ -49,51 +44,20 @@ def settings(study: Study) -> Rows:
             yield f"{task} {cell.label}", row | runs_of(cell)
 
 
-def answer_settings(study: Study) -> str:
+def best_settings(study: Study) -> str:
     """The best setting of each task, and whether it is surely better than the next."""
-    rows = settings(study)
-    tasks = list(dict.fromkeys(rows.task))
-    best = rows[~rows.task.duplicated()]
-    if len(tasks) > MOST_TASKS:
-        counts = best.method.map(partial(setting_in, study)).value_counts()
-        most = "; ".join(f"{name} on {count}" for name, count in counts.items())
-        return f"Best on {plural(len(tasks), 'task')}: {most}."
-    return " ".join(on_task(study, rows[rows.task == task]) for task in tasks)
-
-
-def setting_in(study: Study, label: str) -> str:
-    """A setting in words: the values alone where one method has settings."""
-    name = name_in(study, label)
-    alone = len({label.partition(" ")[0] for label in settings(study).method}) == 1
-    return name.partition(" (")[2].removesuffix(")") if alone else name
-
-
-def on_task(study: Study, rows: pd.DataFrame) -> str:
-    """A sentence on the settings of a task."""
-    first, *others = rows.to_dict("records")
-    reward = interval_in_words(first, "reward")
-    text = f"{first['task']}: {setting_in(study, first['method'])}: {reward} ticks"
-    if not others:
-        return f"{text}."
-    p = np.array([row["p_holm"] for row in others])
-    after = f"next {setting_in(study, others[0]['method'])}: {number(others[0]['reward'], 1)}"
-    if (p < LEVEL).all():
-        return f"{text}, significantly better than all others; {after}."
-    if not np.isfinite(p).sum() * others[0]["least_p"] < LEVEL:
-        return f"{text}; {after}; the runs are too few, or too alike, to tell."
-    surely = "significantly worse" if p[0] < LEVEL else "no significant difference"
-    return f"{text}; {after}, {surely}."
-
-
-SETTINGS = Section(
-    "settings",
-    short="Settings",
-    title="Which setting is best?",
-    caption="Mean reward of each setting (ticks), the best of each task first",
-    finding=answer_settings,
-    table="settings",
-    note=(
-        "Behind: ticks behind the best setting of the task. p is corrected for the settings of "
-        "the task (Holm)."
-    ),
-)
+    rows, texts = settings(study), []
+    for task, of_task in rows.groupby("task", sort=False):
+        first, *others = of_task.to_dict("records")
+        best = name_in(study, first["method"])
+        text = f"{task}: {best}, {interval_in_words(first, 'reward')} ticks"
+        if others:
+            second = others[0]
+            surely = "significant" if second["p_holm"] < LEVEL else "no significant difference"
+            if not of_task.p_holm.count() * second["least_p"] < LEVEL:
+                surely = "the runs are too few, or too alike, to tell"
+            next_best = name_in(study, second["method"])
+            text += f"; next {next_best}, {number(second['reward'], 1)} ({surely})"
+        texts.append(f"{text}.")
+    more = len(texts) - MOST_TASKS
+    return " ".join(texts[:MOST_TASKS]) + (f" And {more} more in the table." if more > 0 else "")

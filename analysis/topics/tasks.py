@@ -13,12 +13,11 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import LEARNER
-from coartic.analysis.section import Section
 from coartic.analysis.statistics.estimates import interval, mean
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.comparison.scores import best_condition
 from coartic.analysis.topics.paper.published import published_cell
+from coartic.analysis.topics.scores import best_condition
 from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
@@ -57,7 +56,7 @@ def tasks(study: Study) -> Rows:
     "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
     "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
-def start_and_goals(study: Study) -> Parts:
+def draw_start_and_goals(study: Study) -> Parts:
     """Start configuration and goals of each task, one panel for each."""
     shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
     if not shown:
@@ -118,19 +117,3 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
     goal = style.entry("goal", linestyle="", color=style.INK, **circle)
     style.legend(drawing, [*arms, goal], 3)
     return drawing
-
-
-TASKS = Section(
-    "tasks",
-    short="Tasks",
-    title="What are the tasks?",
-    caption="Tasks with their initial, learned and best possible rewards (ticks)",
-    figure="tasks",
-    table="tasks",
-    note=(
-        "Initial: the corrective process alone, with the task's initial hands. Learned: the "
-        "learner's best condition. Best known: the optimum where the proven bound equals it. "
-        "Proven bound: a reward that no solution can exceed."
-    ),
-    single=True,
-)

@@ -57,10 +57,9 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
 
 def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
     """What a folder answers, and why runs failed if some did: word and text."""
-    from coartic.analysis.report.about import limits
-    from coartic.analysis.report.text import answers
+    from coartic.analysis.report.about import answers, limits
 
-    yield from ((answer["word"], answer["text"]) for answer in answers(study))
+    yield from ((section.answer, text) for section, text in answers(study))
     what = limits(study)
     if what["failed"]:
         yield "Failed", f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"

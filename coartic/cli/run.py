@@ -83,7 +83,6 @@ def run(
             plan, out, executor=executor, retry_failed=retry_failed, watch=display.update
         )
     say(str(report))
-    import coartic.analysis.report.contents  # noqa: F401  # answers read its tables
     from coartic.analysis.study import load
 
     pairs = answers_in_words(load(report.folder))

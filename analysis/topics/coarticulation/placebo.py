@@ -17,13 +17,13 @@ from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
-from coartic.analysis.topics.comparison.scores import BY_TRIAL, group_of
+from coartic.analysis.topics.scores import BY_TRIAL, groups
 
 
 def selects(study: Study, label: str) -> bool:
     """Whether a method's solution may be one of many trials, selected by its reward."""
     method = label.partition(" ")[0]
-    return method != PLACEBO and group_of(study, label) == BY_TRIAL
+    return method != PLACEBO and groups(study)[label] == BY_TRIAL
 
 
 def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:

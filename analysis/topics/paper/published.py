@@ -19,7 +19,6 @@ from coartic.analysis.words import number
 from coartic.inputs import FileData
 
 HandSequence = Annotated[str, Field(pattern="^[LR]+$")]
-Role = Literal["setting", "constraint", "test"]
 
 
 class Solved(FileData):
@@ -32,13 +31,18 @@ class Solved(FileData):
     hands: HandSequence | None = None
 
 
-class PrintedEntry(Solved):
-    """What every entry says."""
+class Printed(Solved):
+    """An entry. Which fields it has beside the first ones depends on its kind.
+
+    A ``constant`` (length unit, rad), a ``reward``, an ``sd`` and a ``count`` are numbers. A
+    reward of the corrective process is one reward, else it is a mean; a ``gain`` is a mean reward
+    less that of ``than``, and an ``order`` says that it is above (less negative than) that.
+    """
 
     id: str
     task: str | None
     """None: the model, or every task."""
-    role: Role
+    role: Literal["setting", "constraint", "test"]
     """A ``constraint`` may select what the paper does not print, a ``test`` never does."""
     quote: str
     """Words of the paper."""
@@ -48,58 +52,24 @@ class PrintedEntry(Solved):
     """Claims of the register that judge it."""
     sample: bool = False
     """Said of a sample run, not of all."""
-
-
-class PrintedNumber(PrintedEntry):
-    """A constant (length unit, rad), or a reward, SD or number of runs.
-
-    A ``gain`` is a mean reward less that of ``than``. A reward of the corrective process is one
-    reward, else it is a mean.
-    """
-
-    kind: Literal["constant", "reward", "sd", "count", "gain"]
-    value: Decimal
-    """The number with its printed decimals."""
-    rounding: float
+    kind: Literal[
+        "constant", "reward", "sd", "count", "gain", "order", "best of all sequences",
+        "initial hands", "hand sequences", "base", "layout", "goals", "posture", "lock", "context",
+        "statement",
+    ]  # fmt: skip
+    value: Decimal | None = None
+    """Of a number: it with its printed decimals."""
+    rounding: float = 0.0
     """The value's half-width as printed: half a unit of its last decimal, more where derived."""
     difference_of: tuple[str, ...] = ()
     """Entries from which the value is computed, first less second; none: it is printed."""
     than: Solved | None = None
-
-    @property
-    def digits(self) -> int:
-        """Decimals that are printed."""
-        return max(0, -int(self.value.as_tuple().exponent))
-
-    @property
-    def number(self) -> float:
-        """The value; an integer where no decimals are printed."""
-        return float(self.value) if self.digits else int(self.value)
-
-    @property
-    def in_words(self) -> str:
-        """The value, which says whether it was derived."""
-        return printed_words(self.number, bool(self.difference_of))
-
-
-class PrintedOrder(PrintedEntry):
-    """The mean reward is above (less negative than) that of ``than``."""
-
-    kind: Literal["order"]
-    than: Solved
     p_below: Decimal | None = None
-    """Printed bound of the one-tailed bootstrap test's p-value, where one is."""
+    """Order: printed bound of the one-tailed bootstrap test's p-value, where one is."""
     goal: int | None = None
-    """Compared is the movement to this goal alone."""
-
-
-class PrintedFact(PrintedEntry):
-    """Anything else; which fields an entry has depends on its kind."""
-
-    kind: Literal[
-        "best of all sequences", "initial hands", "hand sequences", "base", "layout", "goals",
-        "posture", "lock", "context", "statement",
-    ]  # fmt: skip
+    """Order: compared is the movement to this goal alone. Context: the learned configuration at
+    this goal is another one than in ``other_task``."""
+    other_task: str | None = None
     sequences: tuple[HandSequence, ...] = ()
     """Hand sequences: every one that is named; the paper names no other."""
     mixed: bool = False
@@ -127,12 +97,24 @@ class PrintedFact(PrintedEntry):
     """Posture at the start. In a steeple the arms are up and the hands at one point."""
     locked_base: tuple[Literal["x", "y"], ...] = ()
     """Lock: coordinates in which the base cannot move."""
-    goal: int | None = None
-    """Context: the learned configuration at this goal is another one than in"""
-    other_task: str | None = None
-    """that task."""
     text: str = ""
     """Statement: what is said in words only."""
+
+    @property
+    def digits(self) -> int:
+        """Decimals that are printed."""
+        return max(0, -int((self.value or Decimal()).as_tuple().exponent))
+
+    @property
+    def number(self) -> float:
+        """The value; an integer where no decimals are printed."""
+        value = self.value or Decimal()
+        return float(value) if self.digits else int(value)
+
+    @property
+    def in_words(self) -> str:
+        """The value, which says whether it was derived."""
+        return printed_words(self.number, bool(self.difference_of))
 
 
 def printed_words(value: float, derived: bool) -> str:
@@ -140,7 +122,7 @@ def printed_words(value: float, derived: bool) -> str:
     return f"{number(value)}{' (derived)' * derived}"
 
 
-def parse_entries(text: str) -> dict[str, PrintedNumber | PrintedOrder | PrintedFact]:
+def parse_entries(text: str) -> dict[str, Printed]:
     """Entries by id from the text of a table such as ``published.toml``, in its order."""
     rows: dict[str, dict[str, Any]] = {}
     for task, entries in tomllib.loads(text, parse_float=Decimal).items():
@@ -161,11 +143,10 @@ def parse_entries(text: str) -> dict[str, PrintedNumber | PrintedOrder | Printed
             row["rounding"] = (
                 0.0 if row["kind"] == "count" else first["rounding"] + second["rounding"]
             )
-    kinds = Annotated[PrintedNumber | PrintedOrder | PrintedFact, Field(discriminator="kind")]
-    return TypeAdapter(dict[str, kinds]).validate_python(rows)
+    return TypeAdapter(dict[str, Printed]).validate_python(rows)
 
 
-ENTRIES: Mapping[str, PrintedNumber | PrintedOrder | PrintedFact] = parse_entries(
+ENTRIES: Mapping[str, Printed] = parse_entries(
     Path(__file__).with_name("published.toml").read_text("utf-8")
 )
 """Every entry by id, in the paper's order of tasks."""
@@ -173,9 +154,7 @@ ENTRIES: Mapping[str, PrintedNumber | PrintedOrder | PrintedFact] = parse_entrie
 
 def constant(name: str) -> float:
     """A general constant that the paper prints; KeyError for another."""
-    entry = ENTRIES[f"general.{name}"]
-    assert isinstance(entry, PrintedNumber)
-    return entry.number
+    return ENTRIES[f"general.{name}"].number
 
 
 RUNS = int(constant("runs"))
@@ -193,8 +172,6 @@ class Summary(NamedTuple):
     """Runs with the hand sequence, where their number stands beside the mean."""
     derived: bool = False
     """Computed from other printed numbers rather than printed itself."""
-    digits: int = 0
-    """Decimals of the mean as it is printed."""
     derived_runs: bool = False
     """Whether the number of runs is computed from another."""
 
@@ -213,17 +190,17 @@ class PublishedCell(NamedTuple):
     """Runs by hand sequence, where the paper tells them apart."""
 
 
-def published_initial(task: str) -> PrintedNumber | None:
+def published_initial(task: str) -> Printed | None:
     """Reward of the initial solution of a task; None where the paper prints nothing of it."""
     return _corrective(task, "initial hands")
 
 
-def published_exhaustive(task: str) -> PrintedNumber | None:
+def published_exhaustive(task: str) -> Printed | None:
     """The best over all hand sequences."""
     return _corrective(task, "best of all sequences")
 
 
-def _corrective(task: str, kind: str) -> PrintedNumber | None:
+def _corrective(task: str, kind: str) -> Printed | None:
     for entry in ENTRIES.values():
         if (entry.kind, entry.task) == (kind, task):
             return _number("reward", task, None, entry.hands)
@@ -243,10 +220,9 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
             runs = None if count is None else int(count.number)
             summaries[entry.hands] = Summary(
                 entry.number,
-                None if sd is None else float(sd.value),
+                None if sd is None else float(sd.number),
                 RUNS if runs is None else runs,
                 RUNS if entry.hands is None else runs,
-                digits=entry.digits,
                 derived_runs=count is not None and bool(count.difference_of),
             )
     sequences = {hands: summary for hands, summary in summaries.items() if hands}
@@ -268,9 +244,9 @@ def pooled(parts: list[Summary]) -> Summary | None:
     return Summary(mean, math.sqrt(squares / (runs - 1)), runs, derived=True)
 
 
-def _number(kind: str, task: str, condition: str | None, hands: str | None) -> PrintedNumber | None:
+def _number(kind: str, task: str, condition: str | None, hands: str | None) -> Printed | None:
     for entry in ENTRIES.values():
         about = entry.kind, entry.task, entry.condition, entry.hands
-        if isinstance(entry, PrintedNumber) and about == (kind, task, condition, hands):
+        if about == (kind, task, condition, hands):
             return entry
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,14 @@ from matplotlib.patheffects import withStroke
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
-from coartic.analysis.methods import name_of
+from coartic.analysis.methods import is_variant, name_of
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
+from coartic.analysis.topics.coarticulation.placebo import difference
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
+from coartic.analysis.topics.coarticulation.tables import contexts
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.words import number, p_value, plural
 from coartic.drawing import MARKERS
 
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
@@ -27,7 +32,7 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
     "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
-def one_goal_two_postures(study: Study) -> Parts:
+def draw_two_postures(study: Study) -> Parts:
     """The postures at one goal before two others, overlaid: all runs faint, their means strong."""
     shared = shared_goal(study)
     if shared is None:
@@ -97,3 +102,45 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
     axes.annotate("1 length unit", (x, y), (0, -2), va="top", **words)
     here = f"goal {shared.goal},\nthe same"
     axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)
+
+
+def next_goal(study: Study) -> str:
+    """Whether the posture at the goal that two tasks share depends on the next goal."""
+    found = difference(study)
+    if found is None:
+        return ""
+    shared, placebo = found.contexts, found.placebo
+    goal, runs = shared.goal, plural(shared.n, "run")
+    who = f"{name_of(shared.method)} hits goal {goal} in postures"
+    spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
+    p = ", ".join(filter(None, (runs, p_value(shared.p))))
+    apart = f"{spreads}{number(shared.apart, 2)} (length units, rad) apart ({p})"
+    guesses = placebo and f"{number(placebo.apart, 2)} apart ({p_value(found.beyond_p)})"
+    if found.too_few:
+        text = (
+            f"Too few runs to tell whether the next goal changes postures at goal {goal} ({runs})."
+        )
+    elif not found.differ:
+        text = f"No significant difference: the {who} {apart}."
+    elif found.seen:
+        beside = f"; random guesses lie {guesses}" if guesses else ""
+        text = f"Yes: depending on the next goal, the {who} {apart}{beside}."
+    elif guesses:
+        text = f"Not shown: the {who} {apart}; random guesses lie {guesses}."
+    else:
+        text = (
+            f"Undecided: the {who} {apart}, and no placebo with as many trials ran. Add the method "
+            "placebo/guesses."
+        )
+    cells = [(task.name, shared.method) for task in shared.tasks]
+    return text + failed_runs(study, cells, " and are not counted")
+
+
+def joints_or_hand(study: Study) -> str:
+    """In how many methods the next goal changes more of what leaves the hand in place."""
+    rows = contexts(study)
+    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
+    if not len(rows):
+        return ""
+    larger = int((rows.equivalent > rows.other).sum())
+    return f"In {larger} of {len(rows)} methods the next goal moves the joints more than the hand."

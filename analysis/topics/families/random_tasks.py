@@ -1,15 +1,18 @@
-"""Tables of families of random tasks."""
+"""What holds on random tasks: gaps, more exploration against less, signs of coarticulation."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.methods import (
     EC1,
     EC2,
@@ -21,13 +24,15 @@ from coartic.analysis.methods import (
     is_variant,
     name_of,
 )
+from coartic.analysis.optima import gap_share
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.estimates import LEVEL, interval
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.statistics.instances import Scores, other_tasks, value
-from coartic.analysis.study import Study, cached
+from coartic.analysis.statistics.instances import other_tasks, value
+from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.instances import THERE, Sample, sample, scores_of
+from coartic.analysis.topics.families.instances import THERE, sample, scores_of
+from coartic.analysis.words import interval_in_words, number
 from coartic.robot import Array
 
 OfFamily = TypeVar("OfFamily")
@@ -45,6 +50,9 @@ INITIAL_SOLUTION = "the initial solution"
 """How the column of contrasts names it."""
 ALL = "all"
 """What stands in the column of families for the mean over all of them, each counting alike."""
+MOST_GAPS = 4
+"""Methods whose gaps a sentence tells."""
+_FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 
 
 @table("method, instances, gap[], to_bound[], in *")
@@ -78,37 +86,6 @@ def family_gaps(study: Study) -> Rows:
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
 
 
-def gains(instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]) -> Scores:
-    """Rewards of both as shares of the best known, by family: what the first gains."""
-
-    def share(name: str, label: str) -> Array:
-        gap = instances.gap(name, label)
-        assert gap is not None  # of shared instances
-        return -gap
-
-    return {
-        family: [(share(name, first), share(name, second)) for name in of_family]
-        for family, of_family in names.items()
-    }
-
-
-def gains_by_hands(
-    instances: Sample, first: str, second: str, names: dict[str, tuple[str, ...]]
-) -> Scores:
-    """The part of it that the hand sequences make: as if each run got the best that is known with
-    its hands. The rest is what joints make of them."""
-
-    def share(name: str, label: str) -> Array:
-        best_by_hands, best = instances.by_hands[name], instances.references[name].reward
-        hands = instances.study.cells[name, label].good.hands
-        return np.array([best_by_hands[str(sequence)] for sequence in hands]) / abs(best)
-
-    return {
-        family: [(share(name, first), share(name, second)) for name in of_family]
-        for family, of_family in names.items()
-    }
-
-
 def told_apart(first: Array, second: Array) -> bool:
     """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
     if not np.ptp(first) and not np.ptp(second):
@@ -125,26 +102,44 @@ def each_and_all(by_family: dict[str, OfFamily]) -> Iterator[tuple[str, dict[str
         yield ALL, by_family
 
 
-def family_runs(study: Study, family: str, labels: Iterable[str]) -> Row:
-    """Ids of the runs of methods on the instances of a family, or of all."""
-    return runs_of(
-        *(
-            cell
-            for (task, label), cell in study.cells.items()
-            if label in labels and (family == ALL or study.tasks[task].family == family)
-        )
-    )
+def family_cells(study: Study, family: str, labels: Iterable[str]) -> list[CellRuns]:
+    """Cells of methods on the instances of a family, or of all."""
+    return [
+        cell
+        for (task, label), cell in study.cells.items()
+        if label in labels and (family == ALL or study.tasks[task].family == family)
+    ]
 
 
 @table("contrast, family, instances, gain[], median, by_hands[], better, worse, told_apart")
 def exploration(study: Study) -> Rows:
-    """More exploration against less, by family and over all of them."""
+    """More exploration against less, by family and over all of them.
+
+    ``gain``: of rewards, as a share of the best known. ``by_hands``: the part of it that the hand
+    sequences make, as if each run got the best that is known with its hands; the rest is what
+    joints make of them.
+    """
     instances = sample(study)
+
+    def share(cell: CellRuns) -> Array:
+        return -gap_share(cell.rewards, instances.references[cell.task].reward)
+
+    def share_by_hands(cell: CellRuns) -> Array:
+        best_of, best = instances.by_hands[cell.task], instances.references[cell.task].reward
+        return np.array([best_of[str(hands)] for hands in cell.good.hands]) / abs(best)
+
     for first, second in CONTRASTS:
         less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
         contrast = f"{name_of(first)} over {less}"
         for family, names in each_and_all(instances.shared(first, second)):
-            scores = gains(instances, first, second, names)
+            cells = {
+                of: [(study.cells[name, first], study.cells[name, second]) for name in of_family]
+                for of, of_family in names.items()
+            }
+            scores, by_hands = (
+                {of: [(measure(a), measure(b)) for a, b in pairs] for of, pairs in cells.items()}
+                for measure in (share, share_by_hands)
+            )
             of_instances = [runs for of_family in scores.values() for runs in of_family]
             # Equal means of different runs may differ in the last bit.
             values = np.array(list(map(value, of_instances))).round(12)
@@ -154,13 +149,11 @@ def exploration(study: Study) -> Rows:
                 "instances": len(values),
                 **interval("gain", other_tasks(scores)),
                 "median": float(np.median(values)),
-                **interval(
-                    "by_hands", other_tasks(gains_by_hands(instances, first, second, names))
-                ),
+                **interval("by_hands", other_tasks(by_hands)),
                 "better": int((values > 0).sum()),
                 "worse": int((values < 0).sum()),
                 "told_apart": sum(told_apart(*runs) for runs in of_instances),
-                **family_runs(study, family, (first, second)),
+                **runs_of(*family_cells(study, family, (first, second))),
             }
             yield f"{contrast}, {family}", row
 
@@ -179,7 +172,7 @@ def family_signs(study: Study) -> Rows:
                 "instances": len(means),
                 "there": sum(mean > THERE[sign] for mean in means),
                 **interval("mean", other_tasks(scores)),
-                **family_runs(study, family, (label,)),
+                **runs_of(*family_cells(study, family, (label,))),
             }
             yield f"{sign}, {label}, {family}", row
 
@@ -204,3 +197,82 @@ def instance_gaps(study: Study) -> pd.DataFrame:
             ]  # fmt: skip
     columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
     return pd.DataFrame(rows, columns=columns)
+
+
+@figure(
+    "gaps-by-family",
+    "Gap to the best known reward, by family",
+    "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond; "
+    "gaps above 100 % stand at the right end. Diamonds: mean over instances with its "
+    f"{style.COVERAGE} interval about other tasks of the family (bootstrap over instances and "
+    "runs).",
+)
+def draw_gaps_by_family(study: Study) -> Parts:
+    """Gap to the best known reward of each instance, by method and family."""
+    data = instance_gaps(study)
+    if not len(data):
+        raise missing(study, "no solved runs on instances of a family of tasks")
+    order = data.groupby("method").gap.mean().sort_values().index.tolist()
+    looks = looks_in(study, order)
+    families = list(dict.fromkeys(data.family))
+    size = style.TWO, 0.9 + 0.19 * len(order)
+    drawing, panels = style.panels((1, len(families)), size, sharey=True)
+    for axes, family in zip(panels, families, strict=True):
+        for place, label in enumerate(order):
+            rows = data[(data.method == label) & (data.family == family)]
+            rows = rows.assign(gap=rows.gap.clip(upper=_FARTHEST))
+            draw_instances(axes, -place, rows, "gap", looks[label]["color"])
+        axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
+        axes.set_xlim(-0.004, _FARTHEST * 1.15)
+        axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
+        axes.minorticks_off()
+        axes.set_title(family.partition("/")[0])
+    style.name_rows(panels[0], [name_of(label) for label in order])
+    panels[len(panels) // 2].set_xlabel("gap to the best known reward (%)")
+    style.letters(panels)
+    means = spoken(data.drop_duplicates(["method", "family"]), "{method}, {family}: {mean:.1%}")
+    return drawing, data, f"Gaps of instances by method and family. {means}.", ()
+
+
+def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: str) -> None:
+    """A dot for each instance about a height, and on it their mean with its interval."""
+    if not len(rows):
+        return
+    heights = y + 0.11 * (np.arange(len(rows)) % 3 - 1)
+    dot: Any = {"color": color, "markersize": 2.5, "alpha": 0.5, "markeredgewidth": 0}
+    axes.plot(rows[name], heights, "o", linestyle="", **dot)
+    first = rows.iloc[0]
+    axes.plot([first.mean_low, first.mean_high], [y, y], color=style.INK, linewidth=1)
+    diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
+    axes.plot(first["mean"], y, "D", color=style.INK, **diamond)
+
+
+def on_random_tasks(study: Study) -> str:
+    """How far the nearest methods end from the best known reward, over families with two arms."""
+    instances = sample(study)
+    gaps = family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
+    if not len(gaps):
+        return ""
+    ends = [
+        f"{'the learner' if row['method'] == 'learner' else name_of(row['method'])} "
+        f"{number(100 * row['gap'], 1)} %"
+        for row in gaps.to_dict("records")
+    ]
+    proven = sum(reference.proven for reference in instances.references.values())
+    return (
+        f"Gaps to the best known reward on {len(instances.references)} random tasks: "
+        f"{', '.join(ends)} (mean over families with two arms). It is proven to be the optimum on "
+        f"{proven} of them."
+    )
+
+
+def exploration_pays(study: Study) -> str:
+    """What each condition gains on the one below it, over all families."""
+    rows = exploration(study)
+    initial = rows.contrast.astype(str).str.endswith(INITIAL_SOLUTION)
+    gains = [
+        f"{row['contrast']} {interval_in_words(row, 'gain', scale=100, unit=' %')}, better on "
+        f"{row['better']} of {row['instances']} tasks"
+        for row in rows[(rows.family == ALL) & ~initial].to_dict("records")
+    ]
+    return f"Gains over all families: {'; '.join(gains)}." if gains else ""

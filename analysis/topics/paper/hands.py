@@ -1,101 +1,63 @@
-"""The paper beside our runs: mean rewards, and shares of hand sequences."""
+"""Which hands are chosen: sequences of ours, and of the paper's runs."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import main_methods, name_of
-from coartic.analysis.statistics.equivalence import MARGIN
-from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.topics.paper.tables import hand_shares, published_differences
-from coartic.analysis.words import marked
-from coartic.learner.learning import TRIALS
-
-_MARKS = {
-    "equivalent": (style.BLUE, "o", style.BLUE),
-    "undecided": (style.INK, "s", style.BACKGROUND),
-    "different": (style.VERMILLION, "D", style.VERMILLION),
-    "": (style.INK, "x", style.INK),
-}
-
-
-@figure(
-    "published",
-    "Published and ours",
-    f"Our mean learned reward minus the published one, with its {style.COVERAGE} interval. Grey: "
-    f"margin of equivalence, ±{100 * MARGIN:.0f} % of the published reward. Filled circles: the "
-    "interval lies within the margin (equivalent). Open squares: it crosses the margin "
-    "(undecided). Diamonds: it lies outside (different). ↳: runs with one hand sequence; in "
-    "brackets, how many of our runs have it, then how many of the published ones. * pooled from "
-    "several printed sequences.",
-)
-def draw_published(study: Study) -> Parts:
-    """Difference of every mean reward to the printed one, with interval and margin."""
-    data = published_differences(study)
-    if not len(data):
-        raise missing(
-            study, f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
-        )
-    drawing = Figure(figsize=(style.ONE, 0.85 + 0.185 * len(data)), layout="constrained")
-    tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
-    rows = data.to_dict("records")
-    names = []
-    for row in rows:
-        if row["hands"]:
-            runs = row["published_runs"]
-            printed = "" if runs is None or math.isnan(runs) else f"; {runs:.0f}"
-            names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
-        else:
-            pooled = "*" if row["pooled"] else ""
-            name = marked(tasks[row["task"]])
-            names.append(f"{name}, {name_of(row['method'])}{pooled}")
-    axes = drawing.subplots()
-    for place, row in enumerate(rows):
-        draw_row(axes, -place, row)
-    axes.axvline(0, color=style.INK, linewidth=0.6)
-    style.name_rows(axes, names)
-    axes.spines["left"].set_visible(False)
-    # Symmetric about zero: wide enough for every interval and margin.
-    ends = ["difference", "difference_low", "difference_high", "margin"]
-    reach = np.nanmax(np.abs(data.reindex(columns=ends).to_numpy(float)))
-    axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (ticks)")
-    words = "; ".join(
-        f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
-        + f": {row['difference']:+.1f}"
-        for row in rows
-        if row["runs"]
-    )
-    alt = f"Differences of our mean rewards to the published ones, with intervals. {words}."
-    return drawing, data, alt, tasks.values()
-
-
-def draw_row(axes: Axes, y: float, row: Any) -> None:
-    """Margin, interval and difference of one comparison."""
-    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.2)
-    color, marker, face = _MARKS[row["verdict"] if row["runs"] > 1 else ""]
-    if not row["runs"]:
-        axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)
-        return
-    low, high = row["difference_low"], row["difference_high"]
-    if not math.isnan(low):
-        axes.plot([low, high], [y, y], color=color, linewidth=1.0)
-    axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
-
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import Rows, table
+from coartic.analysis.topics.paper.published import RUNS
+from coartic.analysis.topics.paper.rewards import beside_paper, named, published_of
+from coartic.analysis.topics.scores import best_condition
+from coartic.analysis.words import listed, marked
 
 COLOURED = len(style.PALETTE)
 """Sequences of a task that have a colour; the rarer ones share grey."""
 _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
+
+
+@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
+def hands(study: Study) -> Rows:
+    """Learned rewards by hand sequence, published and ours, where there are several."""
+    for row in beside_paper(study):
+        cell, name = row["cell"], named(study, row["cell"])
+        if row["hands"]:
+            ids = cell.good.run_id[cell.good.hands == row["hands"]]
+            behind = {"run_ids": " ".join(map(str, ids))}
+            yield f"{cell.task} {name['condition']} {row['hands']}", row | name | behind
+
+
+@cached
+def hand_shares(study: Study) -> pd.DataFrame:
+    """Shares of hand sequences on tasks with two hands, of every cell with a solved run.
+
+    Columns ``task``, ``method``, ``source`` (``ours``, or ``published`` where the paper prints the
+    runs of every sequence), ``hands``, ``runs``, ``share``; the commonest sequence first.
+    """
+    rows: list[tuple[str, str, str, str, int]] = []
+    for (task, label), cell in study.cells.items():
+        if len(study.tasks[task].hands) > 1 and len(cell.good):
+            counts = cell.good.hands.value_counts()
+            rows += [(task, label, "ours", str(name), int(n)) for name, n in counts.items()]
+            paper = published_of(cell)
+            printed = paper.sequences if paper else {}
+            if sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS:
+                rows += [
+                    (task, label, "published", name, summary.runs)
+                    for name, summary in printed.items()
+                    if summary.printed_runs
+                ]
+    frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
+    totals = frame.groupby(["task", "method", "source"]).runs.transform("sum")
+    return frame.assign(share=frame.runs / totals)
 
 
 @figure(
@@ -163,3 +125,18 @@ def draw_bars(
     axes.set_xlabel("share of runs")
     axes.spines["left"].set_visible(False)
     axes.set_title(marked(task))
+
+
+def changed_hands(study: Study) -> str:
+    """On which tasks the learner's best condition ends with other hands than it began with."""
+    changes = []
+    for name, task in study.tasks.items():
+        label = best_condition(study, name)
+        good = study.cells[name, label].good if label else None
+        if good is not None and good.initial_hands.notna().any():
+            before, commonest = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
+            if before not in commonest:
+                changes.append(f"on {marked(task)} from {before} to {' or '.join(commonest)}")
+    if not changes:
+        return "The learner keeps the hands of the initial solution."
+    return f"The learner changes hands {listed(changes)}."

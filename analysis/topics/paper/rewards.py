@@ -1,14 +1,17 @@
-"""Tables of the paper's numbers and claims beside ours."""
+"""Learned rewards beside those that the paper prints."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
-from coartic.analysis.claims.judgements import CLAIMS, judgements
-from coartic.analysis.methods import LEARNER, LEARNERS
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.methods import LEARNER, LEARNERS, name_of
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import interval, standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
@@ -19,8 +22,15 @@ from coartic.analysis.topics.paper.published import (
     published_cell,
     published_initial,
 )
-from coartic.analysis.words import marked
+from coartic.analysis.words import interval_in_words, marked
 from coartic.learner.learning import TRIALS
+
+_MARKS = {
+    "equivalent": (style.BLUE, "o", style.BLUE),
+    "undecided": (style.INK, "s", style.BACKGROUND),
+    "different": (style.VERMILLION, "D", style.VERMILLION),
+    "": (style.INK, "x", style.INK),
+}
 
 
 def published_of(cell: CellRuns) -> PublishedCell | None:
@@ -92,37 +102,10 @@ def published(study: Study) -> Rows:
             yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
 
 
-@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
-def hands(study: Study) -> Rows:
-    """Learned rewards by hand sequence, published and ours, where there are several."""
-    for row in beside_paper(study):
-        cell, name = row["cell"], named(study, row["cell"])
-        if row["hands"]:
-            ids = cell.good.run_id[cell.good.hands == row["hands"]]
-            behind = {"run_ids": " ".join(map(str, ids))}
-            yield f"{cell.task} {name['condition']} {row['hands']}", row | name | behind
-
-
 def named(study: Study, cell: CellRuns) -> Row:
     """The task of a cell by its title, and its condition."""
     task = study.tasks[cell.task]
     return {"task": marked(task), "condition": cell.label.removeprefix(LEARNER)}
-
-
-@table(
-    "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote",
-)
-def claims(study: Study) -> Rows:
-    """The paper's claims with their verdicts."""
-    for name, judged in judgements(study).iterrows():
-        claim = CLAIMS[str(name)]
-        row: Row = {
-            "statement": claim.text + " †" * claim.fitted,
-            "sets": claim.sets or "not counted" * claim.fitted,
-            "place": claim.place,
-            "quote": claim.quote,
-        }
-        yield claim.id, {**judged, **row}
 
 
 @cached
@@ -144,26 +127,87 @@ def published_differences(study: Study) -> pd.DataFrame:
     return pd.DataFrame(shown)
 
 
-@cached
-def hand_shares(study: Study) -> pd.DataFrame:
-    """Shares of hand sequences on tasks with two hands, of every cell with a solved run.
+@figure(
+    "published",
+    "Published and ours",
+    f"Our mean learned reward minus the published one, with its {style.COVERAGE} interval. Grey: "
+    f"margin of equivalence, ±{100 * MARGIN:.0f} % of the published reward. Filled circles: the "
+    "interval lies within the margin (equivalent). Open squares: it crosses the margin "
+    "(undecided). Diamonds: it lies outside (different). ↳: runs with one hand sequence; in "
+    "brackets, how many of our runs have it, then how many of the published ones. * pooled from "
+    "several printed sequences.",
+)
+def draw_published(study: Study) -> Parts:
+    """Difference of every mean reward to the printed one, with interval and margin."""
+    data = published_differences(study)
+    if not len(data):
+        raise missing(
+            study, f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
+        )
+    drawing, (axes,) = style.panels((1, 1), (style.ONE, 0.85 + 0.185 * len(data)))
+    tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
+    rows = data.to_dict("records")
+    names = []
+    for row in rows:
+        if row["hands"]:
+            runs = row["published_runs"]
+            printed = "" if runs is None or math.isnan(runs) else f"; {runs:.0f}"
+            names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
+        else:
+            pooled = "*" if row["pooled"] else ""
+            name = marked(tasks[row["task"]])
+            names.append(f"{name}, {name_of(row['method'])}{pooled}")
+    for place, row in enumerate(rows):
+        draw_row(axes, -place, row)
+    axes.axvline(0, color=style.INK, linewidth=0.6)
+    style.name_rows(axes, names)
+    axes.spines["left"].set_visible(False)
+    # Symmetric about zero: wide enough for every interval and margin.
+    ends = ["difference", "difference_low", "difference_high", "margin"]
+    reach = np.nanmax(np.abs(data.reindex(columns=ends).to_numpy(float)))
+    axes.set_xlim(-1.05 * reach, 1.05 * reach)
+    axes.set_xlabel("ours − published (ticks)")
+    words = "; ".join(
+        f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
+        + f": {row['difference']:+.1f}"
+        for row in rows
+        if row["runs"]
+    )
+    alt = f"Differences of our mean rewards to the published ones, with intervals. {words}."
+    return drawing, data, alt, tasks.values()
 
-    Columns ``task``, ``method``, ``source`` (``ours``, or ``published`` where the paper prints the
-    runs of every sequence), ``hands``, ``runs``, ``share``; the commonest sequence first.
-    """
-    rows: list[tuple[str, str, str, str, int]] = []
-    for (task, label), cell in study.cells.items():
-        if len(study.tasks[task].hands) > 1 and len(cell.good):
-            counts = cell.good.hands.value_counts()
-            rows += [(task, label, "ours", str(name), int(n)) for name, n in counts.items()]
-            paper = published_of(cell)
-            printed = paper.sequences if paper else {}
-            if sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS:
-                rows += [
-                    (task, label, "published", name, summary.runs)
-                    for name, summary in printed.items()
-                    if summary.printed_runs
-                ]
-    frame = pd.DataFrame(rows, columns=["task", "method", "source", "hands", "runs"])
-    totals = frame.groupby(["task", "method", "source"]).runs.transform("sum")
-    return frame.assign(share=frame.runs / totals)
+
+def draw_row(axes: Axes, y: float, row: Any) -> None:
+    """Margin, interval and difference of one comparison."""
+    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.2)
+    color, marker, face = _MARKS[row["verdict"] if row["runs"] > 1 else ""]
+    if not row["runs"]:
+        axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)
+        return
+    low, high = row["difference_low"], row["difference_high"]
+    if not math.isnan(low):
+        axes.plot([low, high], [y, y], color=color, linewidth=1.0)
+    axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
+
+
+def rewards_reproduced(study: Study) -> str:
+    """How many printed rewards agree with ours, and which of the undecided are off."""
+    rows = [row for row in beside_paper(study) if not row["hands"] and row["verdict"]]
+    if not rows:
+        return ""
+    verdicts = [row["verdict"] for row in rows]
+    agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
+    text = (
+        f"Of the {len(rows)} learned rewards that the paper prints, {agree} agree with ours within "
+        f"1 %, {differ} differ; undecided: {undecided}."
+    )
+    for row in rows:
+        sure = row["difference_low"] > 0 or row["difference_high"] < 0
+        if row["verdict"] == "undecided" and sure:
+            condition, task = row["cell"].label.removeprefix(LEARNER), row["cell"].task
+            text += (
+                f" {condition} on {marked(study.tasks[task])} is "
+                f"{interval_in_words(row, 'difference')} ticks from the printed mean: its interval "
+                "leaves out 0, not corrected for the number of rewards."
+            )
+    return text

@@ -1,0 +1,219 @@
+"""The page: its sections in their order, and every table and figure of the report by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from coartic.analysis.figures.plot import Plot
+from coartic.analysis.study import Study
+from coartic.analysis.topics import costs, learning, ranking, settings, tasks
+from coartic.analysis.topics.coarticulation import postures
+from coartic.analysis.topics.families import random_tasks
+from coartic.analysis.topics.paper import hands, rewards, verdicts
+
+FIGURES: Mapping[str, Callable[[Study], Plot]] = {
+    "postures": postures.draw_two_postures,
+    "published": rewards.draw_published,
+    "ranking": ranking.draw_ranking,
+    "runtimes": costs.draw_costs,
+    "recruitment": hands.draw_recruitment,
+    "learning-curves": learning.draw_learning,
+    "gaps-by-family": random_tasks.draw_gaps_by_family,
+    "tasks": tasks.draw_start_and_goals,
+}
+"""Every figure by its id: a function of a study. It raises CoarticError where the folder's runs do
+not allow its figure."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """One section of the page. It is left out where the runs allow neither figure nor table."""
+
+    id: str
+    short: str
+    """Name among the contents."""
+    title: str
+    table: str
+    """Id of the table."""
+    caption: str
+    """Caption of the table."""
+    figure: str = ""
+    """Id of the picture."""
+    sentence: Callable[[Study], str] | None = None
+    """What was found, where the runs say something: with enough runs, with too few, and how many
+    failed."""
+    answer: str = ""
+    """Word before the sentence on the terminal and in the first screen of the page; none: it is
+    not there."""
+    note: str = ""
+    """What a reader must know to read picture and table."""
+    single: bool = True
+    """Whether it is about single tasks: left out for many random ones."""
+
+
+SECTIONS = (
+    Section(
+        "settings",
+        "Settings",
+        "Which setting is best?",
+        table="settings",
+        caption="Mean reward of each setting (ticks), the best of each task first",
+        sentence=settings.best_settings,
+        answer="Best",
+        note="Behind: ticks behind the best setting of the task. p is corrected for the settings "
+        "of the task (Holm).",
+        single=False,
+    ),
+    Section(
+        "coarticulation",
+        "Coarticulation",
+        "Does the next goal change the movement?",
+        table="contexts",
+        caption="Postures at a goal that two tasks share before they differ",
+        figure="postures",
+        sentence=postures.next_goal,
+        answer="Coarticulation",
+        note="Postures are compared in length units and rad. Random guesses are a placebo: they "
+        "learn nothing, and the best of many is selected.",
+    ),
+    Section(
+        "paper",
+        "Paper",
+        "Are the paper's rewards reproduced?",
+        table="published",
+        caption="Learned rewards, published and ours (ticks)",
+        figure="published",
+        sentence=rewards.rewards_reproduced,
+        note="EC1 to EC4 are the paper's exploration conditions. EC1 explores the right arm only, "
+        "EC2 both arms with the closest hand, EC3 the choice of hand as well but not the waiting "
+        "arm, EC4 all of these. LRLR means left, right, left, right hand. † marks tasks whose "
+        "goals the paper does not print: these rewards helped to choose ours, so their agreement "
+        "is no evidence. Only runs with as many trials as the paper's, 10 000, are judged.",
+    ),
+    Section(
+        "claims",
+        "Claims",
+        "Do the paper's claims hold?",
+        table="claims",
+        caption="Claims; open one to see its evidence",
+        sentence=verdicts.claims_hold,
+        answer="Paper",
+        note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
+        "goals that it does not print: the third column says in how many of the sets of goals that "
+        "fit its text a claim holds. A claim that our goals support, but at most half of these "
+        "sets, depends on the goals. Rewards are those of the best trial of a run; a replay makes "
+        "what was learned once more, without noise and exploration.",
+        single=False,
+    ),
+    Section(
+        "nearest",
+        "Ranking",
+        "Who comes nearest to the optimum?",
+        table="ranking",
+        caption="Gap to the optimum or, where it is not proven, to the best known reward, in per "
+        "cent of it",
+        figure="ranking",
+        sentence=ranking.nearest,
+        answer="Nearest",
+        note="Methods are grouped by what they know about the reward: the value after each trial, "
+        "its formula, or nothing; of each algorithm the best setting counts. Intervals describe "
+        "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
+        "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
+        "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
+        "against-learner). Empty: the runs are too few, or too alike, to tell.",
+    ),
+    Section(
+        "runtimes",
+        "Cost",
+        "What does it cost?",
+        table="runtimes",
+        caption="What it takes to reach a quarter and half of the targets",
+        figure="runtimes",
+        sentence=costs.what_it_costs,
+        answer="Cost",
+        note="Kinematics: number of forward-kinematics evaluations, a cost that is the same on "
+        "every machine. ∞: not reached within the budget of trials.",
+    ),
+    Section(
+        "hands",
+        "Hands",
+        "Which hands are chosen?",
+        table="hands",
+        caption="Learned rewards by hand sequence, published and ours (ticks)",
+        figure="recruitment",
+        sentence=hands.changed_hands,
+    ),
+    Section(
+        "learning",
+        "Learning",
+        "How fast is it learned?",
+        table="learning",
+        caption="Best reward so far, mean over runs (ticks)",
+        figure="learning-curves",
+        sentence=learning.how_fast,
+        note="Gain: improvement over the initial solution. ∞: never improved.",
+    ),
+    Section(
+        "signatures",
+        "Signatures",
+        "Which signatures of coarticulation does each method show?",
+        table="signatures",
+        caption="Signatures of coarticulation, means over goals and runs",
+        sentence=postures.joints_or_hand,
+        note="Ticks are compared with those of the corrective process with the same hands. A first "
+        "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
+        "hand nearer: share of the way to its next goal that a hand covers while waiting. The CSV "
+        "file has tests against random guesses.",
+    ),
+    Section(
+        "families",
+        "Random tasks",
+        "What holds on random tasks?",
+        table="family-gaps",
+        caption="Gap to the best known reward, in per cent of it: mean over instances",
+        figure="gaps-by-family",
+        sentence=random_tasks.on_random_tasks,
+        answer="Random tasks",
+        single=False,
+    ),
+    Section(
+        "exploration",
+        "Exploration",
+        "Does more exploration pay on random tasks?",
+        table="exploration",
+        caption="More exploration against less, in per cent of the best known reward",
+        sentence=random_tasks.exploration_pays,
+        note="By hands: the part of the gain that comes from the hand sequences, if each run had "
+        "the best reward that is known for its hands.",
+        single=False,
+    ),
+    Section(
+        "signs",
+        "Signs",
+        "Does coarticulation show on random tasks?",
+        table="family-signs",
+        caption="Signs of coarticulation over instances",
+        single=False,
+    ),
+    Section(
+        "tasks",
+        "Tasks",
+        "What are the tasks?",
+        table="tasks",
+        caption="Tasks with their initial, learned and best possible rewards (ticks)",
+        figure="tasks",
+        note="Initial: the corrective process alone, with the task's initial hands. Learned: the "
+        "learner's best condition. Best known: the optimum where the proven bound equals it. "
+        "Proven bound: a reward that no solution can exceed.",
+    ),
+    Section(
+        "methods",
+        "All methods",
+        "What did every method do on every task?",
+        table="methods",
+        caption="Reward, gap to the optimum, hands and what a run spends (medians)",
+        note="Every method works on the same robot. Its movements are scored by a function hidden "
+        "from the method. Times are seconds of solving.",
+    ),
+)

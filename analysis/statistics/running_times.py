@@ -1,0 +1,81 @@
+"""Running times: what runs have spent when they reach targets.
+
+After COCO (Hansen et al. 2021). The ECDF of running times is the share of pairs of run and target
+that are reached within a budget. It is exact, not read off a grid.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Estimate
+from coartic.robot import Array
+
+BUDGET_RESAMPLES = 1_999
+_MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
+_FEWEST_RESAMPLES = 200
+RunningTimes = Sequence[Array]
+"""Running times of one method: for each task, which count alike, what every run had spent at every
+target, shape ``(runs, targets)``; infinite where the target is not reached."""
+
+
+def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
+    """Running times of all pairs of run and target in ascending order, their weights, which sum to
+    1, and the number of the run of each; without pairs that are not reached."""
+    values = np.concatenate([of_task.ravel() for of_task in times])
+    order = np.argsort(values, kind="stable")
+    order = order[np.isfinite(values[order])]
+    weights = [np.full(of_task.size, 1 / of_task.size / len(times)) for of_task in times]
+    runs = (order // times[0].shape[1]).astype(np.int32)  # of very many runs
+    return values[order], np.concatenate(weights)[order], runs
+
+
+def ecdf(times: RunningTimes) -> tuple[Array, Array]:
+    """Budgets at which the share of targets reached rises, and the share from there on."""
+    values, weights, _ = pairs(times)
+    last = np.append(values[1:] != values[:-1], True)[: len(values)]
+    return values[last], np.cumsum(weights)[last]
+
+
+def share_reached(times: RunningTimes) -> float:
+    """Share of targets that are reached in the end."""
+    return float(pairs(times)[1].sum())
+
+
+def budget_for(times: RunningTimes, share: float) -> Estimate:
+    """The least budget within which a share of the targets is reached; infinite without any.
+
+    With its percentile interval: runs are drawn anew within their task, and the tasks stay. It is
+    not widened as means over tasks are, as a budget can be infinite. No interval where a task has
+    too few runs.
+    """
+    values, weights, runs = pairs(times)
+
+    def budget(weights: Array) -> float:
+        place = np.searchsorted(np.cumsum(weights), share - 1e-9)
+        return float(values[place]) if place < len(values) else math.inf
+
+    sizes = list(map(len, times))
+    if min(sizes) < FEWEST:
+        return Estimate(budget(weights))
+    rng = np.random.default_rng(SEED)
+    resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
+    drawn = np.concatenate([times_drawn(size, resamples, rng) for size in sizes], axis=1)
+    budgets = [budget(weights * counts[runs]) for counts in drawn]
+    low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
+    return Estimate(budget(weights), float(low), float(high))
+
+
+def times_drawn(size: int, resamples: int, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """How often each of so many runs is drawn in each resample, shape ``(resamples, size)``.
+
+    A byte each, as there may be many runs: none is drawn 256 times.
+    """
+    shares, drawn = np.full(size, 1 / size), np.empty((resamples, size), dtype=np.uint8)
+    for row in drawn:
+        row[:] = rng.multinomial(size, shares)
+    return drawn

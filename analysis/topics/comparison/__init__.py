@@ -1,1 +1,0 @@
-"""Methods beside each other: gaps, running times, learning curves."""

@@ -1,0 +1,204 @@
+"""How fast it is learned: rewards by trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from coartic import Task
+from coartic.analysis import methods
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.optima import initial_reward
+from coartic.analysis.settings import compares_settings, name_in
+from coartic.analysis.study import Study, one_by_one
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics import scores
+from coartic.analysis.topics.costs import improvements
+from coartic.analysis.topics.ranking import optimum_in_words
+from coartic.analysis.words import marked, two_figures
+from coartic.robot import Array
+
+BUDGETS = (100, 1_000, 10_000)
+"""Trials after which the table reads rewards."""
+WINDOW = 100
+"""Trials over which a learning curve averages the reward of trials."""
+POINTS = 120
+"""Trials of a learning curve that are drawn."""
+CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
+"""Built-in methods whose learning curves are drawn; of others they all are."""
+
+
+@table("task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]")
+def learning(study: Study) -> Rows:
+    """Best reward after so many trials (mean over runs), and the trial at which half of what a run
+    gains on the initial solution is there (median and middle half of the runs; ∞ without gain)."""
+    for (task, label), cell in study.cells.items():
+        runs = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
+        learned = [run for run in runs if run is not None]
+        if task not in one_by_one(study) or not scores.is_compared(study, label):
+            continue
+        if not len(runs) == len(learned) == len(cell.good) > 0:
+            continue
+        if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
+            continue
+        initial, halves = initial_reward(study.tasks[task]), []
+        row: Row = {
+            "task": marked(study.tasks[task]),
+            "method": label,
+            "runs": len(runs),
+            "initial": initial,
+        }
+        for budget in BUDGETS:
+            if budget <= cell.runs.trials.min():
+                best = [
+                    rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in learned
+                ]
+                mean = np.mean(best)
+                row[f"after_{budget}"] = mean if np.isfinite(mean) else math.nan
+        for trials, rewards in learned:
+            gained = trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
+            halves.append(gained[0] if len(gained) else math.inf)
+        quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
+        row |= dict(zip(("half_gain", "half_gain_low", "half_gain_high"), quartiles, strict=True))
+        yield f"{task} {label}", row | runs_of(cell)
+
+
+@figure(
+    "learning-curves",
+    "Learning curves",
+    "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
+    f"the trials themselves (mean over runs and the last {WINDOW} trials; failed trials "
+    "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
+    "far below the initial solution are cut off.",
+)
+def draw_learning(study: Study) -> Parts:
+    """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
+    data = learning_curves(study)
+    if not len(data):
+        raise missing(study, "no run that learns by trial")
+    tasks = [study.tasks[name] for name in data.task.unique()]
+    labels = methods.in_order(data.method.unique())
+    rows, columns = style.grid(len(tasks))
+    size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
+    drawing, panels = style.panels((rows, columns), size, len(tasks))
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
+        draw_curves(axes, study, task, data[data.task == task.name], labels)
+        axes.set_title(marked(task))
+        axes.set_ylabel("reward (ticks)")
+        axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
+    style.letters(panels)
+    handles = [
+        style.entry(name_in(study, label), linewidth=1.3, **look)
+        for label, look in looks_in(study, labels).items()
+    ]
+    handles += [style.entry("initial solution", **style.INITIAL)]
+    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
+    style.legend(drawing, handles, min(len(handles), 4))
+    ends = data.groupby(["task", "method"], sort=False).tail(1)
+    words = spoken(ends, "{task}, {method}: {best:.0f}")
+    alt = f"Reward against trial. Mean best reward at the end: {words}."
+    return drawing, data, alt, tasks
+
+
+def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
+    """Best reward so far and that of the trials themselves, by task and method.
+
+    Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
+    ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
+    ``best_high``, ``trials`` (mean over runs and the last ``window`` trials).
+    """
+    shown = [*cells_with_curve(study)]
+    wanted = {run for key in shown for run in study.cells[key].good.run_id}
+    trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
+    curves = [pd.DataFrame()]
+    for task, label in shown:
+        ids = map(str, study.cells[task, label].good.run_id)
+        runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
+        if runs:
+            named = {"task": task, "method": label, "runs": len(runs)}
+            curve = learning_curve(runs, window)
+            failed = study.cells[task, label].good.failed_trials.sum()
+            if sum(int(np.isnan(run).sum()) for run in runs) > failed:  # more were left out
+                curve["trials"] = np.full(len(curve["trial"]), math.nan)
+            curves.append(pd.DataFrame(named | curve))
+    return pd.concat(curves[1:] or curves, ignore_index=True)
+
+
+def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
+    """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        solved = [
+            label for (name, label), cell in study.cells.items() if name == task and len(cell.good)
+        ]
+        labels = [
+            label
+            for label in methods.in_order(solved)
+            if label in CURVES or not methods.is_built_in(label) or compares_settings(study)
+        ]
+        two_armed = {*methods.LEARNERS} & {*labels} - {methods.EC1}
+        yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
+
+
+def learning_curve(runs: Sequence[Array], window: int) -> dict[str, Array]:
+    """Both curves at chosen trials, from the reward of every trial of runs, NaN where it failed."""
+    length = min(map(len, runs))
+    rewards = np.array([run[:length] for run in runs])
+    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
+    # Until every run has a solution (NaN before) there is no mean of them.
+    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+    low, high = np.quantile(best, [0.25, 0.75], axis=0)
+    sums, counts = (
+        pd.Series(values).rolling(window, min_periods=1).sum()
+        for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
+    )
+    trials = (sums / counts).to_numpy()[at - 1]
+    mean = best.mean(axis=0)
+    return {"trial": at, "best": mean, "best_low": low, "best_high": high, "trials": trials}
+
+
+def draw_curves(
+    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
+) -> None:
+    """Curves of the methods on a task, between its initial solution and its optimum."""
+    look_of = looks_in(study, labels)
+    for label, rows in data.groupby("method", sort=False):
+        look = look_of[str(label)]
+        band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
+        middle_half = axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
+        best = axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
+        style.curve(name_in(study, str(label)), middle_half, *best, *trials)
+    floor, top = data.best.min(), data.best_high.max()
+    initial = initial_reward(task)
+    if not math.isnan(initial):
+        style.curve("initial solution", axes.axhline(initial, **style.INITIAL))
+        floor, top = initial, max(top, initial)
+    optimum = study.optima.get(task.name)
+    if optimum is not None:
+        name = optimum_in_words(study)
+        style.curve(name, axes.axhline(optimum.reward, **style.OPTIMUM))
+        top = max(top, optimum.reward)
+    reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
+    lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)
+    axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
+    style.log_axis(axes)
+    axes.set_xlim(1, max(2, data.trial.max()))
+
+
+def how_fast(study: Study) -> str:
+    """When half of the gain of the learner that explores most is there, by task."""
+    half = learning(study).half_gain
+    after = [
+        f"{two_figures(half[row])} trials on {marked(task)}"
+        for name, task in study.tasks.items()
+        if half.get(row := f"{name} {methods.most_exploring(task)}", math.inf) < math.inf
+    ]
+    if not after:
+        return ""
+    return f"Half of what the learner gains is there after about {', '.join(after)} (median run)."

@@ -1,0 +1,71 @@
+"""What became of the paper's claims."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from coartic.analysis.claims.judgements import CLAIMS, counts, judgements
+from coartic.analysis.study import Study
+from coartic.analysis.table import Row, Rows, table
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.topics.paper.rewards import beside_paper
+from coartic.analysis.words import capital, listed, plural
+
+
+def papers_claims(study: Study) -> pd.DataFrame:
+    """Claims of the paper; none where the folder has no runs for any of them or its rewards."""
+    judged = judgements(study)
+    return judged if beside_paper(study) or judged.run_ids.any() else judged[:0]
+
+
+@table(
+    "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote",
+)
+def claims(study: Study) -> Rows:
+    """The paper's claims with their verdicts, where the folder has runs for any of them."""
+    for name, judged in papers_claims(study).iterrows():
+        claim = CLAIMS[str(name)]
+        row: Row = {
+            "statement": claim.text + " †" * claim.fitted,
+            "sets": claim.sets or "not counted" * claim.fitted,
+            "place": claim.place,
+            "quote": claim.quote,
+        }
+        yield claim.id, {**judged, **row}
+
+
+def mostly_undecided(judged: pd.DataFrame) -> bool:
+    """Whether half of the claims are undecided: they lack runs or trials."""
+    return 2 * counts(judged.verdict)["undecided"] >= len(judged)
+
+
+def in_words(judged: pd.DataFrame) -> str:
+    """The verdicts on the claims that carry the paper's point, and how many others have each."""
+    central: dict[str, list[str]] = {}
+    others = []
+    for name, verdict in judged.verdict.items():
+        if short := CLAIMS[str(name)].short:
+            central.setdefault(verdict, []).append(short)
+        else:
+            others.append(verdict)
+    words = [f"{capital(verdict)}: {listed(texts)}." for verdict, texts in central.items()]
+    if list(central) == ["supported"]:
+        words = [f"In its main point, yes: {listed(central['supported'])}."]
+    each = ", ".join(f"{verdict} {count}" for verdict, count in counts(others).items() if count)
+    words += [f"Of {plural(len(others), 'other claim')}: {each}."] * bool(each)
+    return " ".join(words)
+
+
+def claims_hold(study: Study) -> str:
+    """Whether the paper is reproduced, by its claims."""
+    judged = papers_claims(study)
+    if judged.empty:
+        return ""
+    n, text = counts(judged.verdict), in_words(judged)
+    if mostly_undecided(judged):
+        text = (
+            f"Too little to judge the paper: of {len(judged)} claims {n['undecided']} are "
+            f"undecided, {n['supported']} supported. Tasks, methods, runs or trials are missing."
+        )
+    failed = (cell for cells in judged.failed for cell in cells)
+    return text + failed_runs(study, failed, ", which leaves claims undecided")

@@ -1,0 +1,285 @@
+"""Who comes nearest to the optimum: gaps of methods over all tasks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from coartic.analysis import frames, methods
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.settings import compares_settings, name_in
+from coartic.analysis.statistics.estimates import LEVEL, Estimate
+from coartic.analysis.statistics.hypotheses import bootstrap_test, sign_flip_test
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics import scores
+from coartic.analysis.topics.coarticulation.tables import adjust_p
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.words import capital, interval_in_words, marked, number, p_value, plural
+
+TRIES = methods.PLACEBO, "corrective-alone/every"
+"""Methods that take the best of their trials: they learn nothing from one for the next."""
+MOST_FOREIGN = 3
+"""Methods from files that a sentence names."""
+
+
+@cached
+def main_gaps(study: Study) -> pd.DataFrame:
+    """Mean gap of each method over :func:`.scores.common_tasks`, nearest first.
+
+    Of methods that solved every run on all of them. Columns as of
+    :func:`coartic.analysis.ranking`, ``method``, ``knows`` (its group) and ``algorithm``.
+    """
+    tasks, frame = scores.common_tasks(study), scores.scores(study)
+    frame = frame[frame.task.isin(tasks)]
+    if not len(frame):
+        return pd.DataFrame(columns=["method", "knows", "gap", "gap_low", "gap_high", "runs"])
+    rows = frames.ranking(frame)
+    rows = rows[rows.gap.notna() & (rows.failed == 0)].reset_index()
+    if len(tasks) == 1:  # the learner's conditions together are one of them
+        rows = rows[~rows.method.str.startswith(methods.TOGETHER)]
+    return rows.assign(
+        knows=rows.method.map(scores.groups(study)),
+        algorithm=list(map(methods.algorithm_of, rows.method)),
+    )
+
+
+@table("task, method, runs, reward, learner, p_holm, least_p")
+def against_learner(study: Study) -> Rows:
+    """Mean reward of every method and of the paper's learner that explores most, by task.
+
+    Of methods that solved every run. A method that draws nothing has one reward, which is exact.
+    The test takes samples as independent, though runs have the same seeds
+    (:func:`paired_difference` pairs them): where the learner has 100 runs and the other method 20,
+    pairs would leave out 80.
+    """
+    rows: list[tuple[str, Row]] = []
+    for (task, label), cell in study.cells.items():
+        learner = study.cells.get((task, methods.most_exploring(study.tasks[task])))
+        if learner is None or learner is cell or task not in one_by_one(study):
+            continue
+        both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
+        if not scores.is_compared(study, label) or not both_solved:
+            continue
+        drawn = study.plan.methods[cell.method].stochastic
+        rewards = cell.rewards if drawn else float(cell.rewards[0])
+        test = bootstrap_test(learner.rewards, rewards, "two-sided")
+        row: Row = {
+            "task": marked(study.tasks[task]),
+            "method": label,
+            "runs": len(cell.runs),
+            "reward": cell.rewards.mean(),
+            "learner": learner.rewards.mean(),
+            "p_holm": test.p,
+            "least_p": test.least_p,
+        }
+        rows.append((f"{task} {label}", row | runs_of(cell, learner)))
+    yield from adjust_p(rows)
+
+
+@table("method, knows, gap[], better, worse, on *, runs")
+def ranking(study: Study) -> Rows:
+    """Gap to the optimum over all tasks and on each single one, grouped by what methods know."""
+    over, tested = main_gaps(study).set_index("method"), against_learner(study)
+    single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
+    for method in [*over.index, *solved_some(study, over.index)]:
+        cells = scores.compared(study)[method]
+        row: Row = {"method": method, "knows": scores.groups(study)[method], "gap": math.nan}
+        row |= {f"on {task}": math.nan for task in single}
+        row |= {
+            f"on {task}": scores.cell_gap(study, cells[task]) for task in single if task in cells
+        }
+        if method in over.index:
+            row |= over.loc[method, ["gap", "gap_low", "gap_high"]].to_dict()
+        tests = tested[tested.index.isin([f"{task} {cell.label}" for task, cell in cells.items()])]
+        # With Holm's correction over its tasks: could any of its tests have told them apart?
+        if tests.least_p.count() * tests.least_p.min() < LEVEL:
+            sure = tests[tests.p_holm < LEVEL]
+            row |= {"better": sum(sure.reward > sure.learner)}
+            row |= {"worse": sum(sure.reward < sure.learner)}
+        row |= {"runs": sum(len(cell.runs) for cell in cells.values()), **runs_of(*cells.values())}
+        yield method, row
+
+
+def solved_some(study: Study, ranked: pd.Index) -> list[str]:
+    """Methods without a mean gap that solved every run on some task, by their gaps on the first."""
+    gaps = [
+        (place, scores.cell_gap(study, cell), method)
+        for method, cells in scores.compared(study).items()
+        if method not in ranked and not method.startswith(methods.TOGETHER)
+        for place, task in enumerate(study.tasks)
+        if (cell := cells.get(task)) is not None and len(cell.good) == len(cell.runs)
+    ]
+    return list(dict.fromkeys(method for *_, method in sorted(gaps, key=lambda row: row[:2])))
+
+
+def leaders(study: Study, group: str) -> pd.DataFrame:
+    """The best form of each algorithm of a group in :func:`main_gaps`, nearest first.
+
+    The learner is there by the form that explores most.
+    """
+    rows = main_gaps(study)
+    rows = rows[rows.knows == group]
+    learners = rows.method.map(methods.is_learner).astype(bool)
+    most = learners & rows.method.str.contains("EC4")
+    best = rows[~learners | (most if most.any() else learners)]
+    one = "method" if compares_settings(study) else "algorithm"
+    return best.drop_duplicates(one).reset_index(drop=True)
+
+
+def paired_difference(study: Study, first: str, second: str) -> Estimate:
+    """Two-tailed test of the difference of mean gaps of two methods of :func:`main_gaps`.
+
+    A sign-flip test of runs paired by seed within their task; a method that is run once is compared
+    with every run of the other. All tasks count the same; NaN without pairs on one of them. Runs
+    that only one of them has do not count, unlike in the table ``against-learner``.
+    """
+    frame = scores.scores(study)
+    frame = frame.assign(gap=frames.gaps(frame))
+    differences = []
+    for task in scores.common_tasks(study):
+        of_task = frame[frame.task == task]
+        a, b = (of_task[of_task.method == method] for method in (first, second))
+        once = min(len(a), len(b)) == 1
+        pairs = a.merge(b, "cross") if once else a.merge(b, on="seed")
+        differences.append((pairs.gap_x - pairs.gap_y).to_numpy())
+    if not differences or not all(map(len, differences)):
+        return Estimate(math.nan)
+    return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))
+
+
+@figure(
+    "ranking",
+    "Gap to the optimum",
+    "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
+    f"there are several), with its {style.COVERAGE} bootstrap interval over runs. Methods that "
+    "are run once have no interval. Diamonds and bold names: the paper's learner.",
+)
+def draw_ranking(study: Study) -> Parts:
+    """Gap to the optimum of every method over all tasks, or on the one that there is."""
+    rows = main_gaps(study)
+    if not len(rows):
+        raise missing(study, "no method with a solution to every run and a known optimum")
+    percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
+    groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
+    groups = [(group, of_group) for group, of_group in groups if len(of_group)]
+    heights = [len(of_group) + 0.8 for _, of_group in groups]
+    size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
+    drawing, panels = style.panels((len(groups), 1), size, sharex=True, height_ratios=heights)
+    for axes, (group, of_group) in zip(panels, groups, strict=True):
+        draw_group(axes, study, group, of_group, looks_in(study, rows.method))
+    farthest = float(np.nanmax(percent[["gap", "gap_high"]]))
+    panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
+    first, *more = scores.common_tasks(study)
+    where = f"to {optimum_in_words(study).removesuffix(' reward')}"
+    panels[-1].set_xlabel(f"gap {where if more else f'on {study.tasks[first].label}'} (%)")
+    alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
+    return drawing, rows, alt, study.tasks.values()
+
+
+def optimum_in_words(study: Study) -> str:
+    """What gaps are to: where an optimum is not proven, it is the best known reward."""
+    proven = all(best.proven for best in study.optima.values())
+    return "optimum" if proven else "best known reward"
+
+
+def draw_group(
+    axes: Axes, study: Study, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]
+) -> None:
+    """Methods that know as much of the reward, nearest first."""
+    axes.set_title(capital(group.removeprefix("using the ")))
+    for place, row in enumerate(rows.to_dict("records")):
+        color = looks[row["method"]]["color"]
+        mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
+        end = row["gap"]
+        if not math.isnan(row["gap_low"]):
+            end = max(row["gap"], row["gap_high"])
+            ends = [row["gap_low"], row["gap_high"]]
+            axes.plot(ends, [-place, -place], color=color, linewidth=1.4)
+        shape = "D" if methods.is_learner(row["method"]) else "o"
+        (dot,) = axes.plot(row["gap"], -place, shape, **mark)
+        words = interval_in_words(row, "gap", unit=" %")
+        style.tip(dot, f"{name_in(study, row['method'])}: {words}, {row['runs']} runs")
+        beside: Any = {"textcoords": "offset points", "va": "center"}
+        axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
+    style.name_rows(axes, [name_in(study, method) for method in rows.method])
+    for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
+        if methods.is_learner(method):
+            name.set_fontweight("bold")
+    axes.axvline(0, **style.OPTIMUM)
+
+
+def nearest(study: Study) -> str:
+    """Who comes nearest to the optimum, and where the learner ends."""
+    by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
+    learn = by_trial[~by_trial.method.isin(TRIES)].reset_index(drop=True)
+    rows = next((rows for rows in (learn, by_formula, others, by_trial) if len(rows)), learn)
+    if not len(rows):
+        return ""
+    best, who = rows.iloc[0], name_in(study, rows.method[0])
+    things = "settings" if compares_settings(study) else "algorithms"
+    among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
+    text = (
+        f"{among if len(learn) > 1 else capital(who)} comes nearest to the optimum: "
+        f"{gap_in_words(best)} away{beside(study, rows)}{as_declared(best.method)}."
+    )
+    rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
+    if rank and not compares_settings(study):
+        place = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
+        guesses = by_trial.gap[by_trial.method == methods.PLACEBO]
+        text += f" The paper's learner is {place}, at {gap_in_words(learn.iloc[rank])}"
+        text += "".join(f"; random guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
+    if len(learn) and len(by_formula):
+        row = by_formula.iloc[0]
+        text += (
+            f" The best planner that knows the reward as a formula ends {gap_in_words(row)} away"
+        )
+        text += f"{as_declared(row.method)}."
+    text += from_files(study)
+    cells = [(task, cell.label) for cells in scores.compared(study).values()
+             for task, cell in cells.items()]  # fmt: skip
+    return text + failed_runs(study, cells, ", which bars a method from the ranking")
+
+
+def gap_in_words(row: Any) -> str:
+    """A gap in per cent with its interval, ``7.3 % [6.9, 7.8]``."""
+    return interval_in_words(row, "gap", scale=100, unit=" %")
+
+
+def beside(study: Study, rows: pd.DataFrame) -> str:
+    """Whether the first method is surely nearer than the second; empty where it is alone."""
+    if len(rows) < 2:
+        return ""
+    second, test = name_in(study, rows.method[1]), paired_difference(study, *rows.method[:2])
+    if not test.least_p <= LEVEL:
+        return f" (too few runs to tell it from {second})"
+    surely = "significantly" if test.p < LEVEL else "not significantly"
+    return f", {surely} nearer than {second} ({p_value(test.p)})"
+
+
+def as_declared(method: str) -> str:
+    """That what a method is told is its author's word, where it is not built in."""
+    return "" if methods.is_built_in(method) else "; what it is told is as its author declares"
+
+
+def from_files(study: Study) -> str:
+    """Sentences about methods that are not built in, beside the learner where it ran."""
+    rows, text = ranking(study), ""
+    rows = rows[~rows.method.map(methods.is_built_in).astype(bool) & rows.gap.notna()]
+    learner = any(methods.is_learner(label) for _, label in study.cells)
+    for row in rows.head(MOST_FOREIGN).to_dict("records"):
+        text += f" {row['method']}, not of this project, ends {number(100 * row['gap'], 1)} % away"
+        if learner and math.isnan(row["better"]):
+            text += "; the runs are too few, or too alike, to tell it from the learner"
+        elif learner:
+            text += f"; against the learner it is better on {plural(row['better'], 'task')}"
+            text += f" and worse on {number(row['worse'])}"
+        text += "."
+    more = len(rows) - MOST_FOREIGN
+    return f"{text} And {more} more in the ranking." if more > 0 else text

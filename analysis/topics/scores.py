@@ -1,0 +1,241 @@
+"""Scores: the runs that are compared, one a row, and the table of methods.
+
+Methods are compared on tasks whose optimum and initial solution are known. The learner explores
+one-armed and two-armed tasks under different conditions, so that one method joins them:
+``dual-process (EC1, EC4)`` is EC1 where a task has one arm and EC4 where it has two.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis import methods as known
+from coartic.analysis.optima import gap_share, initial_reward, locks_base
+from coartic.analysis.settings import compares_settings
+from coartic.analysis.statistics.estimates import standard_deviation
+from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_run
+from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
+from coartic.analysis.words import marked, tally
+from coartic.method import Information
+from coartic.robot import Array
+
+TOLD_LETTERS = {
+    Information.GOALS: "G",
+    Information.FORWARD_KINEMATICS: "F",
+    Information.JACOBIAN: "J",
+    Information.CORRECTIVE_PROCESS: "A",
+    Information.REWARD_BY_TRIAL: "T",
+    Information.REWARD_BY_SUBTASK: "U",
+    Information.KINEMATIC_MODEL: "K",
+    Information.REWARD_FORMULA: "R",
+    Information.SECONDARY_OBJECTIVES: "S",
+}
+"""A letter for each kind of information, in the order in which the tables show them."""
+BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
+    "using the reward of each trial",
+    "using the reward as a formula",
+    "not using the reward",
+)
+"""What methods are told of the reward and make use of."""
+STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
+
+
+@cached
+def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
+    """Rewards of the initial solution and of the optimum by task, where the optimum is better.
+
+    Without tasks where one of them is not known or the optimum is 0. The initial solution is the
+    corrective process alone with the task's initial hands, the optimum that with all joints free.
+    """
+    known_of = {task: best.reward for task, best in study.optima.items() if best.reward != 0}
+    both = {
+        name: (initial_reward(task), known_of[name])
+        for name, task in study.tasks.items()
+        if name in known_of
+    }
+    return {name: pair for name, pair in both.items() if pair[0] < pair[1]}  # initial: NaN if none
+
+
+@cached
+def labels_by_task(study: Study) -> dict[str, dict[str, str]]:
+    """Labels by task of every method, on tasks of :func:`initial_and_optimum`.
+
+    A method has its own label on all tasks; the learner's conditions together have several.
+    """
+    by_method: dict[str, dict[str, str]] = {}
+    for task, label in study.cells:
+        if task in initial_and_optimum(study):
+            by_method.setdefault(label, {})[task] = label
+    one_armed = by_method.get(known.EC1, {})
+    for more in (known.EC4, known.EC3):
+        two_armed = by_method.get(more, {})
+        elsewhere = {task: label for task, label in one_armed.items() if task not in two_armed}
+        if two_armed and elsewhere:
+            together = f"{known.TOGETHER}EC1, {more.removeprefix(known.LEARNER)})"
+            by_method[together] = elsewhere | two_armed
+    return by_method
+
+
+@cached
+def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
+    """Cells by task of every method that is compared, the learner's conditions together too.
+
+    Without searches for the optimum, cells that lock the base, which solve another problem, and
+    variants, unless settings are compared.
+    """
+    every = {
+        method: {
+            task: cell
+            for task, label in labels.items()
+            if not locks_base((cell := study.cells[task, label]).runs)
+        }
+        for method, labels in labels_by_task(study).items()
+        if is_compared(study, method)
+    }
+    return {method: cells for method, cells in every.items() if cells}
+
+
+@cached
+def common_tasks(study: Study) -> list[str]:
+    """The tasks that a mean is over: all, or the first where no method ran on all of them."""
+    tasks = list(initial_and_optimum(study))
+    ran = [task for task in tasks for cells in compared(study).values() if task in cells]
+    everywhere = any(len(cells) == len(tasks) for cells in compared(study).values())
+    return tasks if everywhere else ran[:1]
+
+
+@cached
+def scores(study: Study) -> pd.DataFrame:
+    """Runs of the methods that are compared, one a row, for :func:`coartic.analysis.ranking`.
+
+    Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
+    ``reward`` (NaN for a run without a solution) and ``best_known``.
+    """
+    parts = [pd.DataFrame(columns=["method", "task", "run", "seed", "reward", "best_known"])]
+    for method, cells in compared(study).items():
+        for task, cell in cells.items():
+            rewards = cell.runs.reward.where(cell.runs.status == "ok")
+            columns = {"reward": rewards.to_numpy(np.float64, na_value=np.nan)}
+            best = initial_and_optimum(study)[task][1]
+            part = cell.runs[["run", "seed"]].assign(method=method, task=task, best_known=best)
+            parts.append(part.assign(**columns))
+    return pd.concat(parts[1:] or parts, ignore_index=True)
+
+
+def is_compared(study: Study, label: str) -> bool:
+    """Whether a method is compared with others: no search for the optimum, and a variant only where
+    settings are compared."""
+    shown = compares_settings(study) or not known.is_variant(label)
+    return shown and not known.is_search(label)
+
+
+def told(runs: pd.DataFrame) -> str:
+    """A letter for each kind of information that runs were told (:data:`TOLD_LETTERS`)."""
+    names = set(", ".join(runs.told.unique()).split(", "))
+    return "".join(letter for item, letter in TOLD_LETTERS.items() if item.value in names)
+
+
+@cached
+def groups(study: Study) -> dict[str, str]:
+    """Which of :data:`GROUPS` each method belongs to.
+
+    A method that makes a single trial on every task makes no use of the reward that it is told. The
+    learner's conditions together are told what each of them is.
+    """
+    of_label = {}
+    for label in dict.fromkeys(label for _, label in study.cells):
+        runs = pd.concat([cell.runs for key, cell in study.cells.items() if key[1] == label])
+        letters = told(runs)
+        learns = TOLD_LETTERS[Information.REWARD_BY_TRIAL] in letters and (runs.trials > 1).any()
+        by_formula = TOLD_LETTERS[Information.REWARD_FORMULA] in letters
+        of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
+    together = {name: known.EC1 for name in labels_by_task(study) if name not in of_label}
+    return of_label | {name: of_label[label] for name, label in together.items()}
+
+
+def best_condition(study: Study, task: str) -> str | None:
+    """Label of the learner's own condition with the highest mean reward on a task."""
+    rewards = {
+        label: float(cell.rewards.mean())
+        for (name, label), cell in study.cells.items()
+        if name == task and label in known.LEARNERS and len(cell.good)
+    }
+    return max(rewards, key=lambda label: rewards[label]) if rewards else None
+
+
+def cell_gap(study: Study, cell: CellRuns) -> float:
+    """Gap of a cell's mean reward to the optimum; NaN where one of both is not known."""
+    best = study.optima.get(cell.task)
+    if best is None or best.reward == 0 or not len(cell.good) or locks_base(cell.runs):
+        return math.nan
+    return float(gap_share(cell.rewards.mean(), best.reward))
+
+
+def solve_times(runs: pd.DataFrame) -> pd.Series:
+    """Wall time of solving, s: of runs in a warm process, or of all where there are none.
+
+    ``runs`` have a solution. Their whole time stands for methods that mark no solving.
+    """
+    warm = runs.warm.to_numpy(dtype=bool, na_value=False)
+    solving, all_in_all = floats(runs.solve_s), floats(runs.wall_s)
+    spent = np.where(solving > 0, solving, all_in_all)
+    times = pd.Series(spent, runs.index, dtype=runs.solve_s.dtype)
+    return times[warm] if warm.any() else times
+
+
+def median(values: pd.Series) -> float:
+    """Median of the known values; NaN where none is, as for runs that crashed."""
+    present = floats(values)
+    present = present[~np.isnan(present)]
+    return float(np.median(present)) if len(present) else math.nan
+
+
+def floats(values: pd.Series) -> Array:
+    """A column (n,), NaN where a value is missing."""
+    return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
+
+
+@table(
+    "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, told, "
+    "corrections, jacobians, movement_ticks, other_arm, median_run",
+)
+def methods(study: Study) -> Rows:
+    """Every method on every task: mean reward, gap, hands and what a run spends (medians).
+
+    Within a task searches for the optimum come first, then the highest mean reward.
+    ``corrections``: corrective movements in all solutions; ``other_arm``: whether the arm that is
+    not chosen keeps ``still`` in all solutions or ``moves``; ``median_run``: beginning of the id of
+    the run whose reward is nearest the median.
+    """
+    cells = [cell for cell in study.cells.values() if cell.task in one_by_one(study)]
+    places = list(study.tasks)
+    means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
+    cells.sort(
+        key=lambda c: (places.index(c.task), not known.is_search(c.label), -means[id(c)]),
+    )
+    for cell in cells:
+        good, runs = cell.good, cell.runs
+        hands = tally(good.hands.value_counts().to_dict())
+        row = {
+            "task": marked(study.tasks[cell.task]),
+            "method": cell.label,
+            "runs": len(runs),
+            "solved": len(good),
+            "reward": means[id(cell)] if len(good) else math.nan,
+            "reward_sd": standard_deviation(cell.rewards),
+            "gap": cell_gap(study, cell),
+            "hands": hands if len(good) > 1 else "".join(good.hands),
+            "told": told(runs),
+            "corrections": int(good.solution_corrections.sum()),
+            "solve_s": median(solve_times(good)),
+        }
+        spent = ("trials", "forward_kinematics", "jacobians", "movement_ticks")
+        row |= {name: median(runs[name]) for name in spent}
+        if len(good):
+            still = (floats(good.other_arm_travel) <= STILL).all()
+            row["other_arm"] = "still" if still else "moves"
+            row["median_run"] = str(good.run_id.iloc[typical_run(cell)])[:SHORT_ID]
+        yield f"{cell.task} {cell.label}", row | runs_of(cell)
