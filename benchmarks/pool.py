@@ -206,11 +206,11 @@ class Worker:
         """How it has ended, and the last lines that it has printed."""
         name = signal_named(self.exit_code or 0)
         how = f"killed by {name}" if name else f"exit code {self.exit_code}"
-        said = b""
+        words = b""
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
-            said = file.read()
-        lines = said.decode(errors="replace").strip().splitlines()
+            words = file.read()
+        lines = words.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_WORDS:])
         return f"{how}): {plain(last, 1000) or 'it left no message'}"
 
@@ -235,9 +235,9 @@ def perform_jobs(
     """What a process does, in a folder of its own."""
     set_environment(variables)
     begin_worker(folder.parent)
-    said = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
     for stream in (1, 2):
-        os.dup2(said, stream)
+        os.dup2(descriptor, stream)
     bound_resources(workers)
     prepare(job for _, job in jobs)
     place = folder / "place"

@@ -192,17 +192,19 @@ class Robots:
             q, goals = self.q[some[:, None], places], self.goals[self.task[some], self.goal[some]]
             reach = partial(reach_unchecked, locked_base=locked, model=self.model)
             sides = np.tile(self.sides[:, None], len(some))
-            found = [reach(robot, q, side, goals, radius, looks=False).corrected for side in sides]
-            ways = np.nan_to_num(np.linalg.norm(np.array(found) - q, axis=2), nan=np.inf)
+            corrected = [
+                reach(robot, q, side, goals, radius, looks=False).corrected for side in sides
+            ]
+            ways = np.nan_to_num(np.linalg.norm(np.array(corrected) - q, axis=2), nan=np.inf)
             hand = np.where(other[of_kind], 1 - ways.argmin(axis=0), ways.argmin(axis=0))
-            middle = np.choose(hand[:, None], found)
+            middle = np.choose(hand[:, None], corrected)
             moved = away[of_kind[:, None], places]
             moved[:, ["xy".index(axis) for axis in locked]] = 0.0
             targets = np.where(np.isnan(middle), q, middle) + moved
-            made = reach(robot, q, self.sides[hand], goals, radius, targets)
-            self.q[some[:, None], places] = made.q
-            self.goal[some] += made.hit
-            rewards[of_kind] = np.where(made.hit, -made.ticks, -FAILED)
+            reached = reach(robot, q, self.sides[hand], goals, radius, targets)
+            self.q[some[:, None], places] = reached.q
+            self.goal[some] += reached.hit
+            rewards[of_kind] = np.where(reached.hit, -reached.ticks, -FAILED)
         return rewards, (rewards == -FAILED) | (self.goal[rows] == self.counts[self.task[rows]])
 
     def infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
@@ -480,8 +482,8 @@ def score(
     alone = [
         corrective_trial(each, initial_hands(each, model=model), model=model) for each in tasks
     ]
-    known = [best_shipped(each) if model == PAPER else None for each in tasks]
-    best = np.array([[np.nan if each is None else each.reward] for each in known])
+    shipped = [best_shipped(each) if model == PAPER else None for each in tasks]
+    best = np.array([[np.nan if each is None else each.reward] for each in shipped])
     rewards = {
         **{name: solve(each) if isinstance(each, Method) else run(policy_of(each))
            for name, each in policies.items()},

@@ -96,7 +96,8 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
     Raises IndexError if there is none.
     """
     estimate = r":?\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
-    return str(re.findall(re.escape(words) + estimate, evidence)[which])
+    number_behind = re.escape(words) + estimate
+    return str(re.findall(number_behind, evidence, re.IGNORECASE)[which])
 
 
 def p_of_shares(values: Row, printed_runs: int) -> float:

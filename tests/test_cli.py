@@ -184,18 +184,18 @@ def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, n
     number = getattr(signal, name)
     command = ("run", "paper", "--runs", "500", "--trials", "30000", "--jobs", "2", "--out", "out")
     code = [sys.executable, "-c", INTERRUPTED, moment, str(int(number)), str(times), *command]
-    status, said = call_apart(tmp_path, code)
-    assert status == (130 if name == "SIGINT" else 143), said
-    assert said.startswith("Interrupted.")
-    assert len(said.splitlines()) == 1
+    status, words = call_apart(tmp_path, code)
+    assert status == (130 if name == "SIGINT" else 143), words
+    assert words.startswith("Interrupted.")
+    assert len(words.splitlines()) == 1
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the file starts a program of POSIX")
 def test_what_a_method_file_starts_ends_with_the_command(tmp_path):
     (tmp_path / "mine.py").write_text("import subprocess\nsubprocess.Popen(['sleep', '999'])\n")
     command = ["-m", "coartic", "list", "--method-file", "mine.py"]
-    status, said = call_apart(tmp_path, [sys.executable, *command])
-    assert status == 2, said
+    status, words = call_apart(tmp_path, [sys.executable, *command])
+    assert status == 2, words
 
 
 def call_apart(place, command):
@@ -206,26 +206,14 @@ def call_apart(place, command):
         env=os.environ | {"TMPDIR": str(place / "temporary"), "PYTHONPATH": str(ROOT)},
         start_new_session=True,
     )  # fmt: skip
-    _, said = done.communicate()
+    _, words = done.communicate()
     assert not list((place / "temporary").iterdir())
     assert all_end(done.pid)
-    return done.returncode, said
+    return done.returncode, words
 
 
-def test_a_temporary_folder_of_a_long_name(tmp_path):
-    """The system takes no socket of such a path."""
-    place = tmp_path / ("long" * 30)
-    place.mkdir()
-    command = [sys.executable, "-m", "coartic", *map(str, SMALL), "--jobs", "2", "--out", "out"]
-    environment = os.environ | {"TMPDIR": str(place), "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert not list(place.iterdir())
-
-
-def test_modules_in_the_working_folder_are_not_imported(tmp_path):
+@pytest.mark.parametrize("place", ["short", "long" * 30])  # the system takes no long socket
+def test_modules_in_the_working_folder_are_not_imported(tmp_path, place):
     """By no process of a command that is installed, whatever a stranger has put there."""
     program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
     program.parent.mkdir()
@@ -234,9 +222,12 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
         (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
     command = [sys.executable, program, *map(str, SMALL), "--jobs", "2", "--out", "out"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    temporary = tmp_path / place
+    temporary.mkdir()
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)}
     done = subprocess.run(command, cwd=gift, env=environment, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
+    assert not list(temporary.iterdir())
     assert not (tmp_path / "run").exists()
 
 

@@ -37,10 +37,10 @@ def test_the_checkers_find_nothing(task, ahead):
 
 def due_movement(task, q, goal, action, moves, links):
     """The hand and the target that an action says, from what the documentation says."""
-    found = {h: correct(task.robot, q, h, goal, locked_base=task.locked_base).q for h in task.hands}
-    nearer, *others = sorted(task.hands, key=lambda hand: np.linalg.norm(found[hand] - q))
+    ends = {h: correct(task.robot, q, h, goal, locked_base=task.locked_base).q for h in task.hands}
+    nearer, *others = sorted(task.hands, key=lambda hand: np.linalg.norm(ends[hand] - q))
     hand = others[0] if others and action[0] > 0.5 else nearer
-    target, entries = found[hand].copy(), 0.5 * np.clip(action[len(others) :], -1, 1)
+    target, entries = ends[hand].copy(), 0.5 * np.clip(action[len(others) :], -1, 1)
     for entry, axis in enumerate(moves):
         target["xy".index(axis)] += 0 if axis in task.locked_base else entries[entry]
     for number, each in enumerate(task.hands):

@@ -71,11 +71,11 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
 def with_names(text: str, study: Study) -> str:
     """A text with people's names of tasks in place of their ids."""
     ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
-    whole = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
-    return re.sub(whole, lambda found: study.tasks[found[1]].label, text)
+    task_name = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
+    return re.sub(task_name, lambda match: study.tasks[match[1]].label, text)
 
 
 def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
     """How many claims have each verdict; 0 for those that none has."""
-    found = Counter(verdicts)
-    return {verdict: found[verdict] for verdict in get_args(Verdict)}
+    numbers = Counter(verdicts)
+    return {verdict: numbers[verdict] for verdict in get_args(Verdict)}

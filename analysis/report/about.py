@@ -36,8 +36,8 @@ def sentences(study: Study) -> dict[str, str]:
 
 def answers(study: Study) -> list[tuple[Section, str]]:
     """Sections whose sentences are the answers of the first screen, with these."""
-    found = sentences(study)
-    return [(each, found[each.id]) for each in SECTIONS if each.answer and each.id in found]
+    texts = sentences(study)
+    return [(each, texts[each.id]) for each in SECTIONS if each.answer and each.id in texts]
 
 
 @cached

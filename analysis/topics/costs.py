@@ -72,7 +72,7 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
     runs = cell.runs
     if spend == "solve_s":
         runs = runs.assign(solve_s=scores.solve_times(cell.good).reindex(runs.index))
-    rows, made = [], scores.floats(runs.trials)
+    rows, trials_made = [], scores.floats(runs.trials)
     total, reward = scores.floats(runs[spend]), scores.floats(runs.reward)
     for place, (run_id, status) in enumerate(zip(runs.run_id, runs.status, strict=True)):
         if status != "ok":
@@ -81,7 +81,9 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
             spent, rewards = total[[place]], reward[[place]]
             if str(run_id) in improvements(study):
                 trials, rewards = improvements(study)[str(run_id)]
-                spent = trials if spend == "trials" else total[place] * (trials / made[place])
+                spent = (
+                    trials if spend == "trials" else total[place] * (trials / trials_made[place])
+                )
             rows.append(np.append(spent, math.inf)[np.searchsorted(rewards, targets)])
     return np.array(rows).reshape(-1, len(targets))
 

@@ -12,7 +12,16 @@ import math
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import methods as known
+from coartic.analysis.methods import (
+    EC1,
+    EC3,
+    EC4,
+    LEARNER,
+    LEARNERS,
+    TOGETHER,
+    is_search,
+    is_variant,
+)
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
 from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics.estimates import standard_deviation
@@ -69,12 +78,12 @@ def labels_by_task(study: Study) -> dict[str, dict[str, str]]:
     for task, label in study.cells:
         if task in initial_and_optimum(study):
             by_method.setdefault(label, {})[task] = label
-    one_armed = by_method.get(known.EC1, {})
-    for more in (known.EC4, known.EC3):
+    one_armed = by_method.get(EC1, {})
+    for more in (EC4, EC3):
         two_armed = by_method.get(more, {})
         elsewhere = {task: label for task, label in one_armed.items() if task not in two_armed}
         if two_armed and elsewhere:
-            together = f"{known.TOGETHER}EC1, {more.removeprefix(known.LEARNER)})"
+            together = f"{TOGETHER}EC1, {more.removeprefix(LEARNER)})"
             by_method[together] = elsewhere | two_armed
     return by_method
 
@@ -128,8 +137,8 @@ def scores(study: Study) -> pd.DataFrame:
 def is_compared(study: Study, label: str) -> bool:
     """Whether a method is compared with others: no search for the optimum, and a variant only where
     settings are compared."""
-    shown = compares_settings(study) or not known.is_variant(label)
-    return shown and not known.is_search(label)
+    shown = compares_settings(study) or not is_variant(label)
+    return shown and not is_search(label)
 
 
 def told(runs: pd.DataFrame) -> str:
@@ -152,7 +161,7 @@ def groups(study: Study) -> dict[str, str]:
         learns = TOLD_LETTERS[Information.REWARD_BY_TRIAL] in letters and (runs.trials > 1).any()
         by_formula = TOLD_LETTERS[Information.REWARD_FORMULA] in letters
         of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
-    together = {name: known.EC1 for name in labels_by_task(study) if name not in of_label}
+    together = {name: EC1 for name in labels_by_task(study) if name not in of_label}
     return of_label | {name: of_label[label] for name, label in together.items()}
 
 
@@ -161,7 +170,7 @@ def best_condition(study: Study, task: str) -> str | None:
     rewards = {
         label: float(cell.rewards.mean())
         for (name, label), cell in study.cells.items()
-        if name == task and label in known.LEARNERS and len(cell.good)
+        if name == task and label in LEARNERS and len(cell.good)
     }
     return max(rewards, key=lambda label: rewards[label]) if rewards else None
 
@@ -214,7 +223,7 @@ def methods(study: Study) -> Rows:
     places = list(study.tasks)
     means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
     cells.sort(
-        key=lambda c: (places.index(c.task), not known.is_search(c.label), -means[id(c)]),
+        key=lambda c: (places.index(c.task), not is_search(c.label), -means[id(c)]),
     )
     for cell in cells:
         good, runs = cell.good, cell.runs

@@ -48,8 +48,8 @@ def measure_effects(study):
             tests = [judge_test(measured, model, test, level, silent.get(model, ""))
                      for test in finding["tests"]]  # fmt: skip
             verdict = verdict_of([test["of_test"] for test in tests])
-            whole = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
-            rows += [{"finding": name, "model": model, **test, **whole} for test in tests]
+            judged = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
+            rows += [{"finding": name, "model": model, **test, **judged} for test in tests]
     effects = pd.DataFrame(rows)
     effects["because"] = effects.pop("because")  # the last column
     bounds = effects.bound.where(effects.duplicated(["finding", "model", "measure"]), "")

@@ -108,10 +108,13 @@ class Practised(Method):
             policy = recall(given.ahead, given.agent, given.practice, session.model)
         start, goals = session.q0[None], session.goals[None]
         with session.solving():
-            made = list(trial(policy, start, goals, given.ahead, session.radius, session.model))
-            targets, hands = np.array([subtask.target[0] for subtask in made]), "R" * len(made)
+            subtasks = list(trial(policy, start, goals, given.ahead, session.radius, session.model))
+            targets, hands = (
+                np.array([subtask.target[0] for subtask in subtasks]),
+                "R" * len(subtasks),
+            )
             session.trials(hands, targets[None])
-        in_head = [reached for subtask in made for reached in subtask.reached[:2]]
+        in_head = [reached for subtask in subtasks for reached in subtask.reached[:2]]
         session.spend(
             jacobians=sum(int(reached.iterations[0]) for reached in in_head),
             forward_kinematics=sum(int(reached.evaluations[0]) for reached in in_head),

@@ -8,14 +8,14 @@ from pathlib import Path
 
 def processes():
     """Parent, session, working folder and command of each, by id; without those that have ended."""
-    found = {}
+    processes = {}
     for place in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             state, parent, _, session = (place / "stat").read_text().rpartition(") ")[2].split()[:4]
             if state != "Z":
                 folder, command = os.readlink(place / "cwd"), (place / "cmdline").read_text()
-                found[int(place.name)] = int(parent), int(session), folder, command
-    return found
+                processes[int(place.name)] = int(parent), int(session), folder, command
+    return processes
 
 
 def folders_of_session(number):

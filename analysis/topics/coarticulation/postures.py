@@ -106,23 +106,23 @@ def draw_postures(axes: Axes, shared: TwoContexts) -> None:
 
 def next_goal(study: Study) -> str:
     """Whether the posture at the goal that two tasks share depends on the next goal."""
-    found = difference(study)
-    if found is None:
+    contrast = difference(study)
+    if contrast is None:
         return ""
-    shared, placebo = found.contexts, found.placebo
+    shared, placebo = contrast.contexts, contrast.placebo
     goal, runs = shared.goal, plural(shared.n, "run")
     who = f"{name_of(shared.method)} hits goal {goal} in postures"
     spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
     p = ", ".join(filter(None, (runs, p_value(shared.p))))
     apart = f"{spreads}{number(shared.apart, 2)} (length units, rad) apart ({p})"
-    guesses = placebo and f"{number(placebo.apart, 2)} apart ({p_value(found.beyond_p)})"
-    if found.too_few:
+    guesses = placebo and f"{number(placebo.apart, 2)} apart ({p_value(contrast.beyond_p)})"
+    if contrast.too_few:
         text = (
             f"Too few runs to tell whether the next goal changes postures at goal {goal} ({runs})."
         )
-    elif not found.differ:
+    elif not contrast.differ:
         text = f"No significant difference: the {who} {apart}."
-    elif found.seen:
+    elif contrast.seen:
         beside = f"; random guesses lie {guesses}" if guesses else ""
         text = f"Yes: depending on the next goal, the {who} {apart}{beside}."
     elif guesses:

@@ -23,8 +23,8 @@ ROBOT, RIGHT, TRIALS = Robot(), slice(6, 10), 40 * practice.BATCH
 
 
 def ticks(network, q, goals, ahead):
-    made = practice.trial(network, q, goals, ahead, 0.1, PAPER)
-    return np.array([subtask.reached[-1].ticks for subtask in made])
+    subtasks = practice.trial(network, q, goals, ahead, 0.1, PAPER)
+    return np.array([subtask.reached[-1].ticks for subtask in subtasks])
 
 
 @settings(max_examples=10)
