@@ -116,11 +116,6 @@ class Robot:
         }
         return short_repr(self, left_links=self.left_links, right_links=self.right_links, **others)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # Without what is cached: arrays of a copy can be written to, and for those the kernels
-        # would be compiled again.
-        return {name: getattr(self, name) for name in type(self).__dataclass_fields__}
-
     @property
     def dof(self) -> int:
         """Number of degrees of freedom, the length of ``q``."""

@@ -86,7 +86,7 @@ from coartic.motion.lanes import lanes_for, near
 
 @entry
 def length(at):
-    return at["length"][:, 0].sum() if near(at, 1) else -1.0
+    return at[0]["length"][:, 0].sum() if near(at[0], 1) else -1.0
 
 def reach_of(links):
     at = lanes_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at

@@ -62,12 +62,12 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
 
 @entry
 def _board(lanes, lane, run, q, arm):
-    board(lanes.at, lane, run, q, arm)
+    board(lanes.at[0], lane, run, q, arm)
 
 
 @entry
 def _place(at, count):
-    place(at, count, near(at, count))
+    place(at[0], count, near(at[0], count))
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, LANES])
@@ -84,7 +84,7 @@ def test_lanes_do_not_mix(count, far):
         for lane, number in enumerate(chosen):
             _board(lanes, lane, number, starts[number], arms[number])
         _place(lanes.at, len(chosen))
-        return lanes.at["x"][:, : len(chosen)].copy(), lanes.at["y"][:, : len(chosen)].copy()
+        return lanes.at["x"][0, :, : len(chosen)].copy(), lanes.at["y"][0, :, : len(chosen)].copy()
 
     xs, ys = placed(range(count))
     for number, arm in enumerate(arms):

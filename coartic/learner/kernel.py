@@ -34,7 +34,8 @@ from coartic.motion.compiled import (
 )
 from coartic.motion.lanes import LANES, Lanes, lanes_for, runs_for, width_of
 from coartic.motion.movement import Goal
-from coartic.motion.reach import LOOK, MOVE, STAY, arm_of, attempt, correct_missed
+from coartic.motion.reach import LOOK, MOVE, STAY, attempt, correct_missed
+from coartic.motion.setup import arm_of
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
@@ -451,8 +452,8 @@ def learn_kernel(
             fill_row(kept.counts[n], work.trials[n].counts)
         first = trial == 0
         make_trial(
-            first, not replay, first_hands, first_targets, start, goals, setup, rules, tables, log,
-            rngs, work,
+            first, not replay, first_hands, first_targets, start, goals, setup[0], rules, tables,
+            log, rngs, work,
         )  # fmt: skip
         if not replay:
             learn_from(trial, rules, tables, kept, log, work)

@@ -27,19 +27,12 @@ from coartic.motion.lanes import (
     winding,
 )
 from coartic.motion.movement import check_goal, configuration, largest_square
+from coartic.motion.setup import arm_of, setup_for
 from coartic.motion.trigonometry import LARGEST
-from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.text import short_repr
 
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
-
-
-class Corrector(NamedTuple):
-    """How the corrective process may descend."""
-
-    free_x: bool
-    """Whether the base moves in x."""
-    free_y: bool
 
 
 class Correction(NamedTuple):
@@ -70,7 +63,9 @@ def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
 
 
 @inlined
-def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, bool]:
+def descend(
+    at: Any, count: int, goal: Any, gain: float, free_x: bool, free_y: bool
+) -> tuple[int, bool]:
     """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
     ended = 0
     far = 0
@@ -79,15 +74,15 @@ def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, 
         error_x = goal.x - at.x[tip, i]
         error_y = goal.y - at.y[tip, i]
         going = at.fate[i] == GOING
-        x = at.q[0, i] + model.gain * error_x if how.free_x else at.q[0, i]
-        y = at.q[1, i] + model.gain * error_y if how.free_y else at.q[1, i]
+        x = at.q[0, i] + gain * error_x if free_x else at.q[0, i]
+        y = at.q[1, i] + gain * error_y if free_y else at.q[1, i]
         moved = (x != at.q[0, i]) | (y != at.q[1, i])
         at.q[0, i] = x if going else at.q[0, i]
         at.q[1, i] = y if going else at.q[1, i]
         for k in range(tip):
             dx, dy = joint_lever(at.x[:, i], at.y[:, i], k, tip)
             before = at.q[BASE_DOF + k, i]
-            turned = before + model.gain * (dx * error_x + dy * error_y)
+            turned = before + gain * (dx * error_x + dy * error_y)
             moved |= turned != before
             at.q[BASE_DOF + k, i] = turned if going else before
         # Where nothing moves: a stationary point away from the goal, which it will not leave.
@@ -99,12 +94,13 @@ def descend(at: Any, count: int, goal: Any, how: Any, model: Any) -> tuple[int, 
 
 
 @inner
-def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs: Any) -> None:
+def correct_lanes(lanes: Any, count: int, goal: Any, setup: Any, runs: Any) -> None:
     """Let **A** descend in the first ``count`` lanes until each has ended.
 
     The ``target`` of each run becomes what its lane ends with; the rest of its record says how.
     """
-    at = lanes.at
+    at, model = lanes.at[0], setup.model
+    gain, free_x, free_y = model.gain, setup.free_x, setup.free_y
     square = largest_square(model.correction_tolerance)
     is_near = near(at, count)
     iteration = 0
@@ -113,7 +109,7 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
         find_fates(at, count, goal, square)
         ended = count
         if iteration < model.max_iterations:
-            ended, is_near = descend(at, count, goal, how, model)
+            ended, is_near = descend(at, count, goal, gain, free_x, free_y)
         if ended > 0:
             for lane in range(count - 1, -1, -1):
                 if at.fate[lane] == GOING and iteration < model.max_iterations:
@@ -132,10 +128,10 @@ def correct_lanes(lanes: Any, count: int, goal: Any, how: Any, model: Any, runs:
 
 
 @entry
-def correct_kernel(arm: Any, goal: Any, how: Any, model: Any, lanes: Any, runs: Any) -> None:
+def correct_kernel(hand: int, goal: Any, setup: Any, lanes: Any, runs: Any) -> None:
     """Correct the target of the only run."""
-    board(lanes.at, 0, 0, runs[0].target, arm)
-    correct_lanes(lanes, 1, goal, how, model, runs)
+    board(lanes.at[0], 0, 0, runs[0].target, arm_of(setup[0], hand))
+    correct_lanes(lanes, 1, goal, setup[0], runs)
 
 
 def correct(
@@ -184,14 +180,14 @@ def correct(
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
+    robot.arm(hand)  # refuses what is no hand
     runs = runs_for(1, robot)
     run, figures = runs[0], slice(robot.dof)
     run["target"][figures] = configuration(robot, q)
     correct_kernel(
-        robot.arm(hand),
+        HANDS.index(hand),
         check_goal(goal),
-        Corrector("x" not in locked_base, "y" not in locked_base),
-        check_model(model),
+        setup_for(robot, locked_base=locked_base, model=check_model(model)),
         lanes_for(robot),
         runs,
     )

@@ -32,7 +32,7 @@ class Lanes(NamedTuple):
     """Lanes and who is in them."""
 
     at: Any
-    """The rows, by name; see :func:`layout`."""
+    """The rows, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
     corrected: Any
     """The rows of an arm that is corrected: the same memory, shape ``(rows, LANES)``. Only to be
     copied: some are integers."""
@@ -82,7 +82,7 @@ def lanes_for(robot: Robot) -> Lanes:
     record, corrected, moved = layout(links_for(robot))
     at = np.zeros(1, record)
     rows = at.view(np.float64).reshape(-1, LANES)
-    return Lanes(at[0], rows[corrected], rows[moved])
+    return Lanes(at, rows[corrected], rows[moved])
 
 
 @cache

@@ -38,7 +38,8 @@ from coartic.motion.lanes import (
     runs_for,
     winding,
 )
-from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.motion.setup import arm_of, setup_for
+from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.text import short_repr
 
 # Distance kept clear beyond what the bounds ask for, which is more where positions are rounded by
@@ -110,7 +111,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 
 @lanewise
-def set_off(at: Any, count: int, model: Any) -> bool:
+def set_off(at: Any, count: int, step: float) -> bool:
     """Set rates, bounds and number of steps of every lane.
 
     Returns True if all angles stay in the range of the fast cosine (:func:`near`).
@@ -118,7 +119,7 @@ def set_off(at: Any, count: int, model: Any) -> bool:
     far = 0
     for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
-        per_step = model.step / distance if distance > 0.0 else 0.0
+        per_step = step / distance if distance > 0.0 else 0.0
         base_x = (at.target[0, i] - at.start[0, i]) * per_step
         base_y = (at.target[1, i] - at.start[1, i]) * per_step
         speed = math.sqrt(base_x * base_x + base_y * base_y)
@@ -131,12 +132,12 @@ def set_off(at: Any, count: int, model: Any) -> bool:
             bend += at.length[k, i] * rate * rate
         at.base_rate[0, i], at.base_rate[1, i] = base_x, base_y
         at.distance[i], at.slowness[i], at.bend[i] = distance, 1.0 / speed, bend
-        last = np.ceil(distance / model.step)
+        last = np.ceil(distance / step)
         at.step[i], at.last[i] = 0.0, last
         # No joint turns farther than at the farther end, and, where it passes it, a step.
-        most = winding(at.start, i) + winding(at.target, i) + model.step * len(at.length)
+        most = winding(at.start, i) + winding(at.target, i) + step * len(at.length)
         far += 0 if most < trigonometry.LARGEST else 1
-        away = reach * (1.0 + most) + model.step
+        away = reach * (1.0 + most) + step
         for j in range(BASE_DOF):
             away += abs(at.start[j, i]) + abs(at.target[j, i]) + abs(at.shoulder[j, i])
         at.clearance[i] = _CLEARANCE + _ROUNDING * len(at.x) * away
@@ -144,10 +145,10 @@ def set_off(at: Any, count: int, model: Any) -> bool:
 
 
 @lanewise
-def place_between(at: Any, count: int, model: Any) -> None:
+def place_between(at: Any, count: int, step: float) -> None:
     """The point at which each lane is now."""
     for i in range(padded_count(count)):
-        fraction = at.step[i] * model.step / at.distance[i]
+        fraction = at.step[i] * step / at.distance[i]
         for j in range(len(at.q)):
             begin, end = at.start[j, i], at.target[j, i]
             between = begin + fraction * (end - begin)
@@ -156,12 +157,12 @@ def place_between(at: Any, count: int, model: Any) -> None:
 
 @lanewise
 def look(
-    at: Any, count: int, goal: Any, stop_on_arrival: bool, model: Any, hit: float, arrived: float
+    at: Any, count: int, goal: Any, stop_on_arrival: bool, near: float, hit: float, arrived: float
 ) -> int:
     """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended.
 
-    ``hit`` and ``arrived`` are the largest squares of distances to the goal and to the end
-    at which a movement stops.
+    A movement on arrival stops ``near`` the end. ``hit`` and ``arrived`` are the largest squares of
+    distances to the goal and to the end at which a movement stops.
     """
     ended = 0
     tip = len(at.length)
@@ -182,7 +183,7 @@ def look(
             to_end = dx * dx + dy * dy
             stop |= to_end <= arrived
             closing = velocity_x * dx + velocity_y * dy
-            rim = model.arrival_tolerance + at.clearance[i]
+            rim = near + at.clearance[i]
             clear = min(clear, clear_steps(to_end, rim, closing, at.slowness[i], at.bend[i]))
         fate = _MISSED if stop else GOING
         fate = _IN_GOAL if to_goal <= hit else fate
@@ -200,7 +201,7 @@ def move_lanes(
     count: int,
     goal: Any,
     stop_on_arrival: bool,
-    model: Any,
+    setup: Any,
     runs: Any,
 ) -> None:
     """Move the first ``count`` lanes until each has ended.
@@ -208,10 +209,10 @@ def move_lanes(
     Each run's ``q``, from which it departed to its ``target``, becomes the configuration in
     which it stopped; the rest of its record says how.
     """
-    at = lanes.at
-    evaluations = 0
-    hit, arrived = largest_square(goal.radius), largest_square(model.arrival_tolerance)
-    is_near = set_off(at, count, model)
+    at, evaluations = lanes.at[0], 0
+    step, near = setup.model.step, setup.model.arrival_tolerance
+    hit, arrived = largest_square(goal.radius), largest_square(near)
+    is_near = set_off(at, count, step)
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
         place(at, count, is_near)
@@ -219,10 +220,10 @@ def move_lanes(
         fill_row(at.end[1], at.y[-1])
         evaluations += 1
     while count > 0:
-        place_between(at, count, model)
+        place_between(at, count, step)
         place(at, count, is_near)
         evaluations += 1
-        ended = look(at, count, goal, stop_on_arrival, model, hit, arrived)
+        ended = look(at, count, goal, stop_on_arrival, near, hit, arrived)
         if ended == 0:
             continue
         for lane in range(count - 1, -1, -1):
@@ -231,7 +232,7 @@ def move_lanes(
             run = runs[at.run[lane]]
             q, target = run.q, run.target
             at_end = at.step[lane] == at.last[lane]
-            fraction = 0.0 if at_end else at.step[lane] * model.step / at.distance[lane]
+            fraction = 0.0 if at_end else at.step[lane] * step / at.distance[lane]
             for j in range(len(q)):
                 between = q[j] + fraction * (target[j] - q[j])
                 q[j] = target[j] if at_end else between
@@ -247,11 +248,11 @@ def move_lanes(
 
 @entry
 def move_kernel(
-    arm: Any, goal: Any, stop_on_arrival: bool, model: Any, lanes: Any, runs: Any
+    hand: int, goal: Any, stop_on_arrival: bool, setup: Any, lanes: Any, runs: Any
 ) -> None:
     """Move the only run."""
-    depart(lanes.at, 0, 0, runs[0].q, runs[0].target, arm)
-    move_lanes(lanes, 1, goal, stop_on_arrival, model, runs)
+    depart(lanes.at[0], 0, 0, runs[0].q, runs[0].target, arm_of(setup[0], hand))
+    move_lanes(lanes, 1, goal, stop_on_arrival, setup[0], runs)
 
 
 def move(
@@ -301,6 +302,7 @@ def move(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
+    robot.arm(hand)  # refuses what is no hand
     runs = runs_for(1, robot)
     run, figures = runs[0], slice(robot.dof)
     run["q"][figures], run["target"][figures] = (
@@ -308,10 +310,10 @@ def move(
         configuration(robot, target),
     )
     move_kernel(
-        robot.arm(hand),
+        HANDS.index(hand),
         check_goal(goal, radius),
         stop_on_arrival,
-        check_model(model),
+        setup_for(robot, model=check_model(model)),
         lanes_for(robot),
         runs,
     )

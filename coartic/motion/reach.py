@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, fill_row, inlined, inner
-from coartic.motion.corrective import Corrector, correct_lanes
+from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
 from coartic.motion.movement import Goal, check_goal, configuration, move_lanes
+from coartic.motion.setup import arm_of, setup_for
 from coartic.robot import Array, Robot
 from coartic.tasks.task import Task
 from coartic.threads import in_parts
@@ -63,29 +64,11 @@ class Requests(NamedTuple):
     goals: Any  # (K, G, 2)
 
 
-class Setup(NamedTuple):
-    """Robot, constants and options."""
-
-    left: Any
-    right: Any
-    radius: float
-    corrector: Corrector
-    model: MotionModel
-    corrects: bool
-    looks: bool
-
-
 class Batch(NamedTuple):
     """What a lot of arms works on, each now at the same goal."""
 
     runs: Any  # records: see runs_for
     lanes: Any
-
-
-@inlined
-def arm_of(setup: Any, hand: int) -> Any:
-    """The arm of a hand: 0 left, 1 right."""
-    return setup.left if hand == 0 else setup.right
 
 
 @inner
@@ -95,10 +78,10 @@ def move_acting(count: int, goal: Any, stops: bool, setup: Any, batch: Any) -> N
     for i in range(count):
         run = batch.runs[i]
         if run.acting:
-            depart(batch.lanes.at, lane, i, run.q, run.target, arm_of(setup, run.hand))
+            depart(batch.lanes.at[0], lane, i, run.q, run.target, arm_of(setup, run.hand))
             lane += 1
     if lane > 0:
-        move_lanes(batch.lanes, lane, goal, stops, setup.model, batch.runs)
+        move_lanes(batch.lanes, lane, goal, stops, setup, batch.runs)
 
 
 @inlined
@@ -125,9 +108,9 @@ def correct_missed(count: int, goal: Any, setup: Any, batch: Any) -> None:
         run.ticks, run.iterations = 0, 0
         if run.acting:
             fill_row(run.target, run.q)
-            board(batch.lanes.at, lane, i, run.q, arm_of(setup, run.hand))
+            board(batch.lanes.at[0], lane, i, run.q, arm_of(setup, run.hand))
             lane += 1
-    correct_lanes(batch.lanes, lane, goal, setup.corrector, setup.model, batch.runs)
+    correct_lanes(batch.lanes, lane, goal, setup, batch.runs)
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     move_acting(count, goal, False, setup, batch)
@@ -219,7 +202,7 @@ def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
     for group in range(len(arms.goals)):
         end = arms.bounds[group + 1]
         for first in range(arms.bounds[group], end, room):
-            reach_lot(first, min(room, end - first), group, arms, setup, reached, batch)
+            reach_lot(first, min(room, end - first), group, arms, setup[0], reached, batch)
 
 
 SHARE = 14 * LANES
@@ -244,7 +227,7 @@ def batch_for(robot: Robot) -> Batch:
         return Batch(runs_for(LANES, robot), lanes_for(robot))
 
 
-def reach_with(robot: Robot, arms: Requests, setup: Setup) -> Reached:
+def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached:
     """Let N arms in K groups reach for G goals each, in turn, until they miss one.
 
     Nothing is checked. In ``arms.targets`` joints without a target are filled in, for goals that
@@ -267,19 +250,6 @@ def reach_with(robot: Robot, arms: Requests, setup: Setup) -> Reached:
     else:
         work(slice(0, count))
     return reached
-
-
-def setup_for(
-    robot: Robot,
-    radius: float,
-    *,
-    locked_base: Collection[str] = (),
-    model: MotionModel = PAPER,
-    looks: bool = True,
-) -> Setup:
-    """Robot, constants and options for the kernel; see :func:`reach_unchecked`."""
-    free = Corrector("x" not in locked_base, "y" not in locked_base)
-    return Setup(robot.arm("left"), robot.arm("right"), radius, free, model, True, looks)
 
 
 def reach_unchecked(
@@ -334,12 +304,8 @@ class Bench(NamedTuple):
     task: Task
     start: Array  # (dof,)
     goals: Array  # (1, G, 2)
-    setup: Setup
-
-    def __reduce__(self) -> tuple[Any, tuple[Task, MotionModel]]:
-        """For copies and other processes, which make theirs anew: arrays of a copy can be written
-        to, and for those the kernel would be compiled again."""
-        return bench_of, (self.task, self.setup.model)
+    setup: NDArray[np.void]  # (1,)
+    model: MotionModel
 
 
 def bench_of(task: Task, model: MotionModel) -> Bench:
@@ -347,9 +313,12 @@ def bench_of(task: Task, model: MotionModel) -> Bench:
     with: a copy of a task with changed fields is unchecked."""
     check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
-    setup = setup_for(task.robot, float(task.radius), locked_base=task.locked_base, model=model)
     return Bench(
-        task, configuration(task.robot, task.q0), np.array([goals], dtype=np.float64), setup
+        task=task,
+        start=configuration(task.robot, task.q0),
+        goals=np.array([goals], dtype=np.float64),
+        setup=setup_for(task.robot, task.radius, locked_base=task.locked_base, model=model),
+        model=model,
     )
 
 

@@ -260,7 +260,7 @@ def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> 
                 if movement is not None:
                     targets[n, g, m] = movement.target
                     stops[n, g, m] = movement.kind != "corrective"
-    reached, looks = reach_all(bench, hands, targets, stops), bench.setup.looks
+    reached, looks = reach_all(bench, hands, targets, stops), bool(bench.setup["looks"][0])
     return [
         subtasks_of(plan, asked[n], targets[n], Reached._make(f[n] for f in reached), looks)
         for n, plan in enumerate(plans)
@@ -269,7 +269,7 @@ def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> 
 
 def execute_paths(bench: Bench, plan: Plan) -> Execution:
     """Execute a solution in which movements follow paths: one movement after the other."""
-    task, model, subtasks, q = bench.task, bench.setup.model, list[Subtask](), bench.start
+    task, model, subtasks, q = bench.task, bench.model, list[Subtask](), bench.start
     for g, movements in enumerate(plan):
         done = Subtask([], q, False, 0, 0)
         for m, movement in enumerate(
@@ -281,7 +281,8 @@ def execute_paths(bench: Bench, plan: Plan) -> Execution:
                 made = [replace(movement, ticks=moved.ticks)]
                 part = Subtask(made, moved.q, moved.hit, 0, moved.evaluations)
             else:
-                setup = bench.setup._replace(looks=m == 0, corrects=movement.target is None)
+                setup = bench.setup.copy()
+                setup["looks"], setup["corrects"] = m == 0, movement.target is None
                 goal = bench.goals[:, g : g + 1]
                 here = bench._replace(start=done.q, goals=goal, setup=setup)
                 ((part,),) = make_straight(here, [[movements]], [[slots_for([movement])]])
