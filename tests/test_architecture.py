@@ -106,6 +106,7 @@ FRESH = """
 import sys
 import coartic
 assert not {"numba", "numpy", "pydantic"} & set(sys.modules), "imported with the package"
+assert {*coartic.__all__} <= {*dir(coartic)}, "not shown before it is imported"
 from coartic.runs.card import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"

@@ -232,6 +232,16 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["report", "a" * 5000], "File name too long"),
         (["run", "paper", "--out", "a" * 5000], "File name too long"),
         (["check", "/dev/zero.toml"], "no such file"),
+        (["list", "two-armed/v2/i003"], "two-armed/v1"),
+        (["list", "two-armed1"], "two-armed-1"),
+        (["check", "two-armed/v1/i003"], "coartic draw"),
+        (["run", "papr"], "did you mean 'paper'"),
+        (["report", "nowhere"], "nowhere"),
+        (["verify", "nowhere"], "nowhere"),
+        (["trace", "cells", "--in", "nowhere"], "nowhere"),
+        (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
+        (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
+        (["draw", "ascending", "--out", "x.bmp"], ".bmp"),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, capsys):

@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task, trajectory
-from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim
 from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
@@ -94,15 +93,6 @@ def judged(*planted):
 )
 def test_verdicts(finding, verdict):
     assert judged((finding, {})).verdict.tolist() == [verdict]
-
-
-def test_the_opposite_counts_as_many_resamples_as_the_test():
-    values = np.random.default_rng(1).normal(-3, 1, 12)
-    for resamples in (999, 9_999):
-        greater, less = (
-            bootstrap_test(values, 0.0, tail, resamples=resamples) for tail in ("greater", "less")
-        )
-        assert Finding(False, "planted", (greater,)).opposite_p == pytest.approx(less.p)
 
 
 @pytest.mark.parametrize(
@@ -203,20 +193,13 @@ def verdict_of(claim, study):
     return judge_claims(study, [replace(CLAIMS[claim], depends=False)]).iloc[0]
 
 
-BELOW = [-710, -712, -708, -711, -709, -713, -707, -710]
-"""Below the initial solution of two-armed-1, -675."""
 LOW = [-610, -612, -608, -611, -609, -613, -607, -610]
 MIDDLE = [-505, -503, -507, -504, -506, -508, -502, -505]
 HIGH = [-484, -482, -486, -483, -485, -487, -481, -484]
 WORSE = [-350, -351, -352, -353, -351, -350, -352, -354]
 BETTER = [-330, -331, -332, -333, -331, -330, -332, -334]
 RRLR = ["RRLR"] * 8 + ["RRRR"] * 8
-TWENTY = [-505 - k % 5 for k in range(20)]
 MIXED = ["RLRR"] * 8 + ["RRRR"] * 8
-
-
-def lrlr(count):
-    return ["LRLR"] * count + ["RRRR"] * (20 - count)
 
 
 def on_1(condition, rewards, hands="LRLR"):
@@ -764,10 +747,6 @@ def test_every_sentence_is_accounted_for():
     assert not lacking, f"in no sentence of sentences.toml: {lacking}"
     files = re.findall(r"(?:coartic|tests)/[\w/]+(?:\.py)?", str(printed))
     assert [file for file in files if not (Path(__file__).parent.parent / file).exists()] == []
-
-
-def test_few_and_most_are_one_margin():
-    assert margins.FEW == 1 - margins.MOST
 
 
 def test_sets_of_goals_are_as_counted():

@@ -235,9 +235,6 @@ def test_list(coartic):
     assert coartic("list")[0] == 0
     for name in ("two-armed-1", "comparison", "long", "dual-process/EC4", "EC4"):
         assert coartic("list", name)[0] == 0
-    code, _, error = coartic("list", "two-armed1")
-    assert code == 2
-    assert "two-armed-1" in error
 
 
 def test_draw(coartic, tmp_path):
@@ -293,33 +290,6 @@ def test_entry_points():
     ):
         text = subprocess.check_output([*command, "--version"], text=True)
         assert text == f"coartic {__version__}\n"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("list", "two-armed/v2/i003"), "two-armed/v1"),
-        (("check", "two-armed/v1/i003"), "coartic draw"),
-        (("run", "papr"), "paper"),
-        (("run", "paper", "--tasks", "ascendin"), "ascending"),
-        (("run", "paper", "--methods", "EC9"), "EC9"),
-        (("run", "paper", "--runs", "0"), "runs"),
-        (("run", "paper", "--jobs", "-2"), "jobs"),
-        (("report", "nowhere"), "nowhere"),
-        (("verify", "nowhere"), "nowhere"),
-        (("trace", "cells", "--in", "nowhere"), "nowhere"),
-        (("reproduce", "0123456", "--in", "nowhere"), "nowhere"),
-        (("draw", "ascending", "--out", "x.bmp"), ".bmp"),
-        (("animate", "0123456", "--in", "nowhere", "--out", "x.gif"), "nowhere"),
-    ],
-)
-def test_a_mistake_gets_a_sentence(coartic, arguments, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, out, error = coartic(*arguments)
-    assert code == 2
-    assert words in out + error
-    assert "Traceback" not in error
-    assert not list(tmp_path.iterdir())
 
 
 def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path):

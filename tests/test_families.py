@@ -219,33 +219,6 @@ def test_both_hands_reach_every_goal(side):
     assert broken_rule(of_family(hands=one), alone) is None
 
 
-def test_rejection_leaves_the_structure_alone():
-    family = load_family("aligned/v1")
-    for name in instances_in("aligned/v1/i000..i059"):
-        first, last = draft(family, address_of(name), 0), instance(name)
-        for what in ("robot", "locked_base", "start"):  # straight arms of either kind
-            assert getattr(first, what) == getattr(last, what)
-        assert len(first.goals) == len(last.goals)
-
-
-def test_goals_of_the_aligned_family():
-    axes = set()
-    for name in instances_in("aligned/v1/i000..i039"):
-        goals = instance(name).goals
-        for axis in (0, 1):
-            levels = [goal[axis] for goal in goals]
-            odd = [k for k, level in enumerate(levels) if levels.count(level) == 1]
-            if len(odd) == 1:
-                axes.add(axis)
-                assert 0 < odd[0] < len(goals) - 1
-                places = [goal[1 - axis] for goal in goals]
-                assert places in (sorted(places), sorted(places, reverse=True))
-                break
-        else:
-            raise AssertionError(f"{name}: no line with one goal off it")
-    assert axes == {0, 1}
-
-
 def test_splits_share_no_instance():
     ranges = ("d000..d024", "i000..i024", "2027-000..2027-024", "2028-000..2028-024")
     tasks = [[instance(name) for name in instances_in(f"two-armed/v1/{each}")] for each in ranges]
@@ -305,22 +278,6 @@ def test_a_family_that_cannot_be_met_ends():
     message = "20 draws of family 'two-armed/v1' broke a rule, 20 of them 'overlap'"
     with pytest.raises(TaskError, match=message):
         first_good(of_family(apart=99_000), address_of("two-armed/v1/i000"), most=20)
-
-
-SMALL = Selection(
-    tasks=["two-armed/v1/i000..i001"], methods=["EC3", "EC4", "corrective-alone/given"]
-)
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_small_suite(tmp_path):
-    """The folder holds the whole tasks, and thereby the hashes of the instances' files."""
-    report = run_suite("families", tmp_path / "out", runs=2, trials=20, select=SMALL)
-    assert (report.progress.done, report.progress.failed) == (10, 0)
-    names = instances_in("two-armed/v1/i000..i001")
-    study = load(tmp_path / "out")
-    assert set(study.runs.task) == set(names)
-    assert study.tasks == {name: instance(name) for name in names}
 
 
 def test_an_instance_beside_a_suites_tasks():

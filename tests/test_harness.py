@@ -14,7 +14,6 @@ from coartic import (
     Movement,
     corrective_trial,
     execute,
-    hand_sequences,
     load_task,
 )
 from coartic.analysis.study import load
@@ -27,11 +26,10 @@ from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
 from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.method import Information, Meter, Session
-from coartic.motion.initial import ranked_sequences
 from coartic.runs.plan import RunKey, Setting, run_seed
 from coartic.runs.run import Times, movements_from, too_long
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import AS_RELEASED, tiny_task
+from tests.support.strategies import tiny_task
 from tests.support.suites import (
     BROKEN,
     KNOWN,
@@ -76,26 +74,6 @@ def test_suite_ablations_frees_the_base():
     suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
     with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
         select_cells(suite, KNOWN)
-
-
-def test_solutions_re_execute_to_the_stored_reward(results):
-    """From the file alone, every movement as it stands there."""
-    solutions = results.solutions
-    for run in results.runs.itertuples():
-        rows = solutions[solutions.run_id == run.run_id]
-        execution = execute(results.tasks[run.task], movements_from(results.tasks[run.task], rows))
-        assert execution.reward == run.reward == -rows.ticks.sum()
-        assert execution.hands == run.hands
-
-
-def test_rewards_by_trial(results):
-    rewards = dict(results.rewards())
-    assert list(rewards) == list(results.runs.run_id)
-    for run in results.runs.itertuples():
-        curve = rewards[run.run_id]
-        assert (len(curve), curve[0], curve.max()) == (150, run.initial_reward, run.reward)
-        assert curve[run.best_trial] == run.reward
-        assert (curve[: run.best_trial] < run.reward).all()
 
 
 def test_long_runs_begin_first_and_the_time_left_is_that_of_their_methods(tmp_path):
@@ -401,21 +379,6 @@ def test_variants_of_the_learner_are_methods_of_their_own(tmp_path):
             assert ("reward by subtask" in entry.told) == name.endswith("-subtask")
     with pytest.raises(CoarticError, match="discount is an unknown key"):
         KNOWN["dual-process/EC4"].complete({"discount": 0.1})  # told would no longer be right
-
-
-def test_every_sequence_is_sorted_and_bounded():
-    task = load_task("two-armed-1")
-    trials = ranked_sequences(task, hand_sequences(task))
-    rewards = [execution.reward for _, execution in trials]
-    assert rewards == sorted(rewards, reverse=True)
-    assert all(hands == execution.hands for hands, execution in trials)
-    two = AS_RELEASED  # of equals, fewer changes of hand go first
-    assert [corrective_trial(two, hands).reward for hands in ("RLRR", "RRRR")] == [-357] * 2
-    ranked = ranked_sequences(two, hand_sequences(two))
-    assert [hands for hands, _ in ranked[:2]] == ["RRRR", "RLRR"]
-    many = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
-    with pytest.raises(CoarticError, match="8192 hand sequences; at most 4096"):
-        hand_sequences(many)
 
 
 def test_a_suite_can_move_one_goal(tmp_path):

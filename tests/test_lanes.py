@@ -2,17 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
 import numpy.testing as npt
 import pytest
 
 from coartic import PAPER, MotionModel, learn, learn_many, load_task
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
-from coartic.motion.compiled import entry
-from coartic.motion.lanes import LANES, board, lanes_for, near, place
-from coartic.motion.trigonometry import LARGEST
-from tests.support.strategies import UNEVEN
+from coartic.motion.lanes import LANES
 from tests.support.suites import KNOWN, InProcess, run_and_write
 
 SOON_FAILED = MotionModel(max_iterations=60)
@@ -58,42 +54,6 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
             assert_same(run, learn(task, condition, seed=run.seed, **options))
     if model is SOON_FAILED:
         assert any(run.counters.failed_trials for run in together)
-
-
-@entry
-def _board(lanes, lane, run, q, arm):
-    board(lanes.at[0], lane, run, q, arm)
-
-
-@entry
-def _place(at, count):
-    place(at[0], count, near(at[0], count))
-
-
-@pytest.mark.parametrize("count", [1, 2, 9, LANES])
-@pytest.mark.parametrize("far", [False, True])
-def test_lanes_do_not_mix(count, far):
-    """Arms of either hand side by side, also where one of them has turned too far."""
-    robot, rng = UNEVEN, np.random.default_rng(count)
-    starts = rng.normal(0, 0.5, (count, robot.dof))
-    starts[-1, robot.joints("left")] += LARGEST if far else 0.0
-    arms = [robot.arm("left" if k % 2 or far else "right") for k in range(count)]
-    lanes = lanes_for(robot)  # with what was in them before
-
-    def placed(chosen):
-        for lane, number in enumerate(chosen):
-            _board(lanes, lane, number, starts[number], arms[number])
-        _place(lanes.at, len(chosen))
-        return lanes.at["x"][0, :, : len(chosen)].copy(), lanes.at["y"][0, :, : len(chosen)].copy()
-
-    xs, ys = placed(range(count))
-    for number, arm in enumerate(arms):
-        (x,), (y,) = (coordinates.T for coordinates in placed([number]))
-        npt.assert_array_equal(xs[:, number], x)
-        npt.assert_array_equal(ys[:, number], y)
-        hand = "left" if arm.first == robot.arm("left").first else "right"
-        expected = robot.forward_kinematics(starts[number], hand)
-        npt.assert_allclose((xs[-1, number], ys[-1, number]), expected, atol=1e-9)
 
 
 class Nobody(InProcess):

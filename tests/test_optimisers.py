@@ -4,18 +4,15 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import coartic
-from coartic import MotionModel, builtin_tasks, corrective_trial, execute, hand_sequences, load_task
+from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session
 from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED, TOLD, Objective
-from coartic.runs.run import movements_from
-from coartic.tasks.optima import entries
 from tests.support.strategies import tiny_task
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -68,43 +65,6 @@ def test_a_goal_has_all_its_entries_or_none():
         cost.many(points)
     with pytest.raises(ValueError, match="infinite"):
         cost(np.where(goals == 1, np.inf, cost.x0))
-
-
-ENTRIES = {f"{e.task} {e.base} {e.other_arm}": e for e in entries()}
-WITHOUT_SOLUTION = {  # no search has one: the task as it is locked has none, or none is known
-    "ascending xy free", "ascending xy still", "descending xy free", "descending xy still",
-    "descending y free", "descending y still", "two-armed-1 xy free", "two-armed-1 xy still",
-    "two-armed-2 xy free", "two-armed-2 xy still",
-}  # fmt: skip
-
-
-def test_every_optimum_is_replayed_or_there_is_none():
-    assert {name for name, entry in ENTRIES.items() if not entry.solution} == WITHOUT_SOLUTION
-    assert ENTRIES.keys() - WITHOUT_SOLUTION >= {f"{task} task free" for task in builtin_tasks()}
-
-
-@pytest.mark.parametrize("name", sorted(ENTRIES.keys() - WITHOUT_SOLUTION))
-def test_an_optimum_gets_its_reward_through_every_door(name):
-    """Solutions hold one movement for each goal, and none follows a path."""
-    entry, task = ENTRIES[name], load_task(name.split()[0])
-    if entry.base != "task":
-        task = task.model_copy(update={"locked_base": tuple(entry.base)})
-    solution = movements_from(task, pd.DataFrame(entry.solution))
-    assert execute(task, solution).reward == entry.reward
-    assert [movement.goal for movement in solution] == [*range(1, len(task.goals) + 1)]
-    targets = np.array([np.full(task.robot.dof, np.nan) if m.kind == "corrective" else m.target
-                        for m in solution])  # fmt: skip
-    session = Session(task, 0, TOLD)
-    assert session.trials(entry.hands, targets[None]).rewards == [entry.reward]
-    cost = coartic.objective(task, entry.hands)
-    assert cost(targets[cost.joints]) == -entry.reward
-    assert execute(task, cost.solution).reward == entry.reward
-
-
-def test_the_optima_that_need_a_goal_of_no_ticks_hold_one():
-    """So that the tests above see that a door can express it."""
-    none = {n for n, e in ENTRIES.items() if any(m["ticks"] == 0 for m in e.solution)}
-    assert none >= {"two-armed-1 task free", "two-armed-2 task free"}
 
 
 def test_the_default_hands_are_those_that_do_best_alone():

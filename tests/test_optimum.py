@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import renew_optima
 
-from coartic import builtin_tasks, execute, load_task
+from coartic import builtin_tasks, execute, load_task, objective
 from coartic.analysis import optima
 from coartic.baselines.optimum import Optimum, with_locks
 from coartic.baselines.shortest_paths import fewer
@@ -34,7 +34,8 @@ def name_of(entry):
 
 @pytest.mark.parametrize("entry", SOLVED, ids=name_of)
 def test_what_is_shipped_holds(entry):
-    """The solution gives its reward; the searches agree; the bound is not above it."""
+    """The solution gives its reward, also as a point; the searches agree; the bound is not above
+    it."""
     task = load_task(entry.task)
     assert entry.essence == essence(task)
     solution = movements_from(task, pd.DataFrame(list(entry.solution)))
@@ -49,6 +50,10 @@ def test_what_is_shipped_holds(entry):
         column = "xy".index(axis)
         assert np.all(execution.configurations[:, column] == task.q0[column])
     assert max(entry.searches.values()) == entry.reward
+    cost = objective(with_locks(task, entry.base), entry.hands)
+    targets = [np.full(len(task.q0), np.nan) if m.kind == "corrective" else m.target
+               for m in solution]  # fmt: skip
+    assert cost(np.array(targets)[cost.joints]) == -entry.reward
     # On two-armed 1 with the other arm still only random starts find the best.
     apart = 3 if name_of(entry) == "two-armed-1-still-task" else 1
     assert entry.reward - min(entry.searches.values()) <= apart
@@ -166,14 +171,18 @@ def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_fami
     rows = [
         ("ascending", "optimum/a", -290, -280), ("ascending", "other", -200, None),
         ("one-armed/v1/i901", "optimum/a", -300, -250),
-        ("one-armed/v1/i901", "other", -290, None),
+        ("one-armed/v1/i901", "other", -290, None), ("one-armed/v1/i001", "other", -9999, None),
     ]  # fmt: skip
     runs = pd.DataFrame(rows, columns=["task", "method", "reward", "proven_bound"])
     runs = runs.assign(status="ok", hands="RRR", parameters="{}")
     runs = runs.astype({"proven_bound": "Int64"})
-    tasks = {name: load_task(name) for name in ("ascending", "one-armed/v1/i901")}
+    tasks = {name: load_task(name) for name in runs.task}
     best = optima.known_optima(runs, tasks)
-    free = {name: (o.reward, o.bound) for name, o in best.items()}
-    assert free == {"ascending": (-290, -292), "one-armed/v1/i901": (-290, -250)}
+    shipped = best_shipped(tasks["one-armed/v1/i001"])
+    assert {name: (o.reward, o.bound) for name, o in best.items()} == {
+        "ascending": (-290, -292),
+        "one-armed/v1/i901": (-290, -250),
+        "one-armed/v1/i001": (shipped.reward, shipped.bound),
+    }
     locked = runs.assign(parameters='{"base": "y"}')
     assert optima.known_optima(locked, tasks)["ascending"].reward == -292

@@ -142,14 +142,6 @@ def test_looking_ahead_takes_the_other_hand_where_that_pays():
     assert -sum(two.details["expected_ticks"]) == execution.reward
 
 
-def test_another_round_of_generation_never_costs_more():
-    task = bent(goals=[[5.0, 1.0]], initial_hands="R", hands=["right"])
-    for seed in range(12):
-        one, two = (solve(OneGoal, task, seed, stored=20, rounds=rounds)[0] for rounds in (1, 2))
-        lengths = [math.dist(task.q0, each.solution[0].target) for each in (one, two)]
-        assert lengths[1] <= lengths[0]
-
-
 def test_the_way_on_is_that_of_the_base_and_the_next_hand():
     """By the right arm 1.0 and on by the left one 0.5, or by the base 0.7 and on by 0.86."""
     task = bent(goals=[[5.0, 1.0], [4.0, 2.5]])
@@ -159,19 +151,6 @@ def test_the_way_on_is_that_of_the_base_and_the_next_hand():
     first, second = np.stack([q + 1.0 * unit[6], q + 0.7 * unit[0]]), q + 0.5 * unit[2]
     chosen = planner.most_promising(("right", "left"), [first, second[None]])
     np.testing.assert_array_equal(chosen, [first[0], first[0] + second - q])
-
-
-def test_without_diffusion_the_base_takes_the_hand_there():
-    task = bent(goals=[[5.0, 1.0]], initial_hands="R", hands=["right"])
-    result, _, session = solve(OneGoal, task, stored=0, rounds=0)
-    (movement,) = result.solution
-    hand = task.robot.forward_kinematics(task.q0, "right")
-    expected = np.array(task.q0)
-    expected[:2] += np.array(task.goals[0]) - hand
-    assert movement.target == pytest.approx(expected)
-    points = math.ceil(math.dist(hand, task.goals[0]) / STEP) + 1
-    assert session.meter.forward_kinematics == 2 + points  # evaluated, placed, simulated
-    assert session.meter.jacobians == 0
 
 
 @pytest.mark.parametrize("locked", [["x", "y"], ["y"], ["x"]])

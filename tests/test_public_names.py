@@ -1,8 +1,6 @@
 """The names of ``coartic``: what they take, what they refuse, and how they show themselves."""
 
 import inspect
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +9,7 @@ import pytest
 import coartic
 from coartic import Movement, Robot, execute, load_task
 from coartic.method import Information, Session
-from coartic.robot import MOST_LINKS
-from coartic.tasks.task import MOST_GOALS, TASK_FOLDER
-from tests.support.strategies import tiny_task
+from coartic.tasks.task import TASK_FOLDER
 
 TASK = load_task("two-armed-2")
 FILE = next(path for path in TASK_FOLDER.glob("*.toml") if load_task(path).name == TASK.name)
@@ -136,57 +132,6 @@ def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
             coartic.hand_sequences(TASK, wrong)
 
 
-def large():
-    """As much of everything as a task may have."""
-    links, title = [1.0] * MOST_LINKS, "x" * 500
-    source = {"status": "chosen", "source": title}
-    start = {"left": [1 / 3] * MOST_LINKS, "right": [1 / 3] * MOST_LINKS}
-    return tiny_task(
-        name="x" * 64, title=title, description=title, goals=[[5 / 3, 1.0]] * MOST_GOALS,
-        initial_hands="R" * MOST_GOALS, start=start, provenance={"goals": source},
-        robot={"left_links": links, "right_links": links, "left_shoulder": [1 / 3, 1 / 7]},
-    )  # fmt: skip
-
-
-def examples():
-    big, q = large(), np.full(2 * MOST_LINKS + 2, 1 / 3)
-    for task in (TASK, load_task("ascending"), big):
-        yield from (task, task.start, task.robot, task.robot.arm("left"))
-        yield from task.provenance.values()
-    yield from (coartic.CONDITIONS, coartic.VARIANTS, coartic.PAPER)
-    yield from (coartic.CONDITIONS | coartic.VARIANTS).values()
-    yield replace(coartic.CONDITIONS["EC4"], id="x" * 1000, noise_sd=1 / 3, corrects=False)
-    failing = coartic.MotionModel(max_iterations=1)
-    yield from (failing, coartic.corrective_trial(TASK, HANDS, model=failing))
-    yield from (PATH, PATH.execution, *PATH.execution.movements)
-    yield Movement(1, "right", "path", q, 10**9, np.array([q] * 20))
-    yield Movement(1, "x" * 1000, ["y"] * 1000, np.array(["odd"]), None)
-    yield coartic.learn(TASK, "EC3", seed=2**62, trials=20)
-    yield coartic.learn(TASK, "EC3", seed=0, trials=2, model=failing)
-    yield coartic.learn(load_task("ascending"), "EC1", seed=0, trials=3000)
-    yield coartic.correct(TASK.robot, TASK.q0, "right", (1.0, 1.0), model=failing)
-    yield coartic.move(TASK.robot, TASK.q0, TASK.q0, "right", (1.0, 1.0), 0.1)
-    yield coartic.Correction(q, False, 10**9)
-    yield coartic.MoveResult(q, 10**9, True, 10**9)
-    yield coartic.objective(TASK, HANDS)
-    yield from (getattr(coartic, name) for name in coartic.__all__)
-
-
-def test_what_is_shown_of_an_object_fits_in_five_lines():
-    shown = {type(thing) for thing in examples()}
-    classes = {
-        thing for name in coartic.__all__ if inspect.isclass(thing := getattr(coartic, name))
-    }
-    errors = {each for each in classes if issubclass(each, Exception)}
-    assert classes - errors - {coartic.Optimiser} <= shown  # which is abstract
-    for thing in examples():
-        for text in (repr(thing), str(thing)):
-            assert sum(len(line) // 100 + 1 for line in text.splitlines()) <= 5, text
-    assert repr(TASK) == (
-        "Task('two-armed-2', 4 goals, hands=('left', 'right'), initial_hands='RRRR')"
-    )
-
-
 def test_conditions_are_shown_as_they_are_written():
     for condition in (coartic.CONDITIONS | coartic.VARIANTS).values():
         assert eval(repr(condition), {**vars(coartic)}) == condition
@@ -194,59 +139,17 @@ def test_conditions_are_shown_as_they_are_written():
 
 def test_dir_shows_the_interface_alone():
     assert {name for name in dir(coartic) if not name.startswith("__")} == {*coartic.__all__}
-    program = "import coartic; print(*dir(coartic))"  # nothing is loaded yet
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
-    assert {*coartic.__all__, "__version__"} <= {*done.stdout.split()}
     assert len(set(coartic.__all__)) == len(coartic.__all__)
 
 
-def told(*information, **options):
-    return Session(TASK, 0, information, **options)
-
-
-WRONG = {
-    "task": lambda: load_task("ascendng"),
-    "content": lambda: coartic.parse_task({}, "mine"),
-    "condition": lambda: coartic.learn(TASK, "EC9", seed=0),
-    "nothing learned": lambda: coartic.learn(
-        TASK, "EC3", seed=0, trials=1, model=coartic.MotionModel(max_iterations=0)
-    ).execute(),
-    "one hand": lambda: coartic.learn("ascending", "EC4", seed=0),
-    "no trial": lambda: coartic.learn(TASK, "EC4", seed=0, trials=0),
-    "start": lambda: coartic.learn_many(
-        TASK, "EC4", seeds=[0], trials=1, start=[Movement(1, "left", "learned", Q)]
-    ),
-    "sequences": lambda: coartic.hand_sequences(
-        tiny_task(goals=[[5, 1]] * 13, initial_hands="R" * 13)
-    ),
-    "solution": lambda: execute(TASK, []),
-    "path": lambda: coartic.trajectory(TASK, []),
-    "infeasible": lambda: coartic.objective(TASK, model=coartic.MotionModel(max_iterations=0)),
-    "budget": lambda: told(*Information, trial_budget=0).trial([]),
-    "undeclared": lambda: told().trial([]),
-    "shape": lambda: Robot().jacobian([1.0], "left"),
-    "model": lambda: coartic.corrective_trial(TASK, HANDS, model=coartic.MotionModel(step=0.0)),
-    "robot": lambda: Robot(left_links=()),
-}
-
-
-def test_what_is_raised_can_be_imported():
-    """Errors of the baselines stay within them."""
+def test_errors_can_be_imported():
+    """But for those of a folder below, which stay within it."""
 
     def all_of(error):
         return {error, *(each for sub in error.__subclasses__() for each in all_of(sub))}
 
-    raised = set()
-    for call in WRONG.values():
-        with pytest.raises((coartic.CoarticError, ValueError)) as caught:
-            call()
-        raised.add(type(caught.value))
-    public = {getattr(coartic, name) for name in coartic.__all__ if name.endswith("Error")}
-    assert {error for error in raised if not issubclass(error, ValueError)} <= public
     errors = {each for each in all_of(coartic.CoarticError) if each.__module__.count(".") == 1}
-    assert errors <= raised & public
+    assert {error.__name__ for error in errors} <= {*coartic.__all__}
 
 
 FUNCTIONS = {

@@ -18,7 +18,7 @@ from coartic.analysis.report import render
 from coartic.analysis.report.about import answers, limits
 from coartic.analysis.report.build import inert, report_files, write_report
 from coartic.analysis.report.trace import rows_of, tables_of
-from coartic.analysis.sections import FIGURES, SECTIONS
+from coartic.analysis.sections import FIGURES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.tables import TABLES
@@ -293,13 +293,6 @@ def test_tables_compile_and_fit_a_column(tables_by_name, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:]
     assert "Overfull \\hbox" not in done.stdout
-
-
-def test_sections_name_figures_and_tables():
-    for section in SECTIONS:
-        assert section.figure in {"", *FIGURES}
-        assert section.table in {"", *TABLES}
-        assert bool(section.caption) == bool(section.table)
 
 
 def test_limits_count_the_runs_of_the_papers_cells_and_all_trials_of_learners():

@@ -18,24 +18,6 @@ def configurations(robot, low=-10.0, high=10.0):
     return strategies.configurations(robot, low, high)
 
 
-@pytest.mark.parametrize(
-    ("q", "hand", "expected"),
-    [
-        # Arms straight along +x: shoulder plus four unit links.
-        (np.zeros(10), "right", (4.5, 0.1)),
-        (np.zeros(10), "left", (3.5, 0.1)),
-        # Right arm straight up, base moved.
-        ([1, 2, 0, 0, 0, 0, np.pi / 2, 0, 0, 0], "right", (1.5, 6.1)),
-        # Right arm folded into a square: four links back to the shoulder.
-        ([0, 0, 0, 0, 0, 0, 0, np.pi / 2, np.pi / 2, np.pi / 2], "right", (0.5, 0.1)),
-        # Relative angles: the second link turns back against the first.
-        ([0, 0, np.pi / 2, -np.pi / 2, 0, 0, 0, 0, 0, 0], "left", (2.5, 1.1)),
-    ],
-)
-def test_analytic_poses(q, hand, expected):
-    np.testing.assert_allclose(PAPER_ROBOT.forward_kinematics(q, hand), expected, atol=1e-15)
-
-
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("hand", HANDS)
 def test_forward_kinematics_against_complex_exponentials(robot, hand):

@@ -30,16 +30,6 @@ def posture(x, y=0.0):
     return [x, y, *[0.0] * 8]
 
 
-def test_a_plan_that_hits():
-    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
-    execution = execute(task, planned(posture(1.0), posture(2.0)))
-    # 1.0 less the radius of 0.1 is 90 steps and the arrival tick; then 1.0 more.
-    assert execution.ticks_by_goal() == (91, 101)
-    assert execution.reward == -192
-    assert execution.corrections == 0
-    assert execution.completed
-
-
 def test_aiming_at_the_rim_stops_short_of_it():
     """Within θ^a of a rim target the movement ends without a hit; 0.09 inside it hits."""
     task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")

@@ -57,16 +57,6 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
        ("two-armed-1", "cma-es/bandit"): [-466, -467, -468, -466]}  # fmt: skip
 
 
-def test_the_learners_conditions_stand_together():
-    over = ranking.main_gaps(study(LEARNER | CMA))
-    assert over.method.tolist() == ["cma-es/bandit", "dual-process (EC1, EC4)"]
-    by_task = [(301.5 - 292) / 292, (481.5 - 465) / 465]
-    assert over.gap.iloc[1] == pytest.approx(np.mean(by_task))
-    assert over.algorithm.tolist() == ["CMA-ES", "learner"]
-    assert (over.gap_low < over.gap).all()
-    assert (over.gap < over.gap_high).all()
-
-
 def test_on_one_task_intervals_are_of_the_gaps_themselves():
     """Of skewed rewards, so that the ends are not alike; without spread a point."""
     rewards = [-310, -300, -301, -302, -300, -300]
@@ -147,16 +137,6 @@ def resampled_ends(spends, level):
     shares[:, -1] = 1.0
     crossed = budgets[(shares >= level - 1e-9).argmax(axis=1)]
     return tuple(np.quantile(crossed, [0.025, 0.975], method="inverted_cdf"))
-
-
-def test_targets_are_evenly_spaced_rewards():
-    """A run that goes half of the way has reached half of the targets."""
-    half = -319 + (319 - 292) / 2
-    seen = study({("ascending", "posture-based/two-goals"): [math.ceil(half)] * 3})
-    vars(seen)["rewards"] = lambda: iter(())
-    paid = TABLES["runtimes"](seen).loc["posture-based/two-goals"]
-    assert paid.reached == 10 / 20
-    assert (paid.trials_to_quarter, paid.trials_to_half) == (10, 10)  # trials of the made-up row
 
 
 def test_a_failed_run_reaches_nothing():
@@ -258,24 +238,6 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert "mine width=0.2, not of this project, ends" in ranking.nearest(again)
     assert "as its author declares" in ranking.nearest(again)
     assert "declares" not in ranking.nearest(study(TEN))
-
-
-def test_trials_to_the_middle_of_the_way():
-    """The median of three runs by task: 4, 6 and never; never, never and 2."""
-    half = {"ascending": -305, "two-armed-1": -570}  # of -319 to -292, and of -675 to -465
-    at = {"ascending": (4, 6, None), "two-armed-1": (None, None, 2)}
-    seen = study({("ascending", "dual-process/EC1"): [-300] * 3,
-                  ("two-armed-1", "dual-process/EC4"): [-480] * 3})  # fmt: skip
-    rewards = {}
-    for (task, _), cell in seen.cells.items():
-        for run_id, trial in zip(cell.runs.run_id, at[task], strict=True):
-            trials = np.full(10, half[task] - 1.0)
-            if trial is not None:
-                trials[trial - 1] = half[task]
-            rewards[run_id] = trials
-    vars(seen)["rewards"] = lambda: iter(rewards.items())
-    table = TABLES["runtimes"](seen).loc["dual-process (EC1, EC4)"]
-    assert table[["half on ascending", "half on two-armed-1"]].tolist() == [6.0, math.inf]
 
 
 def test_the_best_condition_has_the_highest_mean():

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, Strategy
@@ -28,42 +27,6 @@ def solve(method, task, seed=0, budget=None, model=None, **parameters):
     session = Session(task, seed, method.told, trial_budget=budget, model=model or MotionModel())
     result = method(method.Parameters(**parameters)).solve(session)
     return session, result
-
-
-def shortest_reach(task):
-    """Ticks of the shortest joint-space line to a one-goal task's disc, by SLSQP."""
-    free = [0, 1, 6, 7, 8, 9]
-    goal = np.array(task.goals[0])
-
-    def q(x):
-        full = np.array(task.q0)
-        full[free] = x
-        return full
-
-    def inside(x):
-        return task.radius**2 - ((task.robot.forward_kinematics(q(x), "right") - goal) ** 2).sum()
-
-    rng = np.random.default_rng(0)
-    solutions = [
-        minimize(
-            lambda x: ((x - task.q0[free]) ** 2).sum(),
-            task.q0[free] + rng.normal(0, 1.0, len(free)),
-            constraints={"type": "ineq", "fun": inside},
-            method="SLSQP",
-        )
-        for _ in range(10)
-    ]
-    return math.ceil(min(math.sqrt(f.fun) for f in solutions if f.success) / 0.01) + 1
-
-
-def test_one_goal_is_reached_on_the_shortest_line():
-    shortest = shortest_reach(ONE_GOAL)
-    alone = -corrective_trial(ONE_GOAL, "R").reward
-    assert alone > shortest + 5
-    session, _ = solve(CMAES, ONE_GOAL, trials=800)
-    assert shortest - 1 <= -max(session.rewards) <= shortest + 1
-    climbing, _ = solve(Climbing, ONE_GOAL, trials=800)
-    assert max(climbing.rewards) > -alone
 
 
 def test_joints_explored_for_a_hand_sequence():
