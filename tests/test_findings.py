@@ -1,6 +1,7 @@
 """The pages of the site whose numbers come from stored results."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -26,3 +27,15 @@ def test_a_sentence_that_no_longer_holds_is_refused(tmp_path):
     assert fill_page(template, gap=0.5) == "It is nearer."
     with pytest.raises(ValueError, match="CMA-ES is nearer"):
         fill_page(template, gap=2)
+
+
+def test_links_of_pages_name_files_that_are_there():
+    pages = [*DOCS.parent.glob("*.md"), *DOCS.parent.glob("studies/**/*.md"), *DOCS.rglob("*.md")]
+    lost = []
+    for page in pages:
+        # Code spans and blocks have brackets of their own.
+        text = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(encoding="utf-8"), flags=re.S)
+        for link in re.findall(r"\]\(([^)#\s]+)", text):
+            if "://" not in link and not (page.parent / link).exists():
+                lost.append(f"{page.name}: {link}")
+    assert not lost
