@@ -84,6 +84,29 @@ def test_verdicts_of_planted_means():
     assert judged.p_holm["above"] == pytest.approx(min(1, alone * len(claims)))
 
 
+CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
+"""Values whose mean is above 0 because of the last one."""
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_one_task_carries_no_claim(side):
+    """Without it the test is that of the other tasks alone."""
+    where = {1: "greater", -1: "less"}[side]
+    every, others = (
+        judge({"": ("", "", mean_beyond("{}", side * np.array(values), 0, where))}).loc[""]
+        for values in (CARRIED, CARRIED[:-1])
+    )
+    assert every.p_holm < 0.05 < every.p_without == others.p_holm
+    assert every.verdict == "undecided"
+
+
+def test_one_task_refutes_no_claim():
+    opposite = judge({"": ("", "", mean_beyond("{}", CARRIED, 0, "less"))}).loc[""]
+    others = judge({"": ("", "", mean_beyond("{}", CARRIED[:-1]))}).loc[""]
+    assert opposite.opposite_p_holm == others.p_holm > 0.05
+    assert opposite.verdict == "undecided"
+
+
 def test_runs_are_tidy(tmp_path):
     """Columns of a folder's runs against its tasks; signs and postures against executions."""
     chosen = Selection(tasks=["two-armed-1"], methods=["EC3", "corrective-alone/given"])

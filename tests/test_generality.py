@@ -157,7 +157,7 @@ def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
     monkeypatch.setattr(reader, "initial_solution", lambda task: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
-    study = with_signs(rewarded(centres, families=ONE + TWO))
+    study = with_signs(rewarded(centres, families=ONE + TWO, count=12))
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_ON_FAMILIES]
     for name in (

