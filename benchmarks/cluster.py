@@ -28,23 +28,23 @@ class Dask:
         self.address, self.say = address, say
         self.workers = 1  # it may have any number: batches are as large as methods take them
 
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[int, list[Outcome]], None, None]:
-        """The number of each job with its outcomes, as they come; another worker takes over the
-        jobs of one that dies. Raises CoarticError where there is no scheduler, it is lost, or it
+    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
+        """Each job with its outcomes, as they come; another worker takes over the jobs of one that
+        dies. Raises CoarticError where there is no scheduler, it is lost, or it
         has no workers of this version."""
         client = self._client()
         from distributed import as_completed
 
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
-            numbers = {future.key: number for number, future in enumerate(futures)}
+            job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
             finished = as_completed(futures, loop=client.loop)
             while not finished.is_empty():
                 self._wait_for_workers(client)
                 time.sleep(0.0 if finished.has_ready() else _PAUSE_S)
                 for future in finished.next_batch(block=False):
-                    number = numbers[future.key]
-                    yield number, self._outcomes(future, jobs[number])
+                    job = job_of[future.key]
+                    yield job, self._outcomes(future, job)
         finally:
             client.close(timeout=3)
 

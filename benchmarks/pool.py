@@ -13,7 +13,6 @@ counted. What waits for ever is ended by wall time, later.
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import multiprocessing
 import os
@@ -31,10 +30,10 @@ from typing import Any, Protocol
 from coartic.benchmarks.worker import (
     Job,
     Outcome,
+    answer_of,
     fail,
     outcomes_from,
     perform_job,
-    plain_outcome,
     prepare,
 )
 from coartic.errors import CoarticError
@@ -47,7 +46,6 @@ from coartic.threads import (
     begin_worker,
     end_group,
     environment,
-    set_environment,
     threads_for,
 )
 
@@ -61,7 +59,6 @@ _STARTS = 5  # processes in a row that may end before they begin a job
 _KILLED = (-9, 255)  # exit codes of a process that somebody has killed, or whose server
 _END_S = 1.0  # that a process which is killed has to end
 _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
-Numbered = tuple[int, Job]
 
 
 class Executor(Protocol):
@@ -72,8 +69,8 @@ class Executor(Protocol):
         """How many at once."""
         ...
 
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[int, list[Outcome]], None, None]:
-        """The number of each job with its outcomes, as they come, in any order."""
+    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
+        """Each job with its outcomes, as they come, in any order."""
         ...
 
 
@@ -88,14 +85,14 @@ class Local:
         self.workers = threads_for(jobs)
         self.patience_s = patience_s
 
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[int, list[Outcome]], None, None]:
-        """The number of each job with its outcomes, as they come.
+    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
+        """Each job with its outcomes, as they come; by one process, those of a method in order.
 
         Raises CoarticError where one process after another ends before it begins a job.
         """
-        by_method: dict[Any, list[Numbered]] = {}
-        for number, job in enumerate(jobs):
-            by_method.setdefault(job.method.key, []).append((number, job))
+        by_method: dict[Any, list[Job]] = {}
+        for job in jobs:
+            by_method.setdefault(job.method.key, []).append(job)
         shares = (
             of_method[first :: self.workers]  # each has some of every cell
             for of_method in by_method.values()
@@ -119,18 +116,18 @@ class Local:
                         crew.remove(worker)
                         if not worker.jobs:
                             continue
-                        number, job = worker.jobs[0]
+                        job = worker.jobs[0]
                         lost = lost + 1 if worker.since_s is None else 0
                         if lost == _STARTS:
                             words = f"processes cannot begin ({worker.last_words}"
                             raise CoarticError(f"{words}; finished runs are kept")
                         if lost:
                             time.sleep(_POLL_S)  # a server that was killed may yet be there
-                        elif exit_code in _KILLED and number not in repeated:
-                            repeated.add(number)
+                        elif exit_code in _KILLED and id(job) not in repeated:
+                            repeated.add(id(job))
                         else:
                             worker.jobs.popleft()
-                            yield number, self.fail_at_end(worker, job, exit_code)
+                            yield job, self.fail_at_end(worker, job, exit_code)
                         if worker.jobs:
                             waiting.appendleft(list(worker.jobs))
             finally:
@@ -143,7 +140,7 @@ class Local:
 
     def is_late(self, worker: Worker) -> bool:
         """Whether the job that a process is at takes too long."""
-        since_s, limit_s = worker.since_s, self.wall_limit(worker.jobs[0][1])
+        since_s, limit_s = worker.since_s, self.wall_limit(worker.jobs[0])
         return since_s is not None and time.monotonic() > since_s + limit_s
 
     def fail_at_end(self, worker: Worker, job: Job, exit_code: int | None) -> list[Outcome]:
@@ -160,15 +157,14 @@ class Local:
 class Worker:
     """A process that performs jobs of one method in their order."""
 
-    def __init__(self, folder: str, jobs: Sequence[Numbered], workers: int) -> None:
+    def __init__(self, folder: str, jobs: Sequence[Job], workers: int) -> None:
         self.jobs = deque(jobs)
         """Those that are not answered yet."""
         self.since_s: float | None = None
         """When it was seen to begin the first of them."""
+        self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
-        variables = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
-        arguments = (self._folder, jobs, workers, variables)
-        self._process = WorkerProcess(target=perform_jobs, args=arguments)
+        self._process = WorkerProcess(target=perform_jobs, args=(self._folder, jobs, workers))
 
     def start(self) -> None:
         """Begin it; where it cannot begin, it has ended."""
@@ -179,7 +175,7 @@ class Worker:
             return
         # While it compiles kernels: what it hands over is executed here.
         with contextlib.suppress(Exception):  # the process says the same
-            warm_up(self.jobs[0][1].setting.task, "trials")
+            warm_up(self.jobs[0].setting.task, "trials")
 
     @property
     def sentinels(self) -> list[int]:
@@ -191,14 +187,15 @@ class Worker:
         """Exit code, or minus the signal that ended it; None while it runs."""
         return 1 if self._process.pid is None else self._process.exitcode
 
-    def answers(self) -> Iterator[tuple[int, list[Outcome]]]:
-        """Number and outcomes of the jobs that it has answered since."""
+    def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
+        """The jobs that it has answered since, with their outcomes."""
         if self.since_s is None and (self._folder / _BEGUN).exists():
             self.since_s = time.monotonic()
-        while self.jobs and (answer := self._folder / str(self.jobs[0][0])).is_file():
-            number, job = self.jobs.popleft()
+        while self.jobs and (answer := self._folder / str(self._answered)).is_file():
+            job = self.jobs.popleft()
+            self._answered += 1
             self.since_s = time.monotonic()
-            yield number, outcomes_from(job, answer.read_bytes())
+            yield job, outcomes_from(job, answer.read_bytes())
             answer.unlink()
 
     @property
@@ -229,34 +226,32 @@ def signal_named(exit_code: int) -> str:
         return ""
 
 
-def perform_jobs(
-    folder: Path, jobs: Sequence[Numbered], workers: int, variables: dict[str, str | None]
-) -> None:
+def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
     """What a process does, in a folder of its own."""
-    set_environment(variables)
+    os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     begin_worker(folder.parent)
     descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
     for stream in (1, 2):
         os.dup2(descriptor, stream)
     bound_resources(workers)
-    prepare(job for _, job in jobs)
+    prepare(jobs)
     place = folder / "place"
     place.mkdir()
     tempfile.tempdir = os.environ["TMPDIR"] = str(place)
     os.chdir(place)
     (folder / _BEGUN).touch()
     process = os.getpid()
-    for number, job in jobs:
+    for number, job in enumerate(jobs):
         os.truncate(folder / _SAID, 0)
         try:
-            outcomes = list(map(plain_outcome, perform_within_limit(job)))
-            text = json.dumps(outcomes)
+            text = answer_of(perform_within_limit(job))
         except Exception as error:
-            failed = fail(job, "crashed", f"its outcome cannot be kept: {error_line(error)}")
-            text = json.dumps(list(map(plain_outcome, failed)))
+            text = answer_of(
+                fail(job, "crashed", f"its outcome cannot be kept: {error_line(error)}")
+            )
         if os.getpid() != process:  # a method has forked it
             os._exit(1)
-        write_atomically(folder / str(number), text.encode())
+        write_atomically(folder / str(number), text)
 
 
 def perform_within_limit(job: Job) -> list[Outcome]:
@@ -294,15 +289,10 @@ def bound_resources(workers: int) -> None:
             resource.setrlimit(what, (most, most))
 
 
-def start_method() -> str:
-    """How processes begin: forked from a server that has imported what they need, where there is
-    such a thing and the path of its socket is not too long."""
-    has_server = "forkserver" in multiprocessing.get_all_start_methods()
-    return "forkserver" if has_server and len(tempfile.gettempdir()) <= _LONGEST_PLACE else "spawn"
-
-
-_LONGEST_PLACE = 70  # characters: the system takes sockets of 103, and some are to come
-_START = start_method()
+# Processes are forked from a server that has imported what they need, where there is such a thing
+# and the path of its socket is not too long: the system takes 103 characters, and some are to come.
+_HAS_SERVER = "forkserver" in multiprocessing.get_all_start_methods()
+_START = "forkserver" if _HAS_SERVER and len(tempfile.gettempdir()) <= 70 else "spawn"
 _Ordinary: Any = multiprocessing.get_context(_START).Process  # type: ignore[attr-defined]
 
 

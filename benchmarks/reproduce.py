@@ -63,9 +63,8 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
 
 def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:
     """Runs of one method, each a job of one seed, in this order, in one process of their own."""
-    outcomes = dict(Local(1).perform(jobs))
-    for number, job in enumerate(jobs):
-        yield from score(job, outcomes[number])
+    for job, outcomes in Local(1).perform(jobs):
+        yield from score(job, outcomes)
 
 
 def perform_again(run: Run, registered: Registry) -> Run:

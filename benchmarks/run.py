@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from coartic.benchmarks.planning import WHOLE_SUITE, Selection, plan_suite
 from coartic.benchmarks.pool import Executor, Local
@@ -22,7 +22,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
-from coartic.runs.plan import Plan, RunKey, trials_in
+from coartic.runs.plan import Plan, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
 from coartic.text import counted
@@ -127,43 +127,32 @@ def perform(
     with writing(folder) as store:
         store.ask(plan, current_environment(), command(), now())
         progress = Progress(plan.size, stale=store.stale())
-        missing = missing_runs(plan, store, progress, retry_failed=retry_failed)
-        for batch in missing:
-            progress.waiting[plan.cells[batch.position].method.name] += len(batch.keys)
+        missing = missing_jobs(plan, store, progress, retry_failed=retry_failed)
+        for job in missing:
+            progress.waiting[job.setting.method] += len(job.keys)
         progress.workers = executor.workers
         watch(progress, "")
-        batches = longest_first(plan, split(plan, missing, executor.workers))
-        while batches:
-            alone: list[Batch] = []
-            jobs = [job_of(plan, batch) for batch in batches]
+        jobs = in_order(missing, executor.workers)
+        while jobs:
+            alone: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # workers end, whatever happens here
-                for number, outcomes in answers:
-                    runs = score(jobs[number], outcomes)
+                for job, outcomes in answers:
+                    runs = score(job, outcomes)
                     if len(runs) > 1:  # a run that failed may have failed because of the others
                         again = [run.key for run in runs if run.status not in _SURE]
-                        alone += [Batch(batches[number].position, [key]) for key in again]
+                        alone += [replace(job, keys=(key,)) for key in again]
                         runs = [run for run in runs if run.status in _SURE]
                     store.write(runs)
                     for run in runs:
                         progress.finish(run)
                         watch(progress, f"{run.setting.task.name} {run.setting.method}")
-            batches = alone
+            jobs = alone
         wall_s = time.perf_counter() - clock
         return RunReport(folder, progress, wall_s, store.count() - plan.size)
 
 
-class Batch(NamedTuple):
-    """Runs of one cell that are performed side by side."""
-
-    position: int
-    """Of the cell in the plan."""
-    keys: list[RunKey]
-
-
-def missing_runs(
-    plan: Plan, store: Store, progress: Progress, *, retry_failed: bool
-) -> list[Batch]:
-    """The runs to perform, a batch for each cell; those that are there are counted. Runs of a
+def missing_jobs(plan: Plan, store: Store, progress: Progress, *, retry_failed: bool) -> list[Job]:
+    """The runs to perform, a job for each cell; those that are there are counted. Runs of a
     method whose code is not here stay as they are."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
@@ -173,59 +162,43 @@ def missing_runs(
             there.add((position, number))
             progress.present += 1
             progress.count(status)
-    batches = (
-        Batch(p, [plan.key(p, number) for number in range(cell.runs) if (p, number) not in there])
-        for p, cell in enumerate(plan.cells)
-    )
-    return [batch for batch in batches if batch.keys]
+    jobs = []
+    for p, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
+        keys = tuple(plan.key(p, number) for number in range(cell.runs) if (p, number) not in there)
+        if keys:
+            jobs.append(Job(setting, cell.method, keys, plan.time_limit_s))
+    return jobs
 
 
-def split(plan: Plan, batches: Iterable[Batch], workers: int) -> Iterator[Batch]:
-    """Batches for workers; results do not depend on how runs are divided.
+def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
+    """Jobs divided for workers, in the order in which they begin; results do not depend on it.
 
-    A run among many takes a fraction of its time alone, so batches are as large as methods take
-    them. Where there are few runs, each worker has its part; the last batches are divided that
-    would not go round.
+    A run among many takes a fraction of its time alone, so jobs are as large as methods take
+    them. Where there are few runs, each worker has its part; the last jobs are divided that
+    would not go round. Methods without a number of trials come first, as a planner's run can take
+    as long as thousands of trials, the others by their trials: no long job is alone at the end, and
+    the time left does not go up.
     """
-    batches = list(batches)
-    total = sum(len(batch.keys) for batch in batches)
-    share = max(math.ceil(total / workers), LEAST_BATCH)
-    parts: list[Batch] = []
-    for batch in batches:
-        cell = plan.cells[batch.position]
-        most = cell.method.configure(cell.complete).most_together() if cell.method.is_ours else 1
-        parts += divide(batch, min(most, share))
+
+    def divide(job: Job, size: int) -> Iterator[Job]:
+        for first in range(0, len(job.keys), size):
+            yield replace(job, keys=job.keys[first : first + size])
+
+    share = max(math.ceil(sum(len(job.keys) for job in jobs) / workers), LEAST_BATCH)
+    parts: list[Job] = []
+    for job in jobs:
+        is_ours, parameters = job.method.is_ours, job.setting.parameters
+        most = job.method.configure(parameters).most_together() if is_ours else 1
+        parts += divide(job, min(most, share))
     rest = len(parts) % workers
-    yield from parts[: len(parts) - rest]
-    for batch in parts[len(parts) - rest :]:
-        yield from divide(batch, max(math.ceil(len(batch.keys) * rest / workers), LEAST_BATCH))
+    whole, last = parts[: len(parts) - rest], parts[len(parts) - rest :]
+    for job in last:
+        whole += divide(job, max(math.ceil(len(job.keys) * rest / workers), LEAST_BATCH))
 
+    def trials(job: Job) -> float:
+        return trials_in(job.setting.parameters) * len(job.keys) or math.inf
 
-def longest_first(plan: Plan, batches: Iterable[Batch]) -> list[Batch]:
-    """Batches in the order in which they begin: no long one is alone at the end, and the time left
-    does not go up. Results do not depend on it.
-
-    Methods without a number of trials come first, as a planner's run can take as long as thousands
-    of trials; the others by their trials.
-    """
-
-    def trials(batch: Batch) -> float:
-        return trials_in(plan.cells[batch.position].complete) * len(batch.keys) or math.inf
-
-    return sorted(batches, key=trials, reverse=True)
-
-
-def divide(batch: Batch, size: int) -> Iterator[Batch]:
-    """Batches of so many runs; the last one has the rest."""
-    for first in range(0, len(batch.keys), size):
-        yield Batch(batch.position, batch.keys[first : first + size])
-
-
-def job_of(plan: Plan, batch: Batch) -> Job:
-    """The job of a batch."""
-    position = batch.position
-    method = plan.cells[position].method
-    return Job(plan.settings[position], method, tuple(batch.keys), plan.time_limit_s)
+    return sorted(whole, key=trials, reverse=True)
 
 
 @dataclass(frozen=True, repr=False)

@@ -32,8 +32,8 @@ def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run
     """A run with the scores of its parts, of which it has none unless it is ok."""
     status, reason = final_status(outcome, parts)
     is_ok = status == "ok"
-    done = {part: e for part, e in parts.items() if is_ok and isinstance(e, Execution)}
-    solution, task = done.get("solution"), job.setting.task
+    executed = {part: e for part, e in parts.items() if is_ok and isinstance(e, Execution)}
+    solution, task = executed.get("solution"), job.setting.task
     corrections = travel = None
     if solution is not None:
         corrections = solution.corrections
@@ -46,7 +46,11 @@ def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run
         environment=outcome.environment or current_environment(),
         date=now(),
         time_limit_s=job.time_limit_s,
-        scores={part: score_part(execution) for part, execution in done.items()},
+        scores={
+            part: Score(each.reward, each.hands, each.movements)
+            for part, each in executed.items()
+            if each.reward is not None
+        },
         rewards=outcome.rewards,
         meter=outcome.meter,
         times=outcome.times,
@@ -56,12 +60,6 @@ def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run
         used=outcome.used,
         details=outcome.details,
     )
-
-
-def score_part(execution: Execution) -> Score:
-    """The score of a part that hit every goal."""
-    assert execution.reward is not None
-    return Score(execution.reward, execution.hands, execution.movements)
 
 
 def final_status(outcome: Outcome, parts: Executions) -> tuple[str, str]:

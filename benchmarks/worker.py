@@ -101,30 +101,32 @@ def fail(
     return [Outcome(status, reason, times=times) for _ in job.keys]
 
 
-def plain_outcome(outcome: Outcome) -> dict[str, Any]:
-    """An outcome as plain data, whole."""
-    return vars(outcome) | {
-        "meter": outcome.meter and vars(outcome.meter),
-        "times": vars(outcome.times),
-        "parts": {
-            part: [
-                (m.goal, m.hand, m.kind, as_list(m.target), m.ticks, as_list(m.waypoints))
-                for m in movements
-            ]
-            for part, movements in outcome.parts.items()
-        },
-    }
+def answer_of(outcomes: Sequence[Outcome]) -> bytes:
+    """Outcomes as JSON. Raises TypeError or ValueError for what a method left that cannot be."""
+
+    def numbers(array: Any) -> Any:
+        return None if array is None else array.tolist()
+
+    def plain(outcome: Outcome) -> dict[str, Any]:
+        return vars(outcome) | {
+            "meter": outcome.meter and vars(outcome.meter),
+            "times": vars(outcome.times),
+            "parts": {
+                part: [
+                    (m.goal, m.hand, m.kind, numbers(m.target), m.ticks, numbers(m.waypoints))
+                    for m in movements
+                ]
+                for part, movements in outcome.parts.items()
+            },
+        }
+
+    return json.dumps(list(map(plain, outcomes))).encode()
 
 
-def as_list(array: Any) -> Any:
-    """An array as plain data, or None."""
-    return None if array is None else array.tolist()
-
-
-def outcomes_from(job: Job, text: bytes) -> list[Outcome]:
-    """The outcomes of a job from the JSON of :func:`plain_outcome`, or that it crashed."""
+def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
+    """The outcomes of a job from :func:`answer_of`, or that it crashed."""
     try:
-        outcomes = _OUTCOMES.validate_python(json.loads(text))
+        outcomes = _OUTCOMES.validate_python(json.loads(answer))
         if len(outcomes) == len(job.keys):
             return outcomes
         why = f"{len(outcomes)} for {len(job.keys)} runs"
@@ -201,9 +203,6 @@ def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outc
     }
     try:
         if isinstance(result, MethodError):
-            if result.outcome not in ("infeasible", "solver-failed"):
-                why = f"it ended with an unknown outcome, {result.outcome!r}: {result}"
-                return Outcome("crashed", why, **spent)
             details = plain_details(result.details)
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):

@@ -67,16 +67,11 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
     try:
         yield
     finally:
-        set_environment(before)
-
-
-def set_environment(variables: Mapping[str, str | None]) -> None:
-    """Set variables; those that are None are removed."""
-    for name, value in variables.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def begin_worker(folder: Path | None = None) -> None:

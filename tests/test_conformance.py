@@ -80,7 +80,8 @@ def quick_checks(monkeypatch, another_process):
 
     class HereAndThere(InProcess):
         def perform(self, jobs):
-            return enumerate((another_process.map if len(jobs) > 1 else map)(perform_job, jobs))
+            performed = (another_process.map if len(jobs) > 1 else map)(perform_job, jobs)
+            return zip(jobs, performed, strict=True)
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)

@@ -84,10 +84,10 @@ def test_long_runs_begin_first_and_the_time_left_is_that_of_their_methods(tmp_pa
 
         def perform(self, jobs):
             begun.extend((job.setting.method, len(job.keys)) for job in jobs)
-            for number, outcomes in super().perform(jobs):
-                seconds = 6.0 if jobs[number].setting.method == planner else 1.0
+            for job, outcomes in super().perform(jobs):
+                seconds = 6.0 if job.setting.method == planner else 1.0
                 times = Times(wall_s=seconds)
-                yield number, [replace(outcome, times=times) for outcome in outcomes]
+                yield job, [replace(outcome, times=times) for outcome in outcomes]
 
     cells = suite_of(
         tmp_path,

@@ -60,10 +60,9 @@ class Nobody(InProcess):
     """Its processes end wherever runs are performed side by side."""
 
     def perform(self, jobs):
-        for number, outcomes in super().perform(jobs):
-            job = jobs[number]
+        for job, outcomes in super().perform(jobs):
             lost = len(job.keys) > 1
-            yield number, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
+            yield job, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
 
 
 LEARNER = Cell(load_task("ascending"), KNOWN["dual-process/EC1"])
@@ -84,12 +83,12 @@ class Forges(InProcess):
     """Has two of many runs state what is no solution."""
 
     def perform(self, jobs):
-        for number, outcomes in super().perform(jobs):
+        for job, outcomes in super().perform(jobs):
             if len(outcomes) == LANES:
                 fifth, seventh = (outcomes[run].parts["solution"] for run in (5, 7))
                 fifth[0] = replace(fifth[0], target=fifth[0].target[1:])
                 seventh.pop()
-            yield number, outcomes
+            yield job, outcomes
 
 
 def test_what_is_no_solution_is_that_of_one_run_alone(tmp_path):

@@ -96,7 +96,7 @@ HANDLED = {
               "        return Result(corrected(session), initial=way)",
               "solver-failed", "movements in 'initial' follow a path"),
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
-             "crashed", "unknown outcome, 'ok': x"),
+             "solver-failed", "returned no solution"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",
                "crashed", "counter 'gradients': it counts to"),
     "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),

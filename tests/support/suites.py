@@ -28,7 +28,7 @@ class InProcess:
         pass
 
     def perform(self, jobs):
-        yield from enumerate(map(perform_job, jobs))
+        yield from ((job, perform_job(job)) for job in jobs)
 
 
 class Failing(InProcess):
@@ -40,7 +40,7 @@ class Failing(InProcess):
     def perform(self, jobs):
         for number, job in enumerate(jobs):
             lost = number in self.numbers
-            yield number, fail(job, "crashed", "exit code 9") if lost else perform_job(job)
+            yield job, fail(job, "crashed", "exit code 9") if lost else perform_job(job)
 
 
 def paper_cells(**selection):
