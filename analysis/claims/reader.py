@@ -16,10 +16,9 @@ from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.families.instances import signs
 from coartic.analysis.topics.paper.published import (
-    Printed,
+    Summary,
+    published_alone,
     published_cell,
-    published_exhaustive,
-    published_initial,
 )
 from coartic.analysis.trajectories import Trajectories, initial_solution
 from coartic.analysis.words import estimate, number
@@ -138,7 +137,9 @@ class Reader:
     def initial(self, task: str) -> Measurement:
         """Reward of a task's initial solution."""
         reward = np.array(self.initial_execution(task).reward, dtype=np.float64)
-        return Measurement(task, "initial", reward, printed=in_words(published_initial(task)))
+        return Measurement(
+            task, "initial", reward, printed=in_words(published_alone(task, "initial hands"))
+        )
 
     def best(self, task: str) -> Measurement:
         """Highest reward of the corrective process alone over all hand sequences."""
@@ -147,8 +148,8 @@ class Reader:
             raise MissingError(
                 f"the corrective process alone completes {task} with no hand sequence"
             )
-        best, printed = np.array(np.nanmax(rewards)), in_words(published_exhaustive(task))
-        return Measurement(task, "best", best, printed=printed)
+        printed = in_words(published_alone(task, "best of all sequences"))
+        return Measurement(task, "best", np.array(np.nanmax(rewards)), printed=printed)
 
     def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
@@ -187,16 +188,15 @@ def who_is(label: str) -> str:
     return label.removeprefix(LEARNER) if label.startswith(LEARNER) else name_of(label)
 
 
-def in_words(printed: Printed | None) -> str:
-    """A number that the paper prints; empty where it prints none."""
+def in_words(printed: Summary | None) -> str:
+    """A reward that the paper prints; empty where it prints none."""
     return printed.in_words if printed else ""
 
 
 def printed_reward(task: str, label: str) -> str:
     """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
     cell = published_cell(task, label.removeprefix(LEARNER))
-    summary = cell and cell.summary
-    return summary.in_words if summary else ""
+    return in_words(cell and cell.summary)
 
 
 def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:

@@ -19,8 +19,8 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.paper.published import (
     RUNS,
     PublishedCell,
+    published_alone,
     published_cell,
-    published_initial,
 )
 from coartic.analysis.words import interval_in_words, marked
 from coartic.learner.learning import TRIALS
@@ -95,8 +95,9 @@ def published(study: Study) -> Rows:
     for row in beside_paper(study):
         cell, name = row["cell"], named(study, row["cell"])
         if not row["hands"]:
+            printed = published_alone(cell.task, "initial hands")
             initial = {
-                "published_initial": getattr(published_initial(cell.task), "number", None),
+                "published_initial": printed and printed.mean,
                 "ours_initial": cell.good.initial_reward.dropna().mean(),
             }
             yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
