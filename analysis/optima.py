@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from coartic import Task
-from coartic.analysis.trajectories import initial_solution
+from coartic.analysis.solutions import initial_solution
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped

@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, wraps
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -19,18 +19,17 @@ import pandas as pd
 from coartic import Execution, NotApplicableError, Task, hand_sequences
 from coartic.analysis.frames import gaps
 from coartic.analysis.optima import best_known, known_optima
-from coartic.analysis.trajectories import Trajectories
+from coartic.analysis.solutions import Solutions
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import PARTS, execute_all, movements_by_run
-from coartic.runs.store import RUNS_FILE, explain_errors, open_store
+from coartic.runs.run import execute_all, movements_by_run
+from coartic.runs.store import explain_errors, open_store
 from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of
 from coartic.text import counted, unknown
-from coartic.trajectories import spell_out
 
 CellKey = tuple[str, str]
 """Name of a task, and label of a method: its name with its variant."""
@@ -67,13 +66,28 @@ def typical_run(cell: CellRuns) -> int:
     return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())
 
 
+Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
 """Runs of a cell whose solutions are executed again for the signatures."""
 MOST_INSTANCES = 8
 """Instances that a report has one by one; more are shown together, by family."""
-MOST_TICKS = 100_000_000
-"""Of all these solutions; they are kept tick by tick."""
+
+
+def cached(
+    function: Callable[Concatenate[Study, Asked], Computed],
+) -> Callable[Concatenate[Study, Asked], Computed]:
+    """A function of a study that computes its result once for each study and its arguments."""
+
+    @wraps(function)
+    def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
+        key = function, args, tuple(named.items())
+        if key not in study._computed:
+            study._computed[key] = function(study, *args, **named)
+        result: Computed = study._computed[key]
+        return result
+
+    return once
 
 
 def load(folder: str | Path) -> Study:
@@ -130,8 +144,7 @@ class Study:
     """One row a run: rewards, hand sequences, what was spent (docs/results.md); of its task
     ``family``, ``split``, ``goals`` (their number) and ``best_known``; its parameters by their
     names; ``gap`` to the best known reward, as a share."""
-    _computed: dict[Callable[..., Any], Any] = field(init=False, default_factory=dict)
-    _kept: dict[tuple[str, str, str], Trajectories] = field(init=False, default_factory=dict)
+    _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
         runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
@@ -147,26 +160,21 @@ class Study:
         """The tasks as they were run, by name."""
         return self.plan.tasks
 
+    @cached
     def sequences(self, task: str) -> pd.DataFrame:
         """The corrective process alone on a task: a row for each hand sequence, best first.
 
         Columns ``hands``, ``reward`` (missing where it fails) and ``reason``. Empty where there
-        are too many sequences to try. Tried once for each task.
+        are too many sequences to try.
         """
-        if task not in self._sequences:
-            try:
-                names = hand_sequences(self.tasks[task])
-            except NotApplicableError:
-                names = []
-            ranked = ranked_sequences(self.tasks[task], names)
-            rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
-            frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
-            self._sequences[task] = frame.astype({"reward": "Int64"})
-        return self._sequences[task]
-
-    @cached_property
-    def _sequences(self) -> dict[str, pd.DataFrame]:
-        return {}
+        try:
+            names = hand_sequences(self.tasks[task])
+        except NotApplicableError:
+            names = []
+        ranked = ranked_sequences(self.tasks[task], names)
+        rows = [(hands, trial.reward, trial.reason) for hands, trial in ranked]
+        frame = pd.DataFrame(rows, columns=["hands", "reward", "reason"])
+        return frame.astype({"reward": "Int64"})
 
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
@@ -182,27 +190,50 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """One row a movement of each run's solution."""
-        return self._frame("solutions")
+        with open_store(self.folder) as store:
+            return store.frame("solutions")
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs that made trials, each with the reward of every trial, NaN where it failed."""
         with open_store(self.folder) as store:
             yield from store.rewards()
 
-    def trajectories(self, task: str, label: str) -> Trajectories:
-        """Solutions of a cell, executed again tick by tick, each cell once.
+    @cached
+    def executed(self, task: str, label: str, *, replay: bool = False) -> Solutions:
+        """Solutions of the solved runs of a method on a task, executed again.
 
-        The first 500 runs that solved the task: signatures say no more with thousands, which
-        would fill the memory.
+        The first 500 of them: signatures say no more with thousands.
+
+        Parameters
+        ----------
+        task, label : str
+            Names as in :attr:`runs`; the label is the method with its variant.
+        replay : bool
+            The noiseless trial after learning in place of the solution, of the runs that have one.
+            For a learner whose solution is its best trial, it says what is learned without
+            selection.
+
+        Raises
+        ------
+        CoarticError
+            The stored movements cannot be executed or do not do what is stored of them.
         """
-        return self._executed(task, label, "solution")
-
-    def replays(self, task: str, label: str) -> Trajectories:
-        """The same for the noiseless trials after learning, of the runs that have one.
-
-        For a learner whose solution is its best trial, they say what is learned without selection.
-        """
-        return self._executed(task, label, "replay")
+        ids = list(map(str, self.cells[task, label].good.run_id[:MOST_EXECUTED]))
+        rows, paths = (
+            frame[frame.run_id.isin(ids)]
+            for frame in (self._stored("replay" if replay else "solution"), self._stored("paths"))
+        )
+        with explain_errors(self.folder):
+            solutions = movements_by_run(self.tasks[task], rows, paths)
+            ids = [run_id for run_id in ids if run_id in solutions]
+            runs = execute_all(self.tasks[task], [solutions[run_id] for run_id in ids])
+            executed = []
+            for run_id, run in zip(ids, runs, strict=True):
+                ticks = sum(movement.ticks or 0 for movement in solutions[run_id])
+                if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
+                    raise ValueError(f"run {run_id} does not do what is stored of it")
+                executed.append(run)
+        return Solutions(self.tasks[task], label, tuple(executed), tuple(ids))
 
     def postures(self, task: str, label: str, *, replay: bool = False) -> Array:
         """Postures in which the solved runs of a method hit the goals of a task.
@@ -219,8 +250,7 @@ class Study:
         ndarray, shape (runs, G, dof)
             Configurations, length unit (base) and rad (joints); at most 500 runs.
         """
-        executions = self._executions((task, label), "replay" if replay else "solution")
-        return np.array([execution.configurations for execution in executions.values()])
+        return self.executed(task, label, replay=replay).postures
 
     def sign(self, name: str, *, replay: bool = False) -> pd.Series:
         """A sign of coarticulation of every run.
@@ -244,40 +274,10 @@ class Study:
             raise CoarticError(unknown("sign", name, SIGNS))
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, cell in self.cells.items():
-            executed = self.replays(*key) if replay else self.trajectories(*key)
+            executed = self.executed(*key, replay=replay)
             here = cell.runs.index[cell.runs.run_id.isin(executed.run_ids)]
             values[here] = SIGNS[name].each(executed)
         return values
-
-    def _executed(self, task: str, label: str, part: str) -> Trajectories:
-        key = task, label, part
-        if key not in self._kept:
-            cell, executions = self.cells[task, label], self._executions((task, label), part)
-            runs = tuple(spell_out(self.tasks[task], each) for each in executions.values())
-            self._kept[key] = Trajectories(
-                self.tasks[task], cell.method, cell.variant, runs, run_ids=tuple(executions)
-            )
-        return self._kept[key]
-
-    def _executions(self, key: CellKey, part: str) -> dict[str, Execution]:
-        task, wanted = self.tasks[key[0]], _executed_of(self.cells[key])
-        rows, paths = (
-            frame[frame.run_id.isin(wanted)] for frame in (self._frame(part), self._frame("paths"))
-        )
-        with explain_errors(self.folder):
-            solutions = movements_by_run(task, rows, paths)
-            ids = [run_id for run_id in wanted if run_id in solutions]
-            executions = execute_all(task, [solutions[run_id] for run_id in ids])
-            executed = {}
-            for run_id, execution in zip(ids, executions, strict=True):
-                if (
-                    not isinstance(execution, Execution)
-                    or not execution.completed
-                    or execution.ticks != sum(movement.ticks or 0 for movement in solutions[run_id])
-                ):
-                    raise ValueError(f"run {run_id} does not do what is stored of it")
-                executed[run_id] = execution
-        return executed
 
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:
@@ -289,21 +289,13 @@ class Study:
         """The same, and of an instance of a family without one the best of this folder's runs."""
         return best_known(self.runs, self.tasks, self.optima)
 
-    def _frame(self, view: str) -> pd.DataFrame:
-        return _frame(self.folder, view, (self.folder / RUNS_FILE).stat().st_mtime_ns)
-
-
-def cached(function: Callable[[Study], Computed]) -> Callable[[Study], Computed]:
-    """A function of a study that computes its result once for each study."""
-
-    @wraps(function)
-    def once(study: Study) -> Computed:
-        if function not in study._computed:
-            study._computed[function] = function(study)
-        result: Computed = study._computed[function]
-        return result
-
-    return once
+    @cached
+    def _stored(self, part: str) -> pd.DataFrame:
+        """Movements of a part of the runs that are executed, or waypoints of their ``paths``."""
+        with open_store(self.folder) as store:
+            if part == "paths":
+                return store.waypoints(MOST_EXECUTED)
+            return store.movements(part, MOST_EXECUTED)
 
 
 @cached
@@ -315,21 +307,3 @@ def one_by_one(study: Study) -> set[str]:
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
-
-
-@lru_cache(maxsize=4)
-def _frame(folder: Path, view: str, _: int) -> pd.DataFrame:
-    """A view of a folder as it was at a time, or movements and waypoints of the runs that are
-    executed: studies of parts of a folder share it."""
-    with open_store(folder) as store:
-        if view in PARTS:
-            table = store.movements(view, MOST_EXECUTED)
-        else:
-            table = store.waypoints(MOST_EXECUTED) if view == "paths" else store.frame(view)
-    if view in PARTS and table.ticks.sum() > MOST_TICKS:
-        raise CoarticError(f"the solutions take more than {MOST_TICKS:_} ticks in all")
-    return table
-
-
-def _executed_of(cell: CellRuns) -> list[str]:
-    return [str(run_id) for run_id in cell.good.run_id[:MOST_EXECUTED]]

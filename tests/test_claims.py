@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import corrective_trial, load_task, trajectory
+from coartic import corrective_trial, load_task
 from coartic.analysis.claims.claim import Claim
 from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
@@ -24,7 +25,6 @@ from coartic.analysis.topics.families.claims import in_every_family
 from coartic.analysis.topics.paper import verdicts
 from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of
 from coartic.analysis.topics.paper.shortest import shortest_reach
-from coartic.analysis.trajectories import Trajectories
 from coartic.benchmarks.suites import Cell
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
@@ -185,7 +185,7 @@ def planted_study(rows, sequences=SEQUENCES, tasks=()):
         name: pd.DataFrame(sequences.get(name, {}).items(), columns=["hands", "reward"])
         for name in by_name
     }
-    return MadeUp(study_of(runs, list(by_name.values())), _sequences=tables)
+    return MadeUp(study_of(runs, list(by_name.values())), sequences=tables.__getitem__)
 
 
 def verdict_of(claim, study):
@@ -471,24 +471,22 @@ def plant(solutions, replays=None, rewards=MIDDLE):
     """
     rows = [
         row(label, -500 - k % 3, task=task, run=k, trials=10_000, initial_reward=-671,
-            hands=getattr(run.execution, "hands", "LRLR"),
+            hands=getattr(run, "hands", "LRLR"),
             replay_reward=(rewards[task, label] if isinstance(rewards, dict) else rewards)[k % 8])
         for (task, label), runs in solutions.items()
         for k, run in enumerate(runs)
     ]  # fmt: skip
     study = planted_study(rows)
-    done, again = (
-        {
-            (task, label): Trajectories(study.tasks[task], label, "", tuple(runs))
-            for (task, label), runs in each.items()
-        }
-        for each in (solutions, solutions if replays is None else replays)
-    )
-    return MadeUp(study, **vars(study), trajectories=made(done), replays=made(again))
+    executed = {
+        (*key, *again): Solutions(study.tasks[key[0]], key[1], tuple(runs))
+        for each, again in ((solutions, ()), (solutions if replays is None else replays, (True,)))
+        for key, runs in each.items()
+    }
+    return MadeUp(study, **vars(study), executed=made(executed))
 
 
 def at(q, **more):
-    return SimpleNamespace(execution=SimpleNamespace(configurations=q), **more)
+    return SimpleNamespace(configurations=q, **more)
 
 
 @pytest.mark.parametrize(
@@ -529,9 +527,9 @@ def test_hands_that_serve_other_goals(hands, placebo, verdict):
     assert quick["LLLL"][0] < quick["RRRR"][0]
     assert quick["LRRR"][1] < corrective_trial(task, "LLRR").ticks_by_goal()[1]
     of = {**{f"dual-process/{condition}": h for condition, h in hands.items()}, GUESSES: placebo}
-    paths = {h: trajectory(task, corrective_trial(task, h).movements) for h in set(SLOWER)}
+    runs = {h: corrective_trial(task, h) for h in set(SLOWER)}
     solutions = {
-        (T1, label): [paths[h] for h in (SLOWER if h.startswith("few") else [h] * 40)]
+        (T1, label): [runs[h] for h in (SLOWER if h.startswith("few") else [h] * 40)]
         for label, h in of.items()
     }
     judged = verdict_of("hand-coarticulation-task-1", plant(solutions))
@@ -547,25 +545,23 @@ def waiting(task, part):
     q = corrective_trial(task, "LRLR").configurations.copy()
     left = task.robot.joints("left")
     q[1, left] += part * (q[2, left] - q[1, left])
-    return at(q, task=task, hands=("left", "right", "left", "right"))
+    return at(q, hands="LRLR")
 
 
 def timed(task, first, others=-20):
     """A run whose first movement takes ``first`` ticks more than initially, the next so many."""
     ticks = corrective_trial(load_task(task), "RRR").ticks_by_goal()
     ticks = [ticks[0] + first, ticks[1] + others, ticks[2]]
-    return SimpleNamespace(execution=SimpleNamespace(hands="RRR", ticks_by_goal=lambda: ticks))
+    return SimpleNamespace(hands="RRR", ticks_by_goal=lambda: ticks)
 
 
 def hit_early(task, part):
     """The right hand, part of the way to each next posture at every hit."""
     task = load_task(task)
-    path = trajectory(task, corrective_trial(task, task.initial_hands).movements)
-    q = path.execution.configurations.copy()
+    run = corrective_trial(task, task.initial_hands)
+    q = run.configurations.copy()
     q[:-1] += part * (q[1:] - q[:-1])
-    ticks = path.execution.ticks_by_goal()
-    execution = SimpleNamespace(configurations=q, ticks_by_goal=lambda: ticks)
-    return SimpleNamespace(task=task, hands=path.hands, execution=execution)
+    return at(q, hands=run.hands, ticks_by_goal=run.ticks_by_goal)
 
 
 def elsewhere(task, apart):
@@ -573,7 +569,7 @@ def elsewhere(task, apart):
     q = np.zeros((3, 10))
     q[0, 2] = apart if task == "descending" else 0.0
     q[0, 6] = apart - round(apart)
-    return at(q, hands=("right",) * 3)
+    return at(q, hands="RRR")
 
 
 OFF = np.array([-3, -2, -1, 1, 2, 3, -1, 1])
@@ -678,7 +674,7 @@ def test_the_reward_for_the_whole_makes_the_difference(rewards, first, verdict):
 def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
     q = np.zeros((4, 10))
     q[:, 0] = xs
-    run = SimpleNamespace(execution=SimpleNamespace(configurations=q, hands="RRLR"))
+    run = at(q, hands="RRLR")
     study = plant({(T1, "dual-process/EC2"): [run] * runs})
     assert verdict_of("no-reversal", study).verdict == verdict
 

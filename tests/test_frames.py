@@ -128,10 +128,8 @@ def test_runs_are_tidy(tmp_path):
             assert np.hypot(*(robot.forward_kinematics(q, name) - goal)) <= 0.1
     for name, sign in SIGNS.items():
         of_learner = study.sign(name, replay=True)[runs.method == "dual-process/EC3"].dropna()
-        assert (
-            of_learner.tolist()
-            == sign.of(study.replays("two-armed-1", "dual-process/EC3")).tolist()
-        )
+        replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
+        assert of_learner.tolist() == sign.of(replays).tolist()
     assert study.sign("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
     with pytest.raises(coartic.CoarticError, match="unknown sign 'frist'; did you mean 'first'"):
         study.sign("frist")

@@ -139,7 +139,7 @@ def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
 
 def with_signs(study, **values):
     """A study whose runs are not executed: their signs are made up."""
-    study._computed[signs.__wrapped__] = made_up_signs(study, **values)
+    study._computed[signs.__wrapped__, (), ()] = made_up_signs(study, **values)
     return study
 
 

@@ -13,7 +13,7 @@ def test_films_have_fewer_numbers_and_the_same_ticks():
     targets = corrective_trial(task, "RRR").configurations + 1 / 30
     movements = [Movement(goal, "right", "learned", targets[goal - 1]) for goal in (1, 2, 3)]
     run = trajectory(task, movements)
-    shorter = trajectory(task, shortened(run))
+    shorter = trajectory(task, shortened(task, run.execution))
     assert shorter.execution.ticks_by_goal() == run.execution.ticks_by_goal()
     assert np.abs(shorter.configurations - run.configurations).max() < 0.05
     assert len(repr(shorter.execution.movements[-1].target.tolist())) < 80

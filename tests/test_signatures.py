@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import Movement, corrective_trial, execute, learn, load_task, trajectory
+from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context_tests, subtasks
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
 from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
 from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import hypotheses
 from coartic.analysis.topics.coarticulation import placebo, postures, tables
-from coartic.analysis.trajectories import Trajectories, best_sequences
 from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -51,8 +51,7 @@ def posed(task, method, q, ticks=(0, 0, 0)):
         SimpleNamespace(configurations=each, hands="RRR", ticks_by_goal=lambda: ticks)
         for each in configurations
     )
-    solutions = (SimpleNamespace(hands=["right"] * 3, execution=run) for run in runs)
-    return Trajectories(task, method, "", tuple(solutions))
+    return Solutions(task, method, tuple(runs))
 
 
 # Context dependence
@@ -219,47 +218,49 @@ def test_isolated_reaches_are_the_corrective_process():
     assert isolated_ticks(tiny_task(), posture(0.5, 0.9), 1, "right") == 0
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
-    stays = SimpleNamespace(configurations=np.tile(unreachable.q0, (3, 1)))
-    path = SimpleNamespace(task=unreachable, hands=("right",) * 3, execution=stays)
-    assert subtasks.ticks_slower(unreachable, [path])[0, 2] == math.inf
+    stays = posed(unreachable, "", [unreachable.q0])
+    assert subtasks.ticks_slower(stays)[0, 2] == math.inf
 
 
 def test_what_a_posture_serves():
     """The corrective process itself gains nothing; half the way ahead, half the way is left."""
     task = AS_RELEASED
-    initial = trajectory(task, corrective_trial(task, "RRRR").movements)
-    assert subtasks.gain_at_next(task, [initial])[0] == pytest.approx([0, 0, 0])
-    alone = initial.execution.configurations
+    initial = corrective_trial(task, "RRRR")
+    assert subtasks.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
+    alone = initial.configurations
     q = alone.copy()
     q[:-1] += 0.5 * np.diff(alone, axis=0)
-    execution = SimpleNamespace(configurations=q)
-    path = SimpleNamespace(task=task, hands=initial.hands, execution=execution)
+
+    def gain_of(q):
+        run = SimpleNamespace(configurations=q, hands="RRRR")
+        return subtasks.gain_at_next(Solutions(task, "", (run,)))[0, 0]
+
     left = isolated_ticks(task, q[0], 2, "right")[0]
     gain = isolated_ticks(task, alone[0], 2, "right")[0] - left
     assert gain > 0.4 * left
-    assert subtasks.gain_at_next(task, [path])[0, 0] == gain
+    assert gain_of(q) == gain
     # What the other arm does is not the chosen one's.
     q[0, task.robot.joints("left")] += 0.3
-    assert subtasks.gain_at_next(task, [path])[0, 0] == gain
+    assert gain_of(q) == gain
 
 
 def test_signs_are_one_number_a_run():
     """A learner's first movement is slower, the whole faster, than with the same hands."""
     task = load_task("two-armed-1")
-    runs = [learn(task, "EC4", seed=seed, trials=400).solution for seed in (1, 2)]
-    cell = Trajectories(task, "", "", tuple(trajectory(task, solution) for solution in runs))
-    corrective = [corrective_trial(task, hands).ticks_by_goal() for hands in cell.sequences]
-    learned = [run.execution.ticks_by_goal() for run in cell.runs]
+    learned = [learn(task, "EC4", seed=seed, trials=400).execute() for seed in (1, 2)]
+    cell = Solutions(task, "", tuple(learned))
+    corrective = [corrective_trial(task, run.hands).ticks_by_goal() for run in cell.runs]
+    learned = [run.ticks_by_goal() for run in cell.runs]
     first, whole = SIGNS["first"].of(cell), SIGNS["whole"].of(cell)
     assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
-    nearer = [subtasks.preshaping(run, corrective_trial(task, "RRRR")) for run in cell.runs]
+    nearer = [subtasks.preshaping(task, run, corrective_trial(task, "RRRR")) for run in cell.runs]
     assert SIGNS["other arm"].of(cell) == pytest.approx([np.nanmean(run) for run in nearer])
-    gains = subtasks.gain_at_next(task, cell.runs)
+    gains = subtasks.gain_at_next(cell)
     assert SIGNS["arm"].of(cell) == pytest.approx(gains.mean(axis=1))
-    assert not any(sign.of(Trajectories(task, "", "", ())).size for sign in SIGNS.values())
+    assert not any(sign.of(Solutions(task, "", ())).size for sign in SIGNS.values())
     one = load_task("ascending")
-    alone = Trajectories(one, "", "", (trajectory(one, corrective_trial(one, "RRR").movements),))
+    alone = Solutions(one, "", (corrective_trial(one, "RRR"),))
     assert [sign.of(alone).size for sign in SIGNS.values()] == [0, 1, 0, 1, 1]
     assert [sign.each(alone).size for sign in SIGNS.values()] == [1] * 5
 
@@ -268,19 +269,12 @@ def test_choice_in_isolation():
     """Each hand beside its goal: the near one is the isolated choice."""
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
-    paths = [trajectory(task, corrective_trial(task, hands).movements) for hands in ("RL", "LR")]
-    agrees = as_in_isolation(Trajectories(task, "", "", tuple(paths)))
+    both = Solutions(task, "", tuple(corrective_trial(task, hands) for hands in ("RL", "LR")))
+    agrees = as_in_isolation(both)
     assert agrees[:, 0].tolist() == [1, 0]
     assert agrees[0, 1] == 1
     # Not of the last goal.
-    assert SIGNS["hand"].of(Trajectories(task, "", "", tuple(paths))).tolist() == [0.0, 1.0]
-
-
-def test_best_corrective_sequences():
-    rewards = pd.array([-9, -7, -7, None], dtype="Int64")
-    table = pd.DataFrame({"hands": ["RR", "RL", "LR", "LL"], "reward": rewards})
-    assert best_sequences(table) == ["RL", "LR"]
-    assert best_sequences(table[3:]) == []
+    assert SIGNS["hand"].of(both).tolist() == [0.0, 1.0]
 
 
 # The other arm
@@ -297,21 +291,21 @@ def test_preshaping_by_the_arm_alone():
     task = tiny_task(goals=goals, initial_hands="RL", start=content, locked_base=["x", "y"])
     end = posture(left_1=0.2, right_1=0.4)
     initial = execute(task, planned(swung, end, hands="RL"))
-    path = trajectory(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
+    run = execute(task, planned(posture(left_1=0.6, right_1=0.4), end, hands="RL"))
     now, before = (
         np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
-        for of in (path.execution, initial)
+        for of in (run, initial)
     )
-    assert 0.2 < subtasks.preshaping(path, initial)[0] == pytest.approx(1 - now / before)
-    assert np.isnan(subtasks.preshaping(path, initial)[1])
+    assert 0.2 < subtasks.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
+    assert np.isnan(subtasks.preshaping(task, run, initial)[1])
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
     """The left arm keeps still after its hit of goal 1, in another posture than initially."""
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
-    path = trajectory(task, corrective_trial(task, "LRLR").movements)
-    np.testing.assert_array_equal(subtasks.preshaping(path, initial)[:3], [0, 0, 0])
+    run = corrective_trial(task, "LRLR")
+    np.testing.assert_array_equal(subtasks.preshaping(task, run, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
     goals = [robot.forward_kinematics(q, hand).tolist()
@@ -322,15 +316,15 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     still = execute(
         small, [Movement(1, "left", "corrective"), Movement(2, "right", "corrective"), end]
     )
-    path = trajectory(small, [*planned(*moved, hands="LR"), end])
-    configurations = path.execution.configurations
+    run = execute(small, [*planned(*moved, hands="LR"), end])
+    configurations = run.configurations
     held = np.array(configurations[1])
     held[2:6] = configurations[0, 2:6]
     now, without, before = (
         np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
         for q in (configurations[1], held, still.configurations[1])
     )
-    assert subtasks.preshaping(path, still)[1] == pytest.approx((without - now) / before)
+    assert subtasks.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
     assert abs(without - now) > 0.05
 
 
@@ -340,14 +334,14 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
 def study_with(*cells):
     """A study of cells, those without solutions of one failed run; no replays."""
     rows = [
-        row(cell.method, -300 if cell.runs else None, task=cell.task.name, run=run,
+        row(cell.label, -300 if cell.runs else None, task=cell.task.name, run=run,
             status="ok" if cell.runs else "infeasible")
         for cell in cells for run in range(max(1, len(cell.runs)))
     ]  # fmt: skip
-    solved = {(cell.task.name, cell.method): cell for cell in cells}
-    replays = {key: replace(cell, runs=()) for key, cell in solved.items()}
+    executed = {(cell.task.name, cell.label): cell for cell in cells}
+    executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
     study = study_of(pd.DataFrame(rows), [cell.task for cell in cells])
-    return MadeUp(study, trajectories=made(solved), replays=made(replays))
+    return MadeUp(study, executed=made(executed))
 
 
 def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
@@ -411,7 +405,7 @@ def test_signs_beside_the_placebo():
                     for ticks in of_label), ())
         for label, of_label in slower.items()
     }  # fmt: skip
-    study = study_with(*(Trajectories(task, label, "", runs[label]) for label in slower))
+    study = study_with(*(Solutions(task, label, runs[label]) for label in slower))
     p = placebo.sign_beyond_p(study, task.name, EC1, "first")
     assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
     assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p

@@ -408,7 +408,7 @@ def test_what_is_no_results_folder_is_left_alone(undisturbed, tmp_path, spoil, w
 def read_all(folder):
     study = load(folder)
     for cell in study.cells:
-        study.trajectories(*cell)
+        study.executed(*cell)
     return list(study.rewards())
 
 

@@ -12,6 +12,7 @@ import pandas as pd
 from coartic import Execution, Task
 from coartic.analysis.methods import LEARNER, PLACEBO, name_of
 from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.families.instances import signs
@@ -20,7 +21,6 @@ from coartic.analysis.topics.paper.published import (
     published_alone,
     published_cell,
 )
-from coartic.analysis.trajectories import Trajectories, initial_solution
 from coartic.analysis.words import estimate, number
 from coartic.learner.learning import TRIALS
 from coartic.robot import Array
@@ -105,10 +105,10 @@ class Reader:
         self.run_ids.extend(runs.run_id)
         return runs
 
-    def cell(self, task: str, label: str, *, replay: bool = False) -> Trajectories:
+    def cell(self, task: str, label: str, *, replay: bool = False) -> Solutions:
         """Executed solutions of a method, or its noiseless replays after learning."""
         self.runs(task, label)
-        return (self.study.replays if replay else self.study.trajectories)(task, label)
+        return self.study.executed(task, label, replay=replay)
 
     def hands(self, task: str, label: str) -> list[str]:
         """Hand sequence that each run of the learner learned."""
@@ -156,12 +156,12 @@ class Reader:
         sign, words = SIGNS[name], SIGNS[name].words
         self.runs(task, label)
         if replay:
-            values = sign.of(self.study.replays(task, label))
+            values = sign.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {sign.in_short}"
         elif self.task(task).family is not None:
             values = signs(self.study)[task, label].get(name, np.empty(0))
         else:
-            values = sign.of(self.study.trajectories(task, label))
+            values = sign.of(self.study.executed(task, label))
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from coartic import Movement, Trajectory, execute
+from coartic import Execution, Movement, Task, execute
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.scores import labels_by_task
-from coartic.analysis.trajectories import postures
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS, Array
 
@@ -75,37 +74,35 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
             films = [typical_of(study, cell) for cell in cells]
             if len(tasks) > 1:
                 for film, cell in zip(films, cells, strict=True):
-                    hits = postures(study.trajectories(*cell).runs, 1)
-                    film["reached"] = hits.round(3).tolist()
+                    film["reached"] = study.postures(*cell)[:, 0].round(3).tolist()
             runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
 
 
 def moves_straight(study: Study, cell: CellKey) -> bool:
     """Whether a cell has solutions, and no movement of them follows a path."""
-    runs = study.trajectories(*cell).runs
-    kinds = {movement.kind for run in runs for movement in run.execution.movements}
+    kinds = {each.kind for run in study.executed(*cell).runs for each in run.movements}
     return bool(kinds) and "path" not in kinds
 
 
 def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
     """The run of a cell nearest the median reward."""
-    runs = study.trajectories(*cell).runs
-    good = study.cells[cell].good[: len(runs)]
+    solutions = study.executed(*cell)
+    good = study.cells[cell].good[: len(solutions.runs)]
     k = typical_run(replace(study.cells[cell], runs=good))
+    movements = shortened(solutions.task, solutions.runs[k])
     return {
-        "run": str(good.run_id.iloc[k]),
-        "ticks": runs[k].ticks,
-        "movements": [for_script(movement) for movement in shortened(runs[k])],
+        "run": solutions.run_ids[k],
+        "ticks": solutions.runs[k].ticks,
+        "movements": [for_script(movement) for movement in movements],
     }
 
 
-def shortened(run: Trajectory) -> tuple[Movement, ...]:
+def shortened(task: Task, made: Execution) -> tuple[Movement, ...]:
     """The movements of a run with as few digits as give each goal the same ticks."""
-    made = run.execution
     for digits in range(2, 7):
-        shorter = tuple(rounded(movement, run.task.q0, digits) for movement in made.movements)
-        again = execute(run.task, shorter)
+        shorter = tuple(rounded(movement, task.q0, digits) for movement in made.movements)
+        again = execute(task, shorter)
         if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
             return shorter
     return made.movements

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coartic.analysis.signatures.subtasks import gain_at_next, preshaping, ticks_slower
-from coartic.analysis.trajectories import Trajectories
+from coartic.analysis.solutions import Solutions
 from coartic.robot import Array
 
 
@@ -22,45 +22,45 @@ from coartic.robot import Array
 class Sign:
     """How a sign is measured, and in which words."""
 
-    each: Callable[[Trajectories], Array]
+    each: Callable[[Solutions], Array]
     """The sign of each run, shape ``(n,)``; NaN where a run has none."""
     words: str
     in_short: str
     """The same for tables."""
 
-    def of(self, runs: Trajectories) -> Array:
+    def of(self, runs: Solutions) -> Array:
         """The sign of each run that has one, shape ``(k,)``."""
         signs = self.each(runs)
         return signs[np.isfinite(signs)]
 
 
-def first(runs: Trajectories) -> Array:
+def first(runs: Solutions) -> Array:
     """t(i, 1) - c(i, 1); NaN where the corrective process fails with the hands of the run."""
     return np.asarray(runs.against_same_hands[:, 0])
 
 
-def whole(runs: Trajectories) -> Array:
+def whole(runs: Solutions) -> Array:
     """Σ_g c(i, g) - t(i, g); NaN where the corrective process fails with the hands of the run."""
     return np.asarray(-runs.against_same_hands.sum(axis=1))
 
 
-def hand(runs: Trajectories) -> Array:
+def hand(runs: Solutions) -> Array:
     """Share of the goals g < G at which the hand is not as in isolation."""
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
-def as_in_isolation(runs: Trajectories) -> Array:
+def as_in_isolation(runs: Solutions) -> Array:
     """a(i, g) = [r(h) = min over hands of r], for the ticks r of a reach to g from q(i, g - 1).
 
     Shape ``(n, G)``; NaN on a task for one hand.
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
-    return np.asarray(ticks_slower(runs.task, runs.runs) == 0, dtype=np.float64)
+    return np.asarray(ticks_slower(runs) == 0, dtype=np.float64)
 
 
-def other_arm(runs: Trajectories) -> Array:
+def other_arm(runs: Solutions) -> Array:
     """The mean of :func:`preshaping_of_the_other_arm` over the goals that have it."""
     values = preshaping_of_the_other_arm(runs)
     means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
@@ -70,21 +70,21 @@ def other_arm(runs: Trajectories) -> Array:
     return means
 
 
-def preshaping_of_the_other_arm(runs: Trajectories) -> Array:
+def preshaping_of_the_other_arm(runs: Solutions) -> Array:
     """(d_held(i, g) - d(i, g)) / d_initial(g), g < G, as :func:`~.subtasks.preshaping` says.
 
     Shape ``(n, G - 1)``; NaN on a task for one hand, and without an initial solution.
     """
     if not runs.runs or runs.initial is None or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals) - 1), np.nan)
-    return np.array([preshaping(run, runs.initial)[:-1] for run in runs.runs])
+    return np.array([preshaping(runs.task, run, runs.initial)[:-1] for run in runs.runs])
 
 
-def arm(runs: Trajectories) -> Array:
+def arm(runs: Solutions) -> Array:
     """r(i, g + 1) - r'(i, g + 1), mean over g < G, as :func:`~.subtasks.gain_at_next` says."""
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
-    return np.asarray(gain_at_next(runs.task, runs.runs).mean(axis=1))
+    return np.asarray(gain_at_next(runs).mean(axis=1))
 
 
 SIGNS = {

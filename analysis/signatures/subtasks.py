@@ -3,14 +3,14 @@ arm that is not chosen does meanwhile."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic import Execution, Hand, Task, Trajectory
+from coartic import Execution, Hand, Task
+from coartic.analysis.solutions import Solutions
 from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
+from coartic.tasks.task import hands_of
 
 ROUNDING = 1
 """Ticks that a planned movement can lose to rounding alone."""
@@ -43,61 +43,29 @@ def isolated_reaches(
     return ticks.reshape(shape), reached.q.reshape(q.shape)
 
 
-def gain_at_next(task: Task, paths: Sequence[Trajectory]) -> Array:
+def gain_at_next(runs: Solutions) -> Array:
     """Ticks that the posture at each goal saves at the next, shape ``(n, G − 1)``.
 
     How much sooner the corrective process reaches the next goal from where base and chosen arm of
-    the path hit this one than from where it would have hit it itself, from the same posture before
-    and with the hands of the path; what the other arm does meanwhile is left out. NaN where the
+    the run hit this one than from where it would have hit it itself, from the same posture before
+    and with the hands of the run; what the other arm does meanwhile is left out. NaN where the
     corrective process does not hit.
     """
-    hits = np.array([path.execution.configurations for path in paths])
-    befores, hands = starts_of(task, paths), hand_numbers(task, paths)
+    task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
     now, following = np.s_[:, :-1], np.s_[:, 1:]
-    alone, there = isolated_reaches(task, befores[now], goals[:-1], hands[now])
+    alone, there = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
     waiting = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
         waiting[number, task.robot.joints(other(hand))] = True
-    hit = np.where(waiting[hands[now]], there, hits[now])
+    hit = np.where(waiting[hands[now]], there, runs.postures[now])
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
     )
     return np.where(np.isnan(alone), np.nan, after - nearer)
 
 
-def postures_before(execution: Execution, task: Task) -> list[Array]:
-    """The configuration from which each subtask starts: the hit before it, or the start."""
-    return [np.array(task.q0), *execution.configurations[:-1]]
-
-
-def starts_of(task: Task, paths: Sequence[Trajectory]) -> Array:
-    """:func:`postures_before` of each path, shape ``(n, G, dof)``."""
-    befores = [postures_before(path.execution, task) for path in paths]
-    return np.array(befores).reshape(-1, len(task.goals), task.robot.dof)
-
-
-def hand_numbers(task: Task, paths: Sequence[Trajectory]) -> NDArray[np.int64]:
-    """Hand chosen for each goal, its place in HANDS, shape ``(n, G)``."""
-    hands = [[HANDS.index(hand) for hand in path.hands] for path in paths]
-    return np.array(hands, dtype=np.int64).reshape(-1, len(task.goals))
-
-
-def ticks_alone(task: Task, paths: Sequence[Trajectory]) -> Array:
-    """Ticks in which each hand reaches each goal from where the path was at the goal before.
-
-    By the corrective process alone, shape ``(2, n, G)``. Infinite where it does not reach the goal
-    with the hand, and for a hand that the task does not have.
-    """
-    befores, goals = starts_of(task, paths), 1 + np.arange(len(task.goals))
-    ticks = np.full((len(HANDS), *befores.shape[:-1]), np.inf)
-    for hand in map(HANDS.index, task.hands):
-        reached, _ = isolated_reaches(task, befores, goals, np.array(hand))
-        ticks[hand] = np.where(np.isnan(reached), np.inf, reached)
-    return ticks
-
-
-def ticks_slower(task: Task, paths: Sequence[Trajectory]) -> Array:
+def ticks_slower(runs: Solutions) -> Array:
     """Ticks by which each goal's hand is slower for that goal alone, shape ``(n, G)``.
 
     Slower than the hand with which the corrective process alone reaches the goal in the fewest
@@ -105,14 +73,18 @@ def ticks_slower(task: Task, paths: Sequence[Trajectory]) -> Array:
     of hand serves other goals than its own. Infinite where the corrective process does not reach
     the goal with the hand.
     """
-    alone = ticks_alone(task, paths)
-    chosen = np.take_along_axis(alone, hand_numbers(task, paths)[None], axis=0)[0]
+    goals = 1 + np.arange(len(runs.task.goals))
+    alone = np.full((len(HANDS), *runs.hands.shape), np.inf)
+    for hand in map(HANDS.index, runs.task.hands):
+        reached, _ = isolated_reaches(runs.task, runs.starts, goals, np.array(hand))
+        alone[hand] = np.where(np.isnan(reached), np.inf, reached)
+    chosen = np.take_along_axis(alone, runs.hands[None], axis=0)[0]
     slower: Array = np.full_like(chosen, np.inf)
     np.subtract(chosen, alone.min(axis=0), out=slower, where=chosen < np.inf)
     return slower
 
 
-def preshaping(path: Trajectory, initial: Execution) -> Array:
+def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     """How much nearer the arm brings its hand to its next goal while it waits, shape ``(G,)``.
 
     (d_held - d)/d_initial: d is the distance of the hand that is not chosen to the next goal it
@@ -122,8 +94,7 @@ def preshaping(path: Trajectory, initial: Execution) -> Array:
     keeps still, whatever the base does (always under the exploration conditions 1 and 3). NaN
     where the other hand hits no later goal.
     """
-    task, hands = path.task, path.hands
-    now = path.execution.configurations
+    now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
     own_last = dict.fromkeys(HANDS, task.q0)
     for row, hand in zip(held, hands, strict=True):

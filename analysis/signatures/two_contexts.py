@@ -14,7 +14,7 @@ from itertools import combinations, takewhile
 
 import numpy as np
 
-from coartic import Hand, Task, Trajectory
+from coartic import Hand, Task
 from coartic.analysis.signatures.context_tests import (
     beyond_p,
     context_dependence,
@@ -22,10 +22,9 @@ from coartic.analysis.signatures.context_tests import (
     permutation_p,
 )
 from coartic.analysis.signatures.manifold import motor_equivalence, movable
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED
-from coartic.analysis.trajectories import Trajectories, postures
 from coartic.robot import Array
-from coartic.runs.plan import label_of
 from coartic.tasks.optima import KEPT
 
 
@@ -46,9 +45,8 @@ class TwoContexts:
 
     Parameters
     ----------
-    first, second : Trajectories
-        Runs on two tasks that share the goal, as ``study.trajectories(task, method)`` gives them,
-        or ``study.replays(task, method)`` without noise.
+    first, second : Solutions
+        Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them.
     goal : int
         Number of the goal, from 1.
     hand : {"left", "right"}
@@ -59,8 +57,8 @@ class TwoContexts:
     In the page *Use it from Python*.
     """
 
-    first: Trajectories
-    second: Trajectories
+    first: Solutions
+    second: Solutions
     goal: int
     """Number of the goal, from 1."""
     hand: Hand
@@ -73,7 +71,7 @@ class TwoContexts:
     @property
     def method(self) -> str:
         """Label of the method."""
-        return label_of(self.first.method, self.first.variant)
+        return self.first.label
 
     @property
     def row(self) -> str:
@@ -81,21 +79,23 @@ class TwoContexts:
         return f"{self.first.task.name} {self.method} goal {self.goal} {self.hand}"
 
     @cached_property
-    def runs(self) -> tuple[tuple[Trajectory, ...], tuple[Trajectory, ...]]:
-        """Runs of either context that hit the goal with the hand."""
-        hand, goal = self.hand, self.goal
-        return self.first.with_hand(hand, goal), self.second.with_hand(hand, goal)
-
-    @cached_property
     def postures(self) -> tuple[Array, Array]:
-        """Configurations at the goal in either context, ``(runs, dof)``, length unit and rad."""
-        first, second = self.runs
-        return postures(first, self.goal), postures(second, self.goal)
+        """Configurations of the runs that hit the goal with the hand, in either context.
+
+        Shape ``(runs, dof)``, length unit and rad.
+        """
+        goal, hand = self.goal, self.hand
+        return self.first.postures_at(goal, hand), self.second.postures_at(goal, hand)
+
+    @property
+    def in_both(self) -> bool:
+        """Whether some runs of either context hit the goal with the hand."""
+        return all(map(len, self.postures))
 
     @property
     def n(self) -> int:
         """Runs of both."""
-        return sum(map(len, self.runs))
+        return sum(map(len, self.postures))
 
     @property
     def apart(self) -> float:

@@ -30,7 +30,6 @@ from coartic.analysis.statistics.hypotheses import (
 )
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study, load
-from coartic.analysis.trajectories import postures
 from coartic.robot import Array
 
 SIMULATIONS, RESAMPLES = 500, 999
@@ -123,8 +122,8 @@ def placebo_rates(study: Study) -> Iterator[tuple[str, float]]:
     of the claims *context* and *first-movement-sacrificed*, each with and without a placebo.
     """
     tasks = ("ascending", "descending")
-    cells = [study.trajectories(task, PLACEBO) for task in tasks]
-    shown = [postures(cell.runs, 1) for cell in cells]
+    cells = [study.executed(task, PLACEBO) for task in tasks]
+    shown = [cell.postures[:, 0] for cell in cells]
     slower = [cell.against_same_hands[:, 0].astype(np.float64) for cell in cells]
     rng, passed = np.random.default_rng(0), []
     for _ in range(STUDIES):

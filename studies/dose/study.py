@@ -84,10 +84,10 @@ def tabulate_apart(study, runs):
     ``apart``: the distance, length unit and rad mixed. ``apart_p``: of the permutation test that
     there is none. ``beyond_p``: of that that it is no larger than that of guesses.
     """
-    guesses = TwoContexts(*(study.trajectories(task, GUESSES) for task in SHARED), 1, "right")
+    guesses = TwoContexts(*(study.executed(task, GUESSES) for task in SHARED), 1, "right")
     rows = {}
     for kind, label in runs[runs.task == SHARED[0]].groupby("kind").label.first().items():
-        learned = [study.replays(task, label) for task in SHARED]
+        learned = [study.executed(task, label, replay=True) for task in SHARED]
         ours = guesses if label == GUESSES else TwoContexts(*learned, 1, "right")
         beyond = np.nan if label == GUESSES else ours.p_beyond(guesses)
         apart = {"apart": ours.apart, "apart_p": ours.p, "beyond_p": beyond}

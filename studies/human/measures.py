@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic import Task, corrective_trial
+from coartic import Task, corrective_trial, trajectory
 
 MODELS = tomllib.loads(Path(__file__).with_name("human.toml").read_text("utf-8"))["models"]
 """What is compared with people, by name: methods with their parameters."""
@@ -61,9 +61,10 @@ def tidy(study):
         for name, model in (MODELS | BESIDE).items():
             wanted = model.get("parameters", {}).items()
             if (model["method"] or learner) == cell.method and wanted <= parameters.items():
-                executed = study.replays if model.get("replayed") else study.trajectories
-                paths = executed(cell.task, cell.label).runs
-                rows += [{"model": name, **facts, "path": path} for path in paths]
+                replay = model.get("replayed", False)
+                for run in study.executed(cell.task, cell.label, replay=replay).runs:
+                    path = trajectory(task, run.movements)
+                    rows.append({"model": name, **facts, "path": path})
     return pd.DataFrame(rows)
 
 

@@ -21,7 +21,7 @@ MADE_WITH = {
 
 class MadeUp(Study):
     """A study with some of its parts made up: ``MadeUp(study, optima=...)``; what its methods
-    return as well, ``MadeUp(study, trajectories=made(...))``."""
+    return as well, ``MadeUp(study, executed=made(...))``."""
 
     def __init__(self, study, **parts):
         super().__init__(study.folder, study.plan, study.made_with, study.runs)
@@ -31,8 +31,8 @@ class MadeUp(Study):
 
 
 def made(values):
-    """A method that returns values by its arguments."""
-    return lambda *key: values[key]
+    """A method that returns values by its arguments, of replays by ``True`` as well."""
+    return lambda *key, replay=False: values[(*key, replay) if replay else key]
 
 
 def made_up_optima(*tasks):

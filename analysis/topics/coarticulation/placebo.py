@@ -35,9 +35,9 @@ def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
         method = study.cells[name, contexts.method].runs.trials.max()
         if study.cells[name, label].runs.trials.max() < method:
             return None
-    first, second = (study.trajectories(*key) for key in keys)
+    first, second = (study.executed(*key) for key in keys)
     placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
-    return placebo if all(placebo.runs) else None
+    return placebo if placebo.in_both else None
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
@@ -58,7 +58,7 @@ def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
     """
     if not selects(study, label) or (task, PLACEBO) not in study.cells:
         return math.nan
-    ours, guesses = (SIGNS[sign].of(study.trajectories(task, who)) for who in (label, PLACEBO))
+    ours, guesses = (SIGNS[sign].of(study.executed(task, who)) for who in (label, PLACEBO))
     several = min(len(ours), len(guesses)) > 1
     return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan
 
@@ -94,5 +94,5 @@ def difference(study: Study) -> Difference | None:
     placebo = placebo_of(study, contexts) if needed else None
     beyond = math.nan if placebo is None else contexts.p_beyond(placebo)
     seen = differ and (not needed or beyond < LEVEL)
-    too_few = tested and not smallest_p(*map(len, contexts.runs)) < LEVEL
+    too_few = tested and not smallest_p(*map(len, contexts.postures)) < LEVEL
     return Difference(contexts, placebo, needed, beyond, differ, seen, too_few)

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from coartic.analysis.methods import LEARNERS, main_methods
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.trajectories import Trajectories
 from coartic.robot import HANDS
 
 
@@ -18,15 +18,15 @@ def shared_goals(study: Study) -> Iterator[TwoContexts]:
         for first, second, shared in pairs:
             both = {first, second} <= alone and (second, label) in study.cells
             if first == task and both:
-                runs = study.trajectories(first, label), study.trajectories(second, label)
+                runs = study.executed(first, label), study.executed(second, label)
                 for goal in range(1, shared + 1):
                     yield from contexts_at(*runs, goal)
 
 
-def contexts_at(first: Trajectories, second: Trajectories, goal: int) -> list[TwoContexts]:
+def contexts_at(first: Solutions, second: Solutions, goal: int) -> list[TwoContexts]:
     """A goal in two contexts, for every hand that hit it in both."""
     by_hand = [TwoContexts(first, second, goal, hand) for hand in HANDS]
-    return [contexts for contexts in by_hand if all(contexts.runs)]
+    return [contexts for contexts in by_hand if contexts.in_both]
 
 
 @cached
@@ -40,7 +40,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
         for *names, _ in context_pairs(study.tasks):
             keys = [(name, label) for name in names]
             if all(key in study.cells and len(study.cells[key].good) for key in keys):
-                first, second = (study.trajectories(*key) for key in keys)
+                first, second = (study.executed(*key) for key in keys)
                 for contexts in contexts_at(first, second, 1):
                     return contexts
     return None

@@ -61,7 +61,7 @@ def signatures(study: Study) -> Rows:
     for task in (name for name in study.tasks if name in one_by_one(study)):
         labels = [label for name, label in study.cells if name == task]
         for label in in_order(shown_methods(study, labels)):
-            cell, runs = study.cells[task, label], study.trajectories(task, label)
+            cell, runs = study.cells[task, label], study.executed(task, label)
             if runs.runs and not is_search(label):
                 row: Row = {
                     "task": marked(study.tasks[task]),

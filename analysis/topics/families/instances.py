@@ -149,7 +149,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
         for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                runs = study.trajectories(name, label)
+                runs = study.executed(name, label)
                 measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
     return by_cell

@@ -19,7 +19,6 @@ from coartic.analysis.claims.comparisons import Higher, all_higher, all_positive
 from coartic.analysis.claims.judging import Finding, all_of
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4
-from coartic.analysis.signatures.subtasks import postures_before
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
 from coartic.analysis.topics.paper.coarticulation import (
@@ -74,7 +73,8 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
     parts, most = [], 0.0
     for name in tasks:
         task, initial = read.task(name), read.initial_execution(name)
-        before, after = np.array(postures_before(initial, task)), initial.configurations
+        after = initial.configurations
+        before = np.array([task.q0, *after[:-1]])
         reaches = zip(before, hands_of(initial.hands), itertools.count(1), after, strict=False)
         shortest = np.array([shortest_reach(task, *reach) for reach in reaches])
         ways = np.linalg.norm(after - before, axis=1)
@@ -116,14 +116,14 @@ def resemblance(read: Reader, task: str) -> Measurement:
     """Share of the initial solution's distance to the plan that each run has covered."""
     learned = read.cell(task, EC1).runs
     (plan,) = read.cell(task, LEAST_CHANGES).runs
-    planned = plan.execution.configurations
+    planned = plan.configurations
 
     def apart(execution: Execution) -> float:
         """Mean distance of postures at the goals, length unit and rad mixed."""
         return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
 
     before = apart(read.initial_execution(task))
-    shares = np.array([1 - apart(run.execution) / before for run in learned])
+    shares = np.array([1 - apart(run) / before for run in learned])
     return Measurement(
         task, who_is(EC1), shares,
         "share of the distance of the initial solution to the plan for least squared changes "
@@ -205,7 +205,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
 def no_reversal(read: Reader) -> Finding:
     """With RRLR the base only moves right."""
     learned, q0 = read.hands(TASK_1, EC2), read.task(TASK_1).q0
-    runs = [run.execution for run in read.cell(TASK_1, EC2).runs if run.execution.hands == "RRLR"]
+    runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
         raise MissingError(f"no run of EC2 on {TASK_1} learned RRLR")
     rightward = [bool((base_steps(q0, run.configurations) > 0).all()) for run in runs]

@@ -17,11 +17,11 @@ from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
 from coartic.analysis.signatures.context_tests import dependence_below
-from coartic.analysis.signatures.subtasks import hand_numbers, ticks_slower
+from coartic.analysis.signatures.subtasks import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
+from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
 from coartic.analysis.statistics.hypotheses import share_test
-from coartic.analysis.trajectories import Trajectories
 from coartic.analysis.words import estimate, number
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
@@ -83,7 +83,7 @@ def contexts_of(read: Reader, label: str, *, replay: bool = False) -> TwoContext
     """Runs of a method that hit goal 1 of both one-armed tasks; MissingError without them."""
     first, second = (read.cell(task, label, replay=replay) for task in ONE_ARMED)
     contexts = TwoContexts(first, second, 1, "right")
-    if not all(contexts.runs):
+    if not contexts.in_both:
         raise MissingError(f"no run of {label} hits goal 1 of both tasks with the right hand")
     return contexts
 
@@ -151,20 +151,19 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
     return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
 
 
-def chosen_slower(cell: Trajectories, initial: str) -> Array:
+def chosen_slower(cell: Solutions, initial: str) -> Array:
     """Ticks of the hands that are slower for their goal alone, in each run, shape ``(runs,)``.
 
     Of goals that others follow, hit with another hand than that of the initial solution.
     """
     first = [HANDS.index(hand) for hand in hands_of(initial)]
-    others = hand_numbers(cell.task, cell.runs) != first
-    slower = np.where(others, ticks_slower(cell.task, cell.runs), 0.0)
+    slower = np.where(cell.hands != first, ticks_slower(cell), 0.0)
     return np.asarray(slower[:, :-1].sum(axis=1))
 
 
-def gained_by_slower(cell: Trajectories, slower: Array) -> str:
+def gained_by_slower(cell: Solutions, slower: Array) -> str:
     """By how many ticks such runs are slower, and how much better they end than the others."""
-    rewards = np.array([run.execution.reward for run in cell.runs], dtype=float)
+    rewards = np.array([run.reward for run in cell.runs], dtype=float)
     with_it, without_it = rewards[slower > 0], rewards[slower == 0]
     if not len(with_it):
         return ""

@@ -1,0 +1,83 @@
+"""Solutions of one method on one task, and what they are compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic import Execution, Hand, Task, corrective_trial, initial_hands
+from coartic.errors import NotApplicableError
+from coartic.robot import HANDS, Array
+from coartic.tasks.task import hands_of
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Executed solutions of n runs of one method with parameters on one task with G goals."""
+
+    task: Task
+    label: str
+    """The method with its variant."""
+    runs: tuple[Execution, ...]
+    run_ids: tuple[str, ...] = ()
+
+    @cached_property
+    def initial(self) -> Execution | None:
+        """The initial solution: the corrective process alone with the task's hands.
+
+        None where it completes the task with none.
+        """
+        return initial_solution(self.task)
+
+    @cached_property
+    def hands(self) -> NDArray[np.int64]:
+        """Hand chosen for each goal, its place in HANDS, shape ``(n, G)``."""
+        hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
+        return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
+
+    @cached_property
+    def postures(self) -> Array:
+        """Configurations that hit the goals, shape ``(n, G, dof)``, length unit and rad."""
+        shape = len(self.runs), len(self.task.goals), self.task.robot.dof
+        return np.array([run.configurations for run in self.runs]).reshape(shape)
+
+    @cached_property
+    def starts(self) -> Array:
+        """Configuration from which each subtask starts: the hit before it, or the start."""
+        starts = np.empty_like(self.postures)
+        starts[:, 0], starts[:, 1:] = self.task.q0, self.postures[:, :-1]
+        return starts
+
+    def postures_at(self, goal: int, hand: Hand) -> Array:
+        """Configurations ``(k, dof)`` of the runs that hit a goal, from 1, with a hand."""
+        return np.asarray(self.postures[self.hands[:, goal - 1] == HANDS.index(hand), goal - 1])
+
+    @cached_property
+    def against_same_hands(self) -> Array:
+        """Ticks of subtasks less the corrective process's with each run's own hands.
+
+        Shape ``(n, G)``; NaN for runs with whose hands it does not complete the task.
+        """
+        references = {hands: corrective(self.task, hands) for hands in {r.hands for r in self.runs}}
+        changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
+        for row, run in zip(changes, self.runs, strict=True):
+            if (reference := references[run.hands]) is not None:
+                row[:] = np.subtract(run.ticks_by_goal(), reference.ticks_by_goal())
+        return changes
+
+
+def corrective(task: Task, hands: str) -> Execution | None:
+    """The corrective process alone with these hands; None where it fails the task."""
+    execution = corrective_trial(task, hands)
+    return execution if execution.completed else None
+
+
+def initial_solution(task: Task) -> Execution | None:
+    """The corrective process alone with the task's hands; None where it completes it with none."""
+    try:
+        return corrective(task, initial_hands(task))
+    except NotApplicableError:
+        return None
