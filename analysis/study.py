@@ -7,6 +7,7 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
@@ -25,7 +26,7 @@ from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import execute_all, movements_by_run
+from coartic.runs.run import execute_all, movements_from
 from coartic.runs.store import explain_errors, open_store
 from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of
@@ -220,13 +221,13 @@ class Study:
         """
         ids = list(map(str, self.cells[task, label].good.run_id[:MOST_EXECUTED]))
         rows, paths = (
-            frame[frame.run_id.isin(ids)]
+            rows_by_run(frame[frame.run_id.isin(ids)])
             for frame in (self._stored("replay" if replay else "solution"), self._stored("paths"))
         )
         with explain_errors(self.folder):
-            solutions = movements_by_run(self.tasks[task], rows, paths)
-            ids = [run_id for run_id in ids if run_id in solutions]
-            runs = execute_all(self.tasks[task], [solutions[run_id] for run_id in ids])
+            ids = [run_id for run_id in ids if run_id in rows]
+            solutions = {i: movements_from(self.tasks[task], rows[i], paths[i]) for i in ids}
+            runs = execute_all(self.tasks[task], list(solutions.values()))
             executed = []
             for run_id, run in zip(ids, runs, strict=True):
                 ticks = sum(movement.ticks or 0 for movement in solutions[run_id])
@@ -307,3 +308,11 @@ def one_by_one(study: Study) -> set[str]:
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
+
+
+def rows_by_run(frame: pd.DataFrame) -> dict[str, list[Any]]:
+    """Rows of a frame by run id."""
+    rows: dict[str, list[Any]] = defaultdict(list)
+    for row in frame.to_dict("records"):
+        rows[row["run_id"]].append(row)
+    return rows

@@ -2,8 +2,8 @@
 person's.
 
 They go together where suite, seed, trial budget, the tasks of a name and the code of a method are
-the same. Versions of coartic and of libraries and machines may differ. The scorer is that of the
-code that copies: every solution is executed again.
+the same. Versions of coartic and of libraries and machines may differ. Every solution of another
+folder is executed and scored again; that of the shipped ones is checked by the hash of their file.
 """
 
 from __future__ import annotations
@@ -157,9 +157,9 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
             if results[run_id] != there[run_id]:
                 check_same(name, source.run(run_id), origin[run_id], target.run(run_id))
         runs = [source.run(run_id) for run_id in results if run_id not in there]
-        if runs:
+        if runs and name != RELEASED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
-            target.write(runs)
+        target.write(runs)
         origin |= {run.key.id: name for run in runs}
 
 

@@ -341,7 +341,7 @@ def test_robots_of_different_size_share_a_table(tmp_path):
     for run in study.runs.itertuples():
         rows = study.solutions[study.solutions.run_id == run.run_id]
         task = study.tasks[run.task]
-        assert execute(task, movements_from(task, rows)).reward == run.reward
+        assert execute(task, movements_from(task, rows.to_dict("records"))).reward == run.reward
 
 
 def test_own_task_runs_under_every_applicable_condition(tmp_path):

@@ -38,7 +38,7 @@ def test_what_is_shipped_holds(entry):
     it."""
     task = load_task(entry.task)
     assert entry.essence == essence(task)
-    solution = movements_from(task, pd.DataFrame(list(entry.solution)))
+    solution = movements_from(task, entry.solution)
     execution = execute(task, solution)
     assert execution.reward == entry.reward
     assert execution.hands == entry.hands
@@ -151,7 +151,7 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     assert entry.run_ids == tuple(sorted(study.runs.run_id))
     assert entry.searches == dict.fromkeys(names, -292)
     again = ShippedOptimum.model_validate_json(entry.model_dump_json()).solution
-    assert execute(task, movements_from(task, pd.DataFrame(list(again)))).reward == -292
+    assert execute(task, movements_from(task, again)).reward == -292
 
 
 def test_renewing_with_what_is_there_changes_nothing():

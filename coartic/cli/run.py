@@ -76,7 +76,7 @@ def run(
 
     with interruptible(saved), display:
         if beside:
-            display.line(f"Copying {' and '.join(beside)}, with every solution executed again.")
+            display.line(f"Copying {' and '.join(beside)}.")
             plan = put_beside(plan, beside, out)
         executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
         report = perform(

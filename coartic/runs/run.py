@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +23,6 @@ from coartic.motion.reach import bench_of
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.runs.plan import RunKey, Setting
 from coartic.tasks.task import Task
-
-if TYPE_CHECKING:  # workers do without pandas
-    import pandas as pd
 
 RESULTS = {
     "run_id": "TEXT NOT NULL UNIQUE",
@@ -167,7 +167,7 @@ class Run:
         counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
         return corrections if counted else None
 
-    @property
+    @cached_property
     def result(self) -> str:
         """Hash of status, solutions to the last joint, rewards of all trials, bound.
 
@@ -257,40 +257,28 @@ class Run:
 
 
 def movements_from(
-    task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
+    task: Task, rows: Iterable[Mapping[str, Any]], waypoints: Iterable[Mapping[str, Any]] = ()
 ) -> tuple[Movement, ...]:
-    """The movements of one run from its rows of ``solutions``.
+    """The movements of one solution from its rows of ``solutions``, and from those of ``paths`` for
+    movements of kind ``path``. Raises ValueError where a joint is not a finite number."""
 
-    ``paths`` holds the run's rows of ``paths``, for movements of kind ``path``.
-    """
-    alone = None if paths is None else paths.assign(run_id="")
-    return movements_by_run(task, rows.assign(run_id=""), alone).get("", ())
+    def joints(row: Mapping[str, Any]) -> list[float]:
+        return [row[name] for name in task.robot.joint_names]
 
-
-def movements_by_run(
-    task: Task, rows: pd.DataFrame, paths: pd.DataFrame | None = None
-) -> dict[str, tuple[Movement, ...]]:
-    """The movements of each of several runs of a task, by run id, from their rows of ``solutions``
-    and of ``paths``."""
-    joints, rows = list(task.robot.joint_names), rows.sort_values(["run_id", "order"])
-    targets = rows[joints].to_numpy(dtype=np.float64, copy=True)
-    waypoints: dict[Any, Any] = {}
-    if paths is not None:
-        for key, points in paths.sort_values("waypoint").groupby(["run_id", "order"]):
-            waypoints[key] = points[joints].to_numpy(dtype=np.float64)
-    if not all(np.isfinite(each).all() for each in (targets, *waypoints.values())):
-        raise ValueError("a joint is not a finite number")
-    columns = (rows[name].tolist() for name in ("run_id", "order", "goal", "hand", "kind", "ticks"))
-    movements: dict[str, list[Movement]] = {}
-    for target, run_id, order, goal, hand, kind, ticks in zip(targets, *columns, strict=True):
-        path = None
-        if kind == "path":
-            if paths is None:
-                raise ValueError("a movement of kind 'path' needs its waypoints")
-            path = waypoints.get((run_id, order), np.empty((0, len(joints))))
-        movement = Movement(int(goal), hand, kind, target, int(ticks), path)
-        movements.setdefault(run_id, []).append(movement)
-    return {run_id: tuple(of_run) for run_id, of_run in movements.items()}
+    points: dict[int, list[list[float]]] = defaultdict(list)
+    for row in sorted(waypoints, key=itemgetter("waypoint")):
+        points[row["order"]].append(joints(row))
+    movements = []
+    for row in sorted(rows, key=itemgetter("order")):
+        target, path = np.array(joints(row), dtype=np.float64), None
+        if row["kind"] == "path":
+            path = np.array(points[row["order"]], dtype=np.float64).reshape(-1, len(target))
+        if not all(np.isfinite(each).all() for each in (target, path) if each is not None):
+            raise ValueError("a joint is not a finite number")
+        movements.append(
+            Movement(int(row["goal"]), row["hand"], row["kind"], target, int(row["ticks"]), path)
+        )
+    return tuple(movements)
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:

@@ -325,15 +325,19 @@ class Store:
         setting = Setting.from_row(asked, str(self.folder / RUNS_FILE))
         environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
         blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-        movements = self._table("SELECT * FROM movements WHERE result_id = ?", row["id"])
-        paths = self._table("SELECT * FROM waypoints WHERE result_id = ?", row["id"])
+        movements, waypoints = (
+            self._db.execute(f"SELECT * FROM {table} WHERE result_id = ?", (row["id"],)).fetchall()
+            for table in ("movements", "waypoints")
+        )
         rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
         return Run.from_row(
             row,
             setting,
             json.loads(environment["content"]),
             {
-                part: movements_from(setting.task, movements[movements.part == part], paths)
+                part: movements_from(
+                    setting.task, (each for each in movements if each["part"] == part), waypoints
+                )
                 for part in PARTS
             },
             [None if reward == FAILED_TRIAL else reward for reward in rewards],
