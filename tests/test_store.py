@@ -293,8 +293,8 @@ def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lo
 
 class TooSlow(InProcess):
     def perform(self, jobs):
-        for number, job in enumerate(jobs):
-            yield number, fail(job, "timeout", "time limit exceeded", 1.0)
+        for job in jobs:
+            yield job, fail(job, "timeout", "time limit exceeded", 1.0)
 
 
 def test_what_is_performed_again(undisturbed, tmp_path):
