@@ -331,12 +331,12 @@ def test_ten_thousand_movements_are_not_too_many():
 
 def test_robots_of_different_size_share_a_table(tmp_path):
     small = tiny_task(
-        name="small", robot={"left_links": [2.0], "right_links": [1.0] * 11},
-        start={"left": [0.1], "right": [0.1] * 11}, goals=[[3.0, 1.0]], initial_hands="R",
+        name="small", robot={"left_links": [2.0], "right_links": [1.0] * 8},
+        start={"left": [0.1], "right": [0.1] * 8}, goals=[[3.0, 1.0]], initial_hands="R",
     )  # fmt: skip
     cells = [Cell(small, KNOWN["corrective-alone/given"]), *paper_cells()[:1]]
     study = run_and_write(tmp_path, cells, trials=20)
-    arms = {f"left_{k}" for k in range(1, 5)} | {f"right_{k}" for k in range(1, 12)}
+    arms = {f"left_{k}" for k in range(1, 5)} | {f"right_{k}" for k in range(1, 9)}
     assert set(study.solutions.columns[6:]) == {"base_x", "base_y"} | arms
     for run in study.runs.itertuples():
         rows = study.solutions[study.solutions.run_id == run.run_id]

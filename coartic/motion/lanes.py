@@ -41,9 +41,9 @@ class Lanes(NamedTuple):
 
 
 def links_for(robot: Robot) -> int:
-    """Links for which kernels are compiled: those of the longer arm, and four at least, so that
-    robots with fewer have the machine code of the paper's."""
-    return max(robot.most_links, 4)
+    """Links for which kernels are compiled: four, eight, or those of an arm that has more, so that
+    all robots of a family share their machine code."""
+    return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
 def width_of(robot: Robot) -> int:
