@@ -67,7 +67,8 @@ studies: $(READY)
 	  files=""; \
 	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
 	  for file in studies/$$study/policy.py; do [ -e $$file ] && files="$$files --method-file $$file"; done; \
-	  $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files && \
+	  if [ -e studies/$$study/protocols.py ]; then $(BIN)/python studies/$$study/protocols.py; else \
+	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
 	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
 	done
 	$(BIN)/python docs/make_findings.py

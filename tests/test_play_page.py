@@ -113,7 +113,7 @@ def test_evolution_reports_every_run_to_its_end(opened):
 
 def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page = settled(opened("who=alone&preset=1&others="))
-    handle = page.get_by_role("button", name="Goal 3")
+    handle = page.get_by_role("button", name="Goal 3, at")
     handle.focus()
     for _ in range(7):
         page.keyboard.press("ArrowDown")
@@ -132,6 +132,22 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page.mouse.move(box["x"] - 78, box["y"] + 50, steps=4)
     page.mouse.up()
     page.wait_for_url(re.compile(r"goals=6,0.1;6,2;(?!5.98)[45][.\d]*,[23]"))
+
+
+def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_not(opened):
+    page = settled(opened("preset=1&others="))
+    page.get_by_role("button", name="Move goal 3 now").click()
+    settled(page)
+    task = changed("ascending", goals=[[6.0, 0.1], [6.0, 2.0], [5.0, 4.0]])
+    practised = learn("ascending", "EC1", seed=0).solution
+    after, before = (execute(each, practised) for each in (task, "ascending"))
+    assert np.array_equal(after.configurations[1], before.configurations[1])
+    assert ticks(page, "The learner's next trial") == after.ticks > ticks(page, "The planner")
+    shifts = re.findall(r"by (\d[.\d]*\b)", text(page, "finding"))
+    assert shifts[0] == "0"
+    assert float(shifts[1]) > 0.1
+    page.get_by_role("radio", name="each movement").check()  # and it learns anew
+    assert "One goal at a time" in text(settled(page), "score")
 
 
 def test_two_arms_more_goals_and_a_plan(opened):

@@ -20,7 +20,9 @@ from coartic.tasks.families import instance_of, own_families, task_text
 from coartic.tasks.task import address_of
 
 ROOT = Path(__file__).parents[1]
-STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
+ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
+STUDIES = [folder for folder in ALL if (folder / "suite.toml").exists()]
+"""Studies of runs; the others have protocols of their own."""
 SMALL = ROOT / "tests" / "studies"
 INSTANCES = {
     "fourteen-one/v1/i017": "bad507514407bc5c",
@@ -92,7 +94,7 @@ def test_draws_its_results(measured):
     assert drawing.count(b"<path") > 20
 
 
-@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("folder", ALL, ids=lambda folder: folder.name)
 def test_page_says_what_the_tables_say(folder):
     tables = {path.stem: read(path) for path in folder.glob("*.csv")}
     page = fill_page(folder / "README.md.jinja", **tables)

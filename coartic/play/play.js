@@ -129,8 +129,10 @@ class Play {
     return reward === "movement" ? { ...rules, credit: "subtask" } : rules;
   }
 
-  /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
-  ask() {
+  /* Goals, robot or method have changed: the fast answer at once, the others from the worker. After
+     `told`, a goal has moved and the learner makes its next trial beside the planner. */
+  ask(told = null) {
+    this.told = told;
     if (!(this.state.who in NAMES || this.stored(this.state.who))) {
       this.state.who = "learner";
       this.showControls();
@@ -154,7 +156,7 @@ class Play {
     this.tasks.forEach((task, k) => {
       const { model } = this.data;
       if (!this.alone[k].going) return; // a goal is out of reach
-      if (learns && !this.stored(who)) {
+      if (learns && !this.stored(who) && !this.told) {
         const seeds = this.state.others ? SEEDS : 1;
         for (let seed = 0; seed < seeds; seed += 1) {
           jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 });
@@ -212,6 +214,11 @@ class Play {
       const trial = fits ? execute(problem, movements.filter((m) => m.goal < problem.goals.length)) : this.alone[k];
       return new Mover(problem, trial, ROLES[k]);
     });
+    const planned = this.told && this.fresh.has("0 far") && this.snapshot("0 far", Infinity);
+    if (planned) {
+      this.movers.push(new Mover(this.problems[0], execute(this.problems[0], planned.movements), "second"));
+      this.state.tick = this.meeting;
+    }
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
     if (this.waits && this.calm.matches) this.state.tick = this.stops[0] || 0;
@@ -219,31 +226,35 @@ class Play {
     this.refresh();
   }
 
-  /* ---- Time: both robots wait for each other at the goal they share ---- */
+  /* ---- Time: both robots wait for each other at the goal they share, or that is before the moved one ---- */
+
+  get shared() {
+    return this.told ? this.told.goal - 1 : 0;
+  }
 
   get main() {
     return this.movers.filter((mover) => mover.role !== "ghost");
   }
 
   get meeting() {
-    return this.main.length > 1 ? Math.max(...this.main.map((mover) => mover.hits[0] || 0)) : 0;
+    return this.main.length > 1 ? Math.max(...this.main.map((mover) => mover.hits[this.shared] || 0)) : 0;
   }
 
   row(mover, tick) {
     if (this.main.length < 2) return Math.min(tick, mover.last);
-    const hit = mover.hits[0] || 0;
+    const hit = mover.hits[this.shared] || 0;
     return tick <= this.meeting ? Math.min(tick, hit) : Math.min(hit + tick - this.meeting, mover.last);
   }
 
   get last() {
     const { meeting } = this;
-    return Math.max(...this.movers.map((mover) => (meeting ? mover.last - (mover.hits[0] || 0) + meeting : mover.last)));
+    return Math.max(...this.movers.map((mover) => (meeting ? mover.last - (mover.hits[this.shared] || 0) + meeting : mover.last)));
   }
 
   /* Ticks at which a playing film holds. */
   get stops() {
     const { meeting } = this;
-    const stops = this.main.flatMap((mover) => mover.hits.map((hit) => (meeting ? hit - mover.hits[0] + meeting : hit)));
+    const stops = this.main.flatMap((mover) => mover.hits.map((hit) => (meeting ? hit - mover.hits[this.shared] + meeting : hit)));
     return [...new Set(stops)].sort((a, b) => a - b);
   }
 
@@ -321,7 +332,7 @@ class Play {
       const mover = this.main[k];
       stage.goal(goal, problem.radius, {
         label: `${g + 1}`, movable: !this.editing, held: this.held && this.held.name === `${k} ${g}`,
-        colour: this.main.length > 1 && g ? colours[ROLES[k]] : colours.ink,
+        colour: this.problems.length > 1 && g ? colours[ROLES[k]] : colours.ink,
         hit: mover.hits[g] !== undefined && mover.hits[g] <= this.row(mover, tick),
       });
     }));
@@ -331,7 +342,7 @@ class Play {
       }));
     } else {
       if (this.meeting && tick > this.meeting) {
-        this.main.forEach((mover) => stage.robot(mover.problem, mover.rows[mover.hits[0] || 0], { colour: colours[mover.role], alpha: 0.25, weight: 0.9 }));
+        this.main.forEach((mover) => stage.robot(mover.problem, mover.rows[mover.hits[this.shared] || 0], { colour: colours[mover.role], alpha: 0.25, weight: 0.9 }));
       }
       this.movers.forEach((mover) => {
         const row = this.row(mover, tick);
@@ -361,6 +372,7 @@ class Play {
   postures() {
     if (this.main.length < 2) return null;
     const { who } = this.state;
+    if (this.told) return this.main.map((mover, k) => ({ runs: [this.told.before[k]], mean: mover.trial.reached[this.shared] }));
     return this.main.map((mover, k) => {
       const stored = this.stored(who);
       const runs = stored ? [...stored.films[k].reached] : [];
@@ -390,7 +402,7 @@ class Play {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, weight: 0.35, joints: false }));
       inset.robot(problem, mean, { colour: colours[ROLES[k]], weight: 1 });
     });
-    inset.goal(problem.goals[0], problem.radius, { label: "1", colour: colours.ink, hit: true });
+    inset.goal(problem.goals[this.shared], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
     const distance = apart(both[0].mean, both[1].mean);
     const [n, m] = both.map(({ runs }) => runs.length);
     const squares = both.reduce((sum, { runs, mean }) => sum + runs.reduce((part, q) => part + apart(q, mean) ** 2, 0), 0);
@@ -401,7 +413,7 @@ class Play {
   /* Ticks needed against trials, on a logarithmic scale: what was learned, and the range of what was tried. */
   drawCurve() {
     const { curve, colours } = this;
-    const learns = ["learner", "cma-es"].includes(this.state.who) && !this.stored(this.state.who);
+    const learns = ["learner", "cma-es"].includes(this.state.who) && !this.stored(this.state.who) && !this.told;
     this.find("learning").hidden = !learns;
     if (!learns) return;
     const runs = this.problems.map((_, k) => this.results.get(`${k} run 0`)).filter(Boolean);
@@ -494,7 +506,8 @@ class Play {
       this.find("score").append(line);
     };
     const name = this.stored(state.who) ? this.stored(state.who).name : NAMES[state.who];
-    if (main.length > 1) main.forEach((mover, k) => score(mover.role, k ? "Orange" : "Blue", ticks(mover.trial)));
+    const pair = this.told ? ["The learner's next trial", "The planner"] : ["Blue", "Orange"];
+    if (main.length > 1) main.forEach((mover, k) => score(mover.role, pair[k], ticks(mover.trial)));
     else {
       score("first", name[0].toUpperCase() + name.slice(1), ticks(main[0].trial));
       if (state.who !== "alone") score("ghost", "One goal at a time", ticks(this.alone[0]));
@@ -502,7 +515,10 @@ class Play {
     }
     let finding = "";
     if (missed >= 0) finding = `Goal ${main[missed].trial.reached.length + 1} is out of the robot's reach.`;
-    else if (main.length < 2 && state.who !== "alone") {
+    else if (this.told) {
+      const [learner, planner] = main.map((mover, k) => short(apart(mover.trial.reached[this.shared], this.told.before[k])));
+      finding = `Goal ${this.told.goal + 1} has moved. At goal ${this.told.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner || "…"}.`;
+    } else if (main.length < 2 && state.who !== "alone") {
       const saved = main[0].trial.reward - this.alone[0].reward;
       finding = `${Math.abs(saved)} tick${Math.abs(saved) === 1 ? "" : "s"} ${saved < 0 ? "more" : "fewer"} than one goal at a time.`;
       if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) finding = "You are as fast as the planner!";
@@ -520,6 +536,7 @@ class Play {
     const progress = learns ? `${at.toLocaleString("en").replace(",", "\u202f")} trials` : "";
     this.find("progress").textContent = progress;
     if (state.who === "you") this.find("hand").value = this.own[state.edited - 1].hand;
+    this.find("told").disabled = !this.moved || !this.snapshot("0 run 0") || !this.snapshot("0 far", Infinity);
     const slider = this.find("trials");
     slider.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
     slider.setAttribute("aria-valuetext", progress);
@@ -560,7 +577,7 @@ class Play {
     } else {
       this.problems.forEach((problem, k) => problem.goals.forEach((goal, g) => {
         if (k && !g) return;
-        const whose = this.main.length > 1 && g ? (k ? " of orange" : " of blue") : "";
+        const whose = this.problems.length > 1 && g ? (k ? " of orange" : " of blue") : "";
         wanted.set(`${k} ${g}`, { at: goal, label: `Goal ${g + 1}${whose}`, move: (to) => this.moveGoal(k, g, to) });
       }));
     }
@@ -641,6 +658,11 @@ class Play {
   }
 
   /* ---- Postures by hand ---- */
+
+  /* The goal that the button moves, from 0: the third, or the last of fewer. */
+  get moved() {
+    return Math.min(2, this.state.goals.length - 1);
+  }
 
   get editing() {
     return this.state.who === "you" && !this.playing && !this.watching;
@@ -732,6 +754,18 @@ class Play {
       this.state.edited = 1;
       change("goals", grown(goals));
     };
+    on("told", "click", () => {
+      const goal = this.moved;
+      const [learned, plan] = ["0 run 0", "0 far"].map((key) => this.snapshot(key, Infinity));
+      const [from, to] = [this.state.goals[goal - 1], this.state.goals[goal]];
+      const way = [to[0] - from[0], to[1] - from[1]];
+      const length = Math.hypot(...way) || 1;
+      this.state.others = null;
+      this.state.goals = this.state.goals.with(goal, [to[0] - way[1] / length, to[1] + way[0] / length].map((value) => Math.round(100 * value) / 100));
+      this.showControls();
+      this.ask({ goal, before: [learned, plan].map(({ reached }) => reached[goal - 1]) });
+      this.keep();
+    });
     on("more", "click", () => count(1));
     on("fewer", "click", () => count(-1));
     on("posture", "change", (event) => change("edited", Number(event.target.value)));
@@ -819,6 +853,7 @@ class Play {
     this.find("arms").value = hands;
     this.find("two").checked = Boolean(state.others);
     this.find("two").disabled = state.goals.length < 2;
+    this.find("told").textContent = `Move goal ${this.moved + 1} now`;
     this.find("more").disabled = state.goals.length >= MOST_GOALS;
     this.find("fewer").disabled = state.goals.length < 2;
     this.find("for-learner").hidden = state.who !== "learner";

@@ -1,0 +1,234 @@
+"""What would tell trial and error from planning?
+
+    python studies/tell-apart/protocols.py      # a quarter of an hour of one core
+    python studies/tell-apart/study.py          # results, power, claims, figure.svg, README.md
+
+All predictions with their rules are in :func:`judge_claims`, committed before the test instances
+were run.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from protocols import AFTER, NOISE
+from scipy import stats
+
+from coartic.analysis import all_of, figures, fill_page, judge, mean_beyond, means
+
+HERE = Path(__file__).parent
+HALF = 0.5
+
+
+def share_by_task(changes):
+    """A row for each task, distance and model: sums over people and goals, and shares of the shift.
+
+    ``half``: trials until the share is a half, interpolated on a logarithmic scale.
+    """
+    shares = changes.groupby(["distance", "model", "task"], sort=False)
+    shares = shares.sum(numeric_only=True, min_count=1).reset_index()
+    numbers = {f"share_{n}": shares[f"dot_{n}"] / shares.square for n in AFTER}
+    curve = np.array(list(numbers.values())).T
+    passed = (curve >= HALF).argmax(axis=1)
+    half = np.full(len(curve), np.nan)
+    for row, k in enumerate(passed):
+        if k:
+            ends, logs = curve[row, k - 1 : k + 1], np.log10(AFTER[k - 1 : k + 1])
+            half[row] = np.interp(HALF, ends, logs)
+    return shares.assign(
+        **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
+        drift=shares["same"] / shares.square, from_anew=np.sqrt(shares.anew / shares.among),
+        first=(shares.ticks_1 - shares.ticks_10000) / shares.cases,
+        behind=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
+    )  # fmt: skip
+
+
+def tabulate(changes, starts, steps):
+    """Means over tasks with intervals, a row for each measure of a model."""
+    shares = share_by_task(changes)
+    columns = [*(f"share_{n}" for n in AFTER), "shift", "half", "drift", "from_anew", "first",
+               "behind"]  # fmt: skip
+    tables = [means(shares, ["distance", "model"], columns)]
+    starts = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
+    tables.append(means(starts, ["model", "trials"], ["ratio"]))
+    tables.append(means(steps.groupby(["model", "task"], sort=False).mean(numeric_only=True)
+                        .reset_index(), ["model"], ["same", "kept", "records"]))  # fmt: skip
+    names = "change {0.distance:g} {0.model}", "start {0.model} {0.trials}", "step {0.model}"
+    for table, name in zip(tables, names, strict=True):
+        table.index = [name.format(row) for row in table.itertuples()]
+    return pd.concat(tables).rename(columns={"rows": "tasks"}).rename_axis("row")
+
+
+def judge_claims(changes, starts, steps):
+    """The predictions, each with its rule; what is of the opposite sign counts against it."""
+    shares = share_by_task(changes)
+    shares = shares[shares.distance == 0.5].pivot(index="task", columns="model")  # noqa: PD010
+    ratio = starts.assign(ratio=np.log10(starts.between / starts.within) / 2)
+    ratio = ratio.pivot_table("ratio", "task", ["model", "trials"])
+    same, kept = (steps.pivot_table(name, "task", "model") for name in ("same", "kept"))
+    rule = "one-tailed bootstrap test over test tasks, goals moved by half a link: "
+    return judge({
+        "learner-takes-hundreds-of-trials": (
+            "The learner needs more than 100 trials for half of the shift.",
+            rule + "mean of the logarithm of the trials above 2",
+            mean_beyond("The logarithm is {}", shares["half"]["learner"], 2),
+        ),
+        "shift-is-of-the-change": (
+            "Less than half of the learner's shift is there without a change.",
+            rule + "the shift of as much practice without a change, projected, below 0.5",
+            mean_beyond("The share is {}", shares["drift"]["learner"], HALF, "less"),
+        ),
+        "told-learner-between": (
+            "A learner whose corrective process is told the next goal shifts in part at once.",
+            rule + "share at once above 0.1 and below 0.9",
+            all_of(
+                mean_beyond("The share is {}", shares["share_1"]["learner, told"], 0.1),
+                mean_beyond("it is {}", shares["share_1"]["learner, told"], 0.9, "less"),
+            ),
+        ),
+        "planner-shift-is-seen": (
+            "The shift of a planner is larger than the noise of a trial.",
+            rule + "root mean square shift of the planner with all goals in view above 0.1, twice "
+            "the noise of a joint",
+            mean_beyond("The shift is {}", shares["shift"]["planner, all goals"], 2 * NOISE),
+        ),
+        "learner-ends-where-learning-anew-ends": (
+            "After the change the learner ends where those end who learn the changed task anew.",
+            rule + "its distance to them, over that between them (root mean squares), below 1.2",
+            mean_beyond("The ratio is {}", shares["from_anew"]["learner"], 1.2, "less"),
+        ),
+        "learner-ends-as-well": (
+            "It ends as well in ticks.",
+            rule + "less than 2 % more ticks than learning anew",
+            mean_beyond("It needs {} % more", shares["behind"]["learner"], 2, "less"),
+        ),
+        "starts-keep-learners-apart": (
+            "Learners who practised from different starts stay apart when tested from a third, and "
+            "after as much practice from there.",
+            "one-tailed bootstrap test over test tasks: mean logarithm of the distance between "
+            "groups over that within above 0.1 (a ratio of 1.26), at once and after 10,000 trials",
+            all_of(
+                mean_beyond("At once the logarithm is {}", ratio["learner", 1], 0.1),
+                mean_beyond("after practice it is {}", ratio["learner", 10_000], 0.1),
+            ),
+        ),
+        "signs-tell-no-planner": (
+            "Signs of successive steps do not tell the learner from a planner with noise, but from "
+            "a walk.",
+            "one-tailed bootstrap tests over test tasks: the learner's share of equal signs "
+            "is above the planner's by less than 0.02, and below the walk's by more than 0.1",
+            all_of(
+                mean_beyond("The learner has {} more than the planner",
+                            same.learner - same.planner, 0.02, "less"),
+                mean_beyond("the walk {} more than the learner", same.walk - same.learner, 0.1),
+            ),
+        ),
+        "best-trials-are-kept": (
+            "After its best trial so far the learner stays there, the planner does not.",
+            "one-tailed bootstrap tests over test tasks: of the deviation of the best trial so far "
+            "the next keeps more than 0.5, and less than 0.3 (less what it keeps of others)",
+            all_of(
+                mean_beyond("The learner keeps {}", kept.learner, 0.5),
+                mean_beyond("the planner {}", kept.planner, 0.3, "less"),
+            ),
+        ),
+    })  # fmt: skip
+
+
+def people_needed(learner, planner, noise, items, planned, rng):
+    """Fewest people of whom 90 % of experiments tell what they are; NaN beyond 200.
+
+    A person's score is the mean over ``items``, of which a share is ``planned``: the planner's
+    score or the learner's, with a ``noise`` (SD) each. All learners, or all planners, are told if a
+    one-tailed test rejects half-way between; a mixture if tests reject both.
+    """
+    middle = (learner + planner) / 2
+    nulls = {0: [middle], 1: [middle]}.get(planned, [learner, planner])
+    for people in [*range(3, 30), *range(30, 201, 10)]:
+        plans = rng.binomial(items, planned, (2000, people)) / items
+        scores = learner + (planner - learner) * plans
+        scores += noise / np.sqrt(items) * rng.standard_normal(scores.shape)
+        right = np.ones(2000, bool)
+        for null in nulls:
+            side = "greater" if learner + planned * (planner - learner) > null else "less"
+            right &= stats.ttest_1samp(scores, null, axis=1, alternative=side).pvalue < 0.05
+        if right.mean() >= 0.9:
+            return people
+    return np.nan
+
+
+def find_power(changes, starts, steps):
+    """People needed for each contrast, by what they are.
+
+    Noise: in the first contrast ``NOISE`` in each joint of one trial, as a share of the planner's
+    shift, with means of 20 trials before and after; in the second the spread of runs, as a share of
+    the distance of the groups, whose middle is 0; in the third the spread of persons.
+    """
+    shares, rng = share_by_task(changes), np.random.default_rng(0)
+    ratio = starts[(starts.model == "learner") & (starts.trials == 1)]
+    apart = np.sqrt(np.median(ratio.between / ratio.within) - 1)  # of groups, in RMS within pairs
+    person = steps.groupby("model")[["same", "kept"]].agg(["mean", "std"])
+    cases = {}
+    for distance in (0.25, 0.5, 1.0):
+        planned = shares[(shares.distance == distance) & (shares.model == "planner, all goals")]
+        noise = NOISE * np.sqrt(1.05) / planned["shift"].median()
+        cases |= {f"change {distance:g}, {k} goals": (0, 1, noise, k) for k in (1, 4)}
+    cases["start"] = 1, 0, np.sqrt(2) / apart, 1
+    records = round(steps.records[steps.model == "learner"].mean())
+    for name, items in (("same", 400), ("kept", records)):
+        (a, spread), (b, other) = person.loc["learner", name], person.loc["planner", name]
+        cases[f"step {name}"] = a, b, max(spread, other) * np.sqrt(items), items
+    rows = {
+        name: {"learner": case[0], "planner": case[1], "noise": case[2] / np.sqrt(case[3]),
+               **{f"people_{kind}": people_needed(*case, planned, rng) for kind, planned in
+                  (("learners", 0), ("planners", 1), ("quarter", 0.25), ("half", 0.5))}}
+        for name, case in cases.items()
+    }  # fmt: skip
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("contrast")
+
+
+@figures.styled
+def draw(table):
+    """Share of the shift by trials after the change."""
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
+    rows = table[table.distance == 0.5].set_index("model")
+    blue, _, _, red, _, sky = figures.PALETTE
+    for model, words, color in (
+        ("planner, all goals", "planner", blue), ("learner, told", "learner, told", sky),
+        ("learner", "learner by trial and error", red), ("CMA-ES", "CMA-ES", figures.GREY),
+    ):  # fmt: skip
+        shares = rows.loc[model]
+        y = np.array([shares[f"share_{n}"] for n in AFTER])
+        axes.plot(AFTER, y, color=color, marker="o", label=words)
+        ends = ([shares[f"share_{n}_{end}"] for n in AFTER] for end in ("low", "high"))
+        axes.fill_between(AFTER, *ends, color=color, alpha=0.2, linewidth=0)
+    axes.set_xscale("log")
+    axes.set_xticks([1, 10, 100, 1000, 10_000], ["first", "10", "100", "1000", "10 000"])
+    axes.set_xlabel("trial after a goal was moved")
+    axes.set_ylabel("shift of the posture at the goal before it")
+    axes.set_yticks([0, 0.5, 1], ["none", "half", "all"])
+    axes.legend(loc="center right")
+    return figure
+
+
+def measure(changes, starts, steps):
+    """The tables, each of which becomes a CSV file of its name."""
+    makers = {"results": tabulate, "claims": judge_claims, "power": find_power}
+    return {name: make(changes, starts, steps) for name, make in makers.items()}
+
+
+def main():
+    """Measure what protocols.py wrote, and write the page."""
+    names = "changes", "starts", "steps"
+    raw = [pd.read_csv(HERE / f"{name}.csv", index_col=0) for name in names]
+    tables = measure(*raw)
+    for name, table in tables.items():
+        table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
+    (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
+    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
+    page = fill_page(HERE / "README.md.jinja", **tables)
+    (HERE / "README.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
