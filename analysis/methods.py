@@ -28,6 +28,8 @@ TOGETHER = f"{LEARNER.rstrip('/')} ("
 """Beginning of the label of several conditions together, each on the tasks that it is for."""
 PLACEBO = "placebo/guesses"
 """The best of random guesses around the corrective process, which cannot coarticulate."""
+PLACEBOS = PLACEBO, "placebo/hands"
+"""The same with the best hands, and with every hand sequence."""
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
 
@@ -63,6 +65,7 @@ _PARAMETERS = {
     "noise_sd=": "σ ",
     "epsilon=": "ε ",
     "hands=": "hands ",
+    "half_width=": "± ",
     "stop=": "stop ",
 }
 _VARIANT = re.compile(r"=|\bEC\d-")

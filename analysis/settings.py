@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from coartic.analysis.methods import INITIAL, PLACEBO, is_search, main_methods, name_of
+from coartic.analysis.methods import INITIAL, PLACEBOS, is_search, main_methods, name_of
 from coartic.analysis.study import Study, cached
 
-REFERENCES = (INITIAL, PLACEBO)
+REFERENCES = (INITIAL, *PLACEBOS)
 """Methods that may stand beside the settings of others."""
 
 

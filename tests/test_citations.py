@@ -106,7 +106,8 @@ def test_each_work_once_with_the_methods_that_rest_on_it():
     assert len(keys) == len(set(keys))
     assert set(keys) == {"coartic", *BIB} - set(STATISTICS)
     assert keys[:2] == ["coartic", THE_PAPER]
-    assert f"% cma-es/bandit\n{references()['hansen2016']}\n" in text
+    both = "% cma-es/bandit, cma-es/goal-by-goal"
+    assert f"{both}\n{references()['hansen2016']}\n" in text
     assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *STATISTICS}
 
 

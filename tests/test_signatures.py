@@ -382,6 +382,21 @@ def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
         assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
 
 
+def test_the_placebo_that_shows_most_of_a_sign_counts():
+    tasks, drawn = [load_task("ascending"), load_task("descending")], "placebo/hands"
+    alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
+    study = study_with(*(
+        posed(task, label, [posture(shift * number + noise) for noise in (0.0, 0.1, 0.2)],
+              np.add(alone[task.name], [slower, 0, 0]))
+        for label, shift, slower in ((EC1, 1.0, 5), (PLACEBO, 0.8, 1), (drawn, 0.3, 2))
+        for number, task in enumerate(tasks)
+    ))  # fmt: skip
+    assert placebo.placebos(study, "ascending") == [PLACEBO, drawn]
+    assert placebo.difference(study).placebo.method == PLACEBO
+    assert list(placebo.of_placebo(study, "ascending", "first")) == [2, 2, 2]
+    assert not placebo.selects(study, drawn)
+
+
 @pytest.mark.parametrize("apart", [0.0, 0.5])
 def test_a_method_that_draws_nothing_needs_no_test(apart):
     """One run a context, and no placebo."""

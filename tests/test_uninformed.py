@@ -8,13 +8,15 @@ import pytest
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, Strategy
+from coartic.baselines.cma_es_hands import GoalByGoal
+from coartic.baselines.drawn_hands import DrawnHands
 from coartic.baselines.random_search import Climbing, Guesses
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import BudgetError, Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
 
-METHODS = (Climbing, CMAES)
+METHODS = (Climbing, CMAES, GoalByGoal)
 ONE_GOAL = tiny_task(
     hands=["right"],
     goals=[[-3.0, 0.0]],
@@ -64,6 +66,35 @@ def test_every_sequence_begins_with_its_corrective_trial():
     spent = result.details["trials"]
     assert set(spent) == set(alone)
     assert sum(spent.values()) == 500
+
+
+def test_hands_chosen_goal_by_goal():
+    task = load_task("two-armed-2")
+    session, result = solve(GoalByGoal, task, trials=2000)
+    assert session.rewards[0] == corrective_trial(task, "RRRR").reward
+    assert result.details["sequences"] > 4
+    _, narrow = solve(GoalByGoal, task, trials=100, epsilon=0.0)
+    assert narrow.details["sequences"] == 1  # nothing else is worth more than what was tried
+    assert {movement.hand for movement in narrow.solution} == {"right"}
+    many = task.model_copy(update={"goals": task.goals[:2] * 7, "initial_hands": "R" * 14})
+    session, result = solve(GoalByGoal, many, trials=400)
+    assert result.details["sequences"] > 4  # of 16,384, which are too many to try
+    assert execute(many, result.solution).reward == max(filter(None, session.rewards))
+
+
+def test_guesses_with_every_hand_sequence():
+    """Each sequence has its corrective trial and as many guesses; the best of all is kept."""
+    task = load_task("two-armed-2")
+    session, result = solve(DrawnHands, task, trials=165)
+    assert session.meter.trials == 165
+    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
+    starts = [165 * n // 16 for n in range(16)]
+    assert sorted(session.rewards[n] for n in starts) == sorted(alone.values())
+    completed = [reward for reward in session.rewards if reward is not None]
+    assert execute(task, result.solution).reward == max(completed)
+    far, _ = solve(DrawnHands, task, trials=165, half_width=3.0)
+    assert max(filter(None, far.rewards)) == max(alone.values())  # no such guess is better
+    assert solve(DrawnHands, task, trials=301, budget=20)[0].meter.trials == 20
 
 
 def test_the_bandit_exploits_explores_and_goes_where_rewards_are():

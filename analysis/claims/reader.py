@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.methods import LEARNER, PLACEBO, name_of
+from coartic.analysis.methods import LEARNER, PLACEBO, PLACEBOS, name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
+from coartic.analysis.topics.coarticulation.placebo import of_placebo, placebos
 from coartic.analysis.topics.families.instances import signs
 from coartic.analysis.topics.paper.published import (
     Summary,
@@ -93,7 +94,7 @@ class Reader:
                 "the mean of the others would mislead"
             )
         runs = cell.good
-        if label.startswith((LEARNER, PLACEBO)):
+        if label.startswith((LEARNER, *PLACEBOS)):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
                 raise MissingError(
@@ -152,19 +153,29 @@ class Reader:
         return Measurement(task, "best", np.array(np.nanmax(rewards)), printed=printed)
 
     def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
-        """A sign of coarticulation, of the runs that have one; of an instance, computed once."""
+        """A sign of coarticulation, of the runs that have one; of an instance, computed once.
+
+        Of the placebo, that of the widths and hands that show most of it.
+        """
         sign, words = SIGNS[name], SIGNS[name].words
-        self.runs(task, label)
+        for each in (label, *(self.placebos(task) if label == PLACEBO else ())):
+            self.runs(task, each)
         if replay:
             values = sign.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {sign.in_short}"
         elif self.task(task).family is not None:
             values = signs(self.study)[task, label].get(name, np.empty(0))
+        elif label == PLACEBO:
+            values = of_placebo(self.study, task, name)
         else:
             values = sign.of(self.study.executed(task, label))
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)
+
+    def placebos(self, task: str) -> list[str]:
+        """Labels of the placebos that solved a task."""
+        return placebos(self.study, task) or [PLACEBO]
 
     def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""

@@ -23,7 +23,7 @@ from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import capital, interval_in_words, marked, number, p_value, plural
 
-TRIES = methods.PLACEBO, "corrective-alone/every"
+TRIES = *methods.PLACEBOS, "corrective-alone/every"
 """Methods that take the best of their trials: they learn nothing from one for the next."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""

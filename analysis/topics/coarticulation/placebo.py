@@ -1,7 +1,8 @@
 """Tests against the placebo: random guesses, of which the best of many is selected.
 
 A method that selects its solution from trials by their rewards shows signs that selection alone
-shows, and has to exceed the placebo's.
+shows, and has to exceed the placebo's. A folder may have placebos of several widths, and one that
+draws hands. On each task, and for each sign, the one that shows most counts.
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from coartic.analysis.methods import PLACEBO
+import numpy as np
+
+from coartic.analysis.methods import PLACEBOS
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.two_contexts import TwoContexts
@@ -18,26 +21,43 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.scores import BY_TRIAL, groups
+from coartic.robot import Array
+
+
+def placebos(study: Study, task: str) -> list[str]:
+    """Labels of the placebos that solved a task."""
+    return [
+        label
+        for (name, label), cell in study.cells.items()
+        if name == task and cell.method in PLACEBOS and len(cell.good)
+    ]
+
+
+def of_placebo(study: Study, task: str, sign: str) -> Array:
+    """A sign of the placebo whose runs show most of it in the mean, shape ``(n,)``; empty where
+    none has a value."""
+    signs = [SIGNS[sign].of(study.executed(task, each)) for each in placebos(study, task)]
+    return max((values for values in signs if len(values)), key=np.mean, default=np.empty(0))
 
 
 def selects(study: Study, label: str) -> bool:
     """Whether a method's solution may be one of many trials, selected by its reward."""
-    method = label.partition(" ")[0]
-    return method != PLACEBO and groups(study)[label] == BY_TRIAL
+    return label.partition(" ")[0] not in PLACEBOS and groups(study)[label] == BY_TRIAL
 
 
 def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The placebo in the same two contexts; None without one that made as many trials."""
-    keys = [(task.name, PLACEBO) for task in contexts.tasks]
-    if not all(key in study.cells and len(study.cells[key].good) for key in keys):
-        return None
-    for name, label in keys:
-        method = study.cells[name, contexts.method].runs.trials.max()
-        if study.cells[name, label].runs.trials.max() < method:
-            return None
-    first, second = (study.executed(*key) for key in keys)
-    placebo = TwoContexts(first, second, contexts.goal, contexts.hand)
-    return placebo if placebo.in_both else None
+    """The placebo whose postures lie farthest apart in the same two contexts; None without one
+    that made as many trials."""
+    names, pairs = [task.name for task in contexts.tasks], []
+    for label in (each for each in placebos(study, names[0]) if each in placebos(study, names[1])):
+        most, wanted = (
+            [study.cells[name, who].runs.trials.max() for name in names]
+            for who in (label, contexts.method)
+        )
+        if all(m >= w for m, w in zip(most, wanted, strict=True)):
+            first, second = (study.executed(name, label) for name in names)
+            pairs.append(TwoContexts(first, second, contexts.goal, contexts.hand))
+    return max((pair for pair in pairs if pair.in_both), key=lambda p: p.apart, default=None)
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
@@ -56,9 +76,9 @@ def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
 
     NaN for a method that selects nothing, and where one of both has fewer than two values.
     """
-    if not selects(study, label) or (task, PLACEBO) not in study.cells:
+    if not selects(study, label):
         return math.nan
-    ours, guesses = (SIGNS[sign].of(study.executed(task, who)) for who in (label, PLACEBO))
+    ours, guesses = SIGNS[sign].of(study.executed(task, label)), of_placebo(study, task, sign)
     several = min(len(ours), len(guesses)) > 1
     return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan
 

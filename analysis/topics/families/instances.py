@@ -15,6 +15,7 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.instances import Runs, Scores
 from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.topics.coarticulation.placebo import of_placebo
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum
@@ -139,7 +140,8 @@ tenth of the goals, or of the way; more than a tick, which rounding can make."""
 
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signs (n,) on every instance, of the learner by condition and of the placebo.
+    """Values of signs (n,) on every instance, of the learner by condition and of the placebo that
+    shows most of a sign.
 
     By the instance's name and the method's label, then by the sign's name in :data:`THERE`; a
     value for each run that has one. A sign without any is left out.
@@ -149,8 +151,11 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
         for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                runs = study.executed(name, label)
-                measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
+                measured = {
+                    sign: of_placebo(study, name, sign) if label == PLACEBO
+                    else SIGNS[sign].of(study.executed(name, label))
+                    for sign in THERE
+                }  # fmt: skip
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
     return by_cell
 

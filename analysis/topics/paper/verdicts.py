@@ -42,16 +42,19 @@ def mostly_undecided(judged: pd.DataFrame) -> bool:
 def in_words(judged: pd.DataFrame) -> str:
     """The verdicts on the claims that carry the paper's point, and how many others have each."""
     central: dict[str, list[str]] = {}
-    others = []
     for name, verdict in judged.verdict.items():
         if short := CLAIMS[str(name)].short:
             central.setdefault(verdict, []).append(short)
-        else:
-            others.append(verdict)
+    others = judged[[not CLAIMS[str(name)].short for name in judged.index]]
+    lacking = others.evidence.str.startswith("Not judged")
+    of_others = [
+        *counts(others.verdict[~lacking]).items(),
+        ("without the runs here", lacking.sum()),
+    ]
     words = [f"{capital(verdict)}: {listed(texts)}." for verdict, texts in central.items()]
     if list(central) == ["supported"]:
         words = [f"In its main point, yes: {listed(central['supported'])}."]
-    each = ", ".join(f"{verdict} {count}" for verdict, count in counts(others).items() if count)
+    each = ", ".join(f"{verdict} {count}" for verdict, count in of_others if count)
     words += [f"Of {plural(len(others), 'other claim')}: {each}."] * bool(each)
     return " ".join(words)
 
