@@ -31,7 +31,7 @@ from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
 from coartic.model import PAPER
 from coartic.motion.lanes import LANES
-from coartic.motion.reach import Requests, batch_for, bench_of, blank, reach_goals
+from coartic.motion.reach import ALL_STOP, Requests, batch_for, bench_of, blank, reach_goals
 from coartic.motion.trials import hand_codes, movements_of
 from coartic.robot import Array
 
@@ -77,9 +77,8 @@ def trials_a_second() -> dict[str, float]:
     bench, codes = bench_of(task, PAPER), hand_codes(task, hands, 1000)
 
     def arguments(targets: Array) -> tuple[Any, ...]:
-        ends, asked = np.array([0, len(targets)]), targets[:, :, None].copy()
-        starts, stops = np.tile(bench.start, (len(targets), 1)), np.ones(asked.shape[:3], np.bool_)
-        arms = Requests(starts, codes[: len(targets)], asked, stops, ends, bench.goals)
+        asked = targets[:, :, None].copy()
+        arms = Requests(bench.starts, codes[: len(targets)], asked, ALL_STOP, bench.goals)
         return arms, bench.setup, blank(arms), batch_for(task.robot)
 
     together, *alone = map(arguments, (targets, *targets[:100, None]))

@@ -11,7 +11,7 @@ from coartic import PAPER, MotionModel, Robot, correct, execute, load_task
 from coartic.baselines.corrective_alone import EverySequence
 from coartic.method import Session
 from coartic.motion.compiled import entry, joint_lever
-from coartic.motion.movement import Goal, largest_square
+from coartic.motion.movement import largest_square
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from tests.support import reference
@@ -58,7 +58,7 @@ def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
     tip = len(arm.links)
     for iteration in range(most):
         joint_chain(q, arm, xs, ys)
-        error_x, error_y = goal.x - xs[tip], goal.y - ys[tip]
+        error_x, error_y = goal[0] - xs[tip], goal[1] - ys[tip]
         if math.sqrt(error_x * error_x + error_y * error_y) <= tolerance:
             return iteration
         q[0] += gain * error_x
@@ -80,7 +80,7 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     fast = correct(robot, q, hand, tuple(goal))
     model = PAPER
     iterations = _by_steps(
-        slow, robot.arm(hand), Goal(*goal, 0.0), model.gain, model.correction_tolerance,
+        slow, robot.arm(hand), tuple(goal), model.gain, model.correction_tolerance,
         model.max_iterations, *np.empty((2, robot.most_links + 1)),
     )  # fmt: skip
     assert fast.iterations == iterations

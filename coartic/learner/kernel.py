@@ -33,7 +33,6 @@ from coartic.motion.compiled import (
     record_type,
 )
 from coartic.motion.lanes import LANES, Lanes, lanes_for, runs_for, width_of
-from coartic.motion.movement import Goal
 from coartic.motion.reach import LOOK, MOVE, STAY, attempt, correct_missed
 from coartic.motion.setup import arm_of
 from coartic.motion.trigonometry import joint_chain
@@ -181,14 +180,14 @@ def work_for(runs: int, task: Task) -> Work:
 
 
 @inlined
-def distance_to_goal(n: int, goal: Any, hand: int, setup: Any, work: Any) -> float:
-    """How far a hand of run ``n`` is from the centre of a goal, length unit."""
-    arm = arm_of(setup, hand)
-    joint_chain(work.runs[n].q, arm, work.xs, work.ys)
-    work.runs[n].evaluations += 1
+def distance_to_goal(n: int, hand: int, setup: Any, work: Any) -> float:
+    """How far a hand of run ``n`` is from the centre of its goal, length unit."""
+    run, arm = work.runs[n], arm_of(setup, hand)
+    joint_chain(run.q, arm, work.xs, work.ys)
+    run.evaluations += 1
     tip = len(arm.links)
-    dx = goal.x - work.xs[tip]
-    dy = goal.y - work.ys[tip]
+    dx = run.goal[0] - work.xs[tip]
+    dy = run.goal[1] - work.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
 
 
@@ -209,13 +208,13 @@ def random_hand(hands: Any, rng: Any) -> int:
 
 
 @inlined
-def closest_hand(n: int, goal: Any, setup: Any, rules: Any, rng: Any, work: Any) -> int:
-    """The hand closest to a goal, a random one of equally close ones."""
+def closest_hand(n: int, setup: Any, rules: Any, rng: Any, work: Any) -> int:
+    """The hand closest to the goal, a random one of equally close ones."""
     nearest = rules.hands[0]
-    nearest_distance = distance_to_goal(n, goal, nearest, setup, work)
+    nearest_distance = distance_to_goal(n, nearest, setup, work)
     tie = False
     for hand in rules.hands[1:]:
-        distance = distance_to_goal(n, goal, hand, setup, work)
+        distance = distance_to_goal(n, hand, setup, work)
         tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
         if distance < nearest_distance:
             nearest, nearest_distance = hand, distance
@@ -224,7 +223,7 @@ def closest_hand(n: int, goal: Any, setup: Any, rules: Any, rng: Any, work: Any)
 
 @inlined
 def choose_hand(
-    n: int, goal: Any, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
+    n: int, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
 ) -> int:
     """The hand of a run: greedy, or with probability ε an explored one."""
     if explore and rules.exploration != 0:
@@ -232,7 +231,7 @@ def choose_hand(
         if rng.random() < rules.epsilon:
             if rules.exploration == 1:
                 return random_hand(rules.hands, rng)
-            return closest_hand(n, goal, setup, rules, rng, work)
+            return closest_hand(n, setup, rules, rng, work)
     return greedy_hand(entries, rules.hands)
 
 
@@ -251,7 +250,6 @@ def set_target(
 def aim(
     n: int,
     number: int,
-    goal: Any,
     explore: bool,
     setup: Any,
     rules: Any,
@@ -262,7 +260,7 @@ def aim(
     """Choose the hand of a run; where it has a stored target, set it."""
     run = work.runs[n]
     entries = tables[n, number, work.trials[n].previous]
-    run.hand = choose_hand(n, goal, entries, explore, setup, rules, rngs, work)
+    run.hand = choose_hand(n, entries, explore, setup, rules, rngs, work)
     learned = entries[run.hand]
     if learned.value > -math.inf:
         rng = generator_at(rngs, n)
@@ -337,22 +335,22 @@ def make_trial(
         trial.ticks = 0
         log.count[n] = 0
     for number in range(len(goals)):
-        goal = Goal(goals[number, 0], goals[number, 1], setup.radius)
         for n in range(runs):
             run = work.runs[n]
+            fill_row(run.goal, goals[number])
             fill_row(run.target, run.q)
             run.how, run.hit = LOOK if run.going else STAY, False
             if run.going and first:
                 aim_first(n, number, first_hands, first_targets, work)
             elif run.going:
-                aim(n, number, goal, explore, setup, rules, tables, rngs, work)
-        attempt(runs, goal, setup, work)
+                aim(n, number, explore, setup, rules, tables, rngs, work)
+        attempt(runs, setup, work)
         for n in range(runs):
             run = work.runs[n]
             run.corrects = rules.corrects or first or run.how != MOVE
             if run.how == MOVE:
                 record_movement(log, n, number, LEARNED, run, work.trials[n])
-        correct_missed(runs, goal, setup, work)
+        correct_missed(runs, setup, work)
         for n in range(runs):
             if work.runs[n].going:
                 note_goal(n, number, log, work)

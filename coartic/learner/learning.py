@@ -250,7 +250,7 @@ def learn_together(
     arguments = (
         np.array(codes, dtype=np.int64),
         first_targets,
-        bench.start,
+        bench.starts[0],
         bench.goals[0],
         bench.setup,
         rules_of(task, condition),

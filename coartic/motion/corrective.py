@@ -51,28 +51,26 @@ class Correction(NamedTuple):
 
 
 @lanewise
-def find_fates(at: Any, count: int, goal: Any, square: float) -> None:
+def find_fates(at: Any, count: int, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
     for i in range(padded_count(count)):
-        error_x = goal.x - at.x[tip, i]
-        error_y = goal.y - at.y[tip, i]
+        error_x = at.goal[0, i] - at.x[tip, i]
+        error_y = at.goal[1, i] - at.y[tip, i]
         error = error_x * error_x + error_y * error_y
         fate = GOING if error < math.inf else _FAILED
         at.fate[i] = _AT_GOAL if error <= square else fate
 
 
 @inlined
-def descend(
-    at: Any, count: int, goal: Any, gain: float, free_x: bool, free_y: bool
-) -> tuple[int, bool]:
+def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tuple[int, bool]:
     """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
     ended = 0
     far = 0
     tip = len(at.length)
     for i in range(padded_count(count)):
-        error_x = goal.x - at.x[tip, i]
-        error_y = goal.y - at.y[tip, i]
+        error_x = at.goal[0, i] - at.x[tip, i]
+        error_y = at.goal[1, i] - at.y[tip, i]
         going = at.fate[i] == GOING
         x = at.q[0, i] + gain * error_x if free_x else at.q[0, i]
         y = at.q[1, i] + gain * error_y if free_y else at.q[1, i]
@@ -94,7 +92,7 @@ def descend(
 
 
 @inner
-def correct_lanes(lanes: Any, count: int, goal: Any, setup: Any, runs: Any) -> None:
+def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
     """Let **A** descend in the first ``count`` lanes until each has ended.
 
     The ``target`` of each run becomes what its lane ends with; the rest of its record says how.
@@ -106,10 +104,10 @@ def correct_lanes(lanes: Any, count: int, goal: Any, setup: Any, runs: Any) -> N
     iteration = 0
     while count > 0:
         place(at, count, is_near)
-        find_fates(at, count, goal, square)
+        find_fates(at, count, square)
         ended = count
         if iteration < model.max_iterations:
-            ended, is_near = descend(at, count, goal, gain, free_x, free_y)
+            ended, is_near = descend(at, count, gain, free_x, free_y)
         if ended > 0:
             for lane in range(count - 1, -1, -1):
                 if at.fate[lane] == GOING and iteration < model.max_iterations:
@@ -128,10 +126,11 @@ def correct_lanes(lanes: Any, count: int, goal: Any, setup: Any, runs: Any) -> N
 
 
 @entry
-def correct_kernel(hand: int, goal: Any, setup: Any, lanes: Any, runs: Any) -> None:
+def correct_kernel(setup: Any, lanes: Any, runs: Any) -> None:
     """Correct the target of the only run."""
-    board(lanes.at[0], 0, 0, runs[0].target, arm_of(setup[0], hand))
-    correct_lanes(lanes, 1, goal, setup[0], runs)
+    run = runs[0]
+    board(lanes.at[0], 0, 0, run.target, arm_of(setup[0], run.hand), run.goal)
+    correct_lanes(lanes, 1, setup[0], runs)
 
 
 def correct(
@@ -184,11 +183,7 @@ def correct(
     runs = runs_for(1, robot)
     run, figures = runs[0], slice(robot.dof)
     run["target"][figures] = configuration(robot, q)
-    correct_kernel(
-        HANDS.index(hand),
-        check_goal(goal),
-        setup_for(robot, locked_base=locked_base, model=check_model(model)),
-        lanes_for(robot),
-        runs,
-    )
+    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
+    setup = setup_for(robot, locked_base=locked_base, model=check_model(model))
+    correct_kernel(setup, lanes_for(robot), runs)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))

@@ -63,6 +63,7 @@ def run_type(width: int) -> np.dtype[np.void]:
     fields = {
         "q": (np.float64, width),  # where the robot is
         "target": (np.float64, width),  # where it is to go, or what a correction has found
+        "goal": (np.float64, 2),  # x and y, length unit
         "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
         "how": np.int64,  # it acts next: see coartic.motion.reach
         "corrects": np.bool_,  # whether the corrective process finishes what it misses
@@ -96,6 +97,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "links": (),  # of its arm
         "length": (links,),
         "shoulder": (2,),
+        "goal": (2,),
         "start": joints,
     }
     moved = {
@@ -122,11 +124,12 @@ def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
 
 
 @inlined
-def seat(at: Any, lane: int, run: int, arm: Any) -> None:
-    """Say whose arm is in a lane, and what it is like."""
+def seat(at: Any, lane: int, run: int, arm: Any, goal: Any) -> None:
+    """Say whose arm is in a lane, what it is like and where its goal is."""
     at.run[lane], at.first[lane], at.links[lane] = run, arm.first, len(arm.links)
     at.shoulder[0, lane] = arm.shoulder_x
     at.shoulder[1, lane] = arm.shoulder_y
+    at.goal[0, lane], at.goal[1, lane] = goal[0], goal[1]
     for k in range(len(at.length)):
         at.length[k, lane] = arm.links[k] if k < len(arm.links) else 0.0
 
@@ -141,16 +144,16 @@ def copy_arm(row: Any, lane: int, q: Any, arm: Any) -> None:
 
 
 @inlined
-def board(at: Any, lane: int, run: int, q: Any, arm: Any) -> None:
+def board(at: Any, lane: int, run: int, q: Any, arm: Any, goal: Any) -> None:
     """Put an arm into a lane, where the robot is in configuration ``q``."""
-    seat(at, lane, run, arm)
+    seat(at, lane, run, arm, goal)
     copy_arm(at.q, lane, q, arm)
 
 
 @inlined
-def depart(at: Any, lane: int, run: int, q: Any, target: Any, arm: Any) -> None:
+def depart(at: Any, lane: int, run: int, q: Any, target: Any, arm: Any, goal: Any) -> None:
     """Put an arm into a lane that the robot is to move from ``q`` to ``target``."""
-    seat(at, lane, run, arm)
+    seat(at, lane, run, arm, goal)
     copy_arm(at.start, lane, q, arm)
     copy_arm(at.target, lane, target, arm)
     square = 0.0

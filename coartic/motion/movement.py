@@ -53,14 +53,6 @@ _IN_GOAL, _MISSED = 1.0, 2.0  # fates of a lane
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
-class Goal(NamedTuple):
-    """A goal as the kernels read it, length unit."""
-
-    x: float
-    y: float
-    radius: float
-
-
 class MoveResult(NamedTuple):
     """What came of one movement (:func:`move`)."""
 
@@ -157,7 +149,13 @@ def place_between(at: Any, count: int, step: float) -> None:
 
 @lanewise
 def look(
-    at: Any, count: int, goal: Any, stop_on_arrival: bool, near: float, hit: float, arrived: float
+    at: Any,
+    count: int,
+    radius: float,
+    stop_on_arrival: bool,
+    near: float,
+    hit: float,
+    arrived: float,
 ) -> int:
     """Evaluate the stopping rule, or skip the steps that are clear; lanes that have ended.
 
@@ -172,10 +170,10 @@ def look(
         for k in range(tip):
             velocity_x -= at.rate[k, i] * (at.y[k + 1, i] - at.y[k, i])
             velocity_y += at.rate[k, i] * (at.x[k + 1, i] - at.x[k, i])
-        dx, dy = goal.x - at.x[tip, i], goal.y - at.y[tip, i]
+        dx, dy = at.goal[0, i] - at.x[tip, i], at.goal[1, i] - at.y[tip, i]
         to_goal = dx * dx + dy * dy
         closing = velocity_x * dx + velocity_y * dy
-        rim = goal.radius + at.clearance[i]
+        rim = radius + at.clearance[i]
         clear = clear_steps(to_goal, rim, closing, at.slowness[i], at.bend[i])
         stop = at.step[i] == at.last[i]
         if stop_on_arrival:
@@ -196,14 +194,7 @@ def look(
 
 
 @inner
-def move_lanes(
-    lanes: Any,
-    count: int,
-    goal: Any,
-    stop_on_arrival: bool,
-    setup: Any,
-    runs: Any,
-) -> None:
+def move_lanes(lanes: Any, count: int, stop_on_arrival: bool, setup: Any, runs: Any) -> None:
     """Move the first ``count`` lanes until each has ended.
 
     Each run's ``q``, from which it departed to its ``target``, becomes the configuration in
@@ -211,7 +202,8 @@ def move_lanes(
     """
     at, evaluations = lanes.at[0], 0
     step, near = setup.model.step, setup.model.arrival_tolerance
-    hit, arrived = largest_square(goal.radius), largest_square(near)
+    radius = setup.radius
+    hit, arrived = largest_square(radius), largest_square(near)
     is_near = set_off(at, count, step)
     if stop_on_arrival:
         copy_lanes(at.target, at.q)
@@ -223,7 +215,7 @@ def move_lanes(
         place_between(at, count, step)
         place(at, count, is_near)
         evaluations += 1
-        ended = look(at, count, goal, stop_on_arrival, near, hit, arrived)
+        ended = look(at, count, radius, stop_on_arrival, near, hit, arrived)
         if ended == 0:
             continue
         for lane in range(count - 1, -1, -1):
@@ -247,12 +239,11 @@ def move_lanes(
 
 
 @entry
-def move_kernel(
-    hand: int, goal: Any, stop_on_arrival: bool, setup: Any, lanes: Any, runs: Any
-) -> None:
+def move_kernel(stop_on_arrival: bool, setup: Any, lanes: Any, runs: Any) -> None:
     """Move the only run."""
-    depart(lanes.at[0], 0, 0, runs[0].q, runs[0].target, arm_of(setup[0], hand))
-    move_lanes(lanes, 1, goal, stop_on_arrival, setup[0], runs)
+    run = runs[0]
+    depart(lanes.at[0], 0, 0, run.q, run.target, arm_of(setup[0], run.hand), run.goal)
+    move_lanes(lanes, 1, stop_on_arrival, setup[0], runs)
 
 
 def move(
@@ -305,18 +296,11 @@ def move(
     robot.arm(hand)  # refuses what is no hand
     runs = runs_for(1, robot)
     run, figures = runs[0], slice(robot.dof)
-    run["q"][figures], run["target"][figures] = (
-        configuration(robot, q),
-        configuration(robot, target),
-    )
-    move_kernel(
-        HANDS.index(hand),
-        check_goal(goal, radius),
-        stop_on_arrival,
-        setup_for(robot, model=check_model(model)),
-        lanes_for(robot),
-        runs,
-    )
+    run["q"][figures] = configuration(robot, q)
+    run["target"][figures] = configuration(robot, target)
+    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
+    setup = setup_for(robot, radius, model=check_model(model))
+    move_kernel(stop_on_arrival, setup, lanes_for(robot), runs)
     return MoveResult(
         run["q"][figures].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
     )
@@ -378,11 +362,11 @@ def configuration(robot: Robot, q: Any) -> Array:
     return array
 
 
-def check_goal(centre: Any, radius: float = 0.0) -> Goal:
-    """A goal for the kernels; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
+def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
+    """The centre of a goal; ValueError where it is not finite or beyond ``LARGEST_ENTRY``."""
     x, y = float(centre[0]), float(centre[1])
     if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
         raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
     if not 0.0 <= radius <= LARGEST_ENTRY:
         raise ValueError(f"radius is {radius}; it must be a number from 0 to {LARGEST_ENTRY:g}")
-    return Goal(x, y, float(radius))
+    return x, y

@@ -20,7 +20,7 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, fill_row, inlined, inner
 from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
-from coartic.motion.movement import Goal, check_goal, configuration, move_lanes
+from coartic.motion.movement import check_goal, configuration, move_lanes
 from coartic.motion.setup import arm_of, setup_for
 from coartic.robot import Array, Robot
 from coartic.tasks.task import Task
@@ -54,66 +54,65 @@ class Reached(NamedTuple):
 
 
 class Requests(NamedTuple):
-    """What the kernel reads: N arms in K groups, each to G goals in turn by M movements each."""
+    """What the kernel reads: N arms, each to G goals in turn by M movements each."""
 
-    starts: Any  # (N, dof)
+    starts: Any  # (N, dof), or (1, dof) for one start of all
     hands: Any  # (N, G)
     targets: Any  # (N, G, M, dof), in which the kernel fills in joints without a target
-    stops: Any  # (N, G, M) whether the movement to the target ends on arrival
-    bounds: Any  # (K + 1,) first arm of each group, and the one after the last
-    goals: Any  # (K, G, 2)
+    stops: Any  # (N, G, M) whether the movement to the target ends on arrival; empty where all do
+    goals: Any  # (N, G, 2), or (1, G, 2) for the same goals of all
 
 
 class Batch(NamedTuple):
-    """What a lot of arms works on, each now at the same goal."""
+    """What a lot of arms works on, each now at its next goal."""
 
     runs: Any  # records: see runs_for
     lanes: Any
 
 
 @inner
-def move_acting(count: int, goal: Any, stops: bool, setup: Any, batch: Any) -> None:
+def move_acting(count: int, stops: bool, setup: Any, batch: Any) -> None:
     """Move the acting arms to their targets."""
-    lane = 0
+    at, lane = batch.lanes.at[0], 0
     for i in range(count):
         run = batch.runs[i]
         if run.acting:
-            depart(batch.lanes.at[0], lane, i, run.q, run.target, arm_of(setup, run.hand))
+            depart(at, lane, i, run.q, run.target, arm_of(setup, run.hand), run.goal)
             lane += 1
     if lane > 0:
-        move_lanes(batch.lanes, lane, goal, stops, setup, batch.runs)
+        move_lanes(batch.lanes, lane, stops, setup, batch.runs)
 
 
 @inlined
-def attempt(count: int, goal: Any, setup: Any, batch: Any) -> None:
+def attempt(count: int, setup: Any, batch: Any) -> None:
     """Let each run act as it is to; one that does not move takes no ticks."""
     for stops in (True, False):
         for i in range(count):
             run = batch.runs[i]
             # A movement to where an arm is tells whether it hits; it needs no other end.
             run.acting = run.how == MOVE if stops else run.how == LOOK or run.how == REPEAT
-        move_acting(count, goal, stops, setup, batch)
+        move_acting(count, stops, setup, batch)
     for i in range(count):
         if batch.runs[i].how < MOVE:
             batch.runs[i].ticks = 0
 
 
 @inlined
-def correct_missed(count: int, goal: Any, setup: Any, batch: Any) -> None:
+def correct_missed(count: int, setup: Any, batch: Any) -> None:
     """Have **A** finish what was missed; then ``target`` and ``ticks`` are those of that."""
-    lane = 0
+    at, lane = batch.lanes.at[0], 0
     for i in range(count):
         run = batch.runs[i]
         run.acting, run.converged = run.corrects and run.going and not run.hit, False
         run.ticks, run.iterations = 0, 0
         if run.acting:
             fill_row(run.target, run.q)
-            board(batch.lanes.at[0], lane, i, run.q, arm_of(setup, run.hand))
+            board(at, lane, i, run.q, arm_of(setup, run.hand), run.goal)
             lane += 1
-    correct_lanes(batch.lanes, lane, goal, setup, batch.runs)
+    correct_lanes(batch.lanes, lane, setup, batch.runs)
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
-    move_acting(count, goal, False, setup, batch)
+    move_acting(count, False, setup, batch)
 
 
 @inner
@@ -165,31 +164,35 @@ def note(n: int, g: int, run: Any, reached: Any) -> None:
 
 
 @inlined
-def reach_lot(
-    first: int, count: int, group: int, arms: Any, setup: Any, reached: Any, batch: Any
-) -> None:
-    """Requests of one group, as many as there is room for."""
+def row_of(rows: Any, n: int) -> Any:
+    """The row of an arm, or the only one."""
+    return rows[n if len(rows) > 1 else 0]
+
+
+@inlined
+def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch: Any) -> None:
+    """Some of the arms to their goals, as many as there is room for."""
     for i in range(count):
         clear(first + i, reached)
-        fill_row(batch.runs[i].q, arms.starts[first + i])
+        fill_row(batch.runs[i].q, row_of(arms.starts, first + i))
         batch.runs[i].going = True
-    for g in range(arms.goals.shape[1]):
-        goal = Goal(arms.goals[group, g, 0], arms.goals[group, g, 1], setup.radius)
+    for g in range(arms.targets.shape[1]):
         for i in range(count):
             run = batch.runs[i]
+            fill_row(run.goal, row_of(arms.goals, first + i)[g])
             run.hand, run.corrects = arms.hands[first + i, g], setup.corrects
             run.hit, run.evaluations = False, 0
         for m in range(arms.targets.shape[2]):
             for i in range(count):
                 n = first + i
-                target, stops = arms.targets[n, g, m], arms.stops[n, g, m]
-                set_target(batch.runs[i], target, stops, m == 0, setup.looks)
-            attempt(count, goal, setup, batch)
+                stops = len(arms.stops) == 0 or arms.stops[n, g, m]
+                set_target(batch.runs[i], arms.targets[n, g, m], stops, m == 0, setup.looks)
+            attempt(count, setup, batch)
             for i in range(count):
                 if batch.runs[i].going:
                     reached.moved[first + i, g, m] = batch.runs[i].ticks
                     reached.ticks[first + i, g] += batch.runs[i].ticks
-        correct_missed(count, goal, setup, batch)
+        correct_missed(count, setup, batch)
         for i in range(count):
             if batch.runs[i].going:
                 note(first + i, g, batch.runs[i], reached)
@@ -197,18 +200,17 @@ def reach_lot(
 
 @entry
 def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
-    """Every arm to its goals, each group of arms in lots."""
-    room = len(batch.runs)
-    for group in range(len(arms.goals)):
-        end = arms.bounds[group + 1]
-        for first in range(arms.bounds[group], end, room):
-            reach_lot(first, min(room, end - first), group, arms, setup[0], reached, batch)
+    """Every arm to its goals, in lots."""
+    count, room = len(arms.targets), len(batch.runs)
+    for first in range(0, count, room):
+        reach_lot(first, min(room, count - first), arms, setup[0], reached, batch)
 
 
 SHARE = 14 * LANES
 """Arms for a thread, at least: to begin one takes as long as a hundred trials."""
 _IDLE: dict[int, list[Batch]] = {}
-_ONLY = np.zeros(1, dtype=np.int64)
+ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
+"""Movements that all end on arrival, too; see :class:`Requests`."""
 
 
 def blank(arms: Requests) -> Reached:
@@ -228,24 +230,23 @@ def batch_for(robot: Robot) -> Batch:
 
 
 def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached:
-    """Let N arms in K groups reach for G goals each, in turn, until they miss one.
+    """Let N arms reach for G goals each, in turn, until they miss one.
 
     Nothing is checked. In ``arms.targets`` joints without a target are filled in, for goals that
-    were attempted. Many arms of one group are shared among threads.
+    were attempted. Many arms are shared among threads.
     """
     count, reached = len(arms.targets), blank(arms)
 
     def work(part: slice) -> None:
-        some, own, rows = arms, reached, part.stop - part.start
-        if rows < count:
-            each = [field[part] for field in arms[:4]]
-            some = Requests._make([*each, np.array([0, rows]), arms.goals])
-            own = Reached._make(field[part] for field in reached)
+        some, own = arms, reached
+        if part.stop - part.start < count:
+            some = Requests._make(each[part] if len(each) == count else each for each in arms)
+            own = Reached._make(each[part] for each in reached)
         batch = batch_for(robot)
         reach_goals(some, setup, own, batch)
         _IDLE[robot.most_links].append(batch)
 
-    if len(arms.goals) == 1 and count >= 2 * SHARE:
+    if count >= 2 * SHARE:
         in_parts(work, count, SHARE)
     else:
         work(slice(0, count))
@@ -274,35 +275,23 @@ def reach_unchecked(
     these as they are. Source: paper, sections *Generating Movement for Each Goal* and *The
     Corrective Process*.
     """
-    count = len(q)
-    order = back = bounds = _ONLY
-    if count != 1:  # arms of one goal are neighbours, in the order given
-        order = np.lexsort(goals.T)
-        places = goals[order]
-        begins = np.ones(count, dtype=np.bool_)
-        begins[1:] = (places[1:] != places[:-1]).any(axis=1)
-        bounds = np.flatnonzero(begins)
-        back = np.empty_like(order)
-        back[order] = np.arange(count)
-    given = np.full((count, robot.dof), np.nan) if targets is None else targets
-    requests = Requests(
-        starts=q[order],
-        hands=hands[order, None],
-        targets=given[order, None, None],
-        stops=np.ones((count, 1, 1), dtype=np.bool_),
-        bounds=np.append(bounds, count),
-        goals=goals[order[bounds], None],
-    )
+    given = np.full(q.shape, np.nan) if targets is None else np.array(targets, order="C")
     setup = setup_for(robot, radius, locked_base=locked_base, model=model, looks=looks)
-    reached = reach_with(robot, requests, setup)
-    return Reached._make(field[back, 0] for field in reached)
+    arms = Requests(
+        starts=np.array(q, order="C"),
+        hands=np.array(hands)[:, None],
+        targets=given[:, None, None],
+        stops=ALL_STOP,
+        goals=np.array(goals, order="C")[:, None],
+    )
+    return Reached._make(each[:, 0] for each in reach_with(robot, arms, setup))
 
 
 class Bench(NamedTuple):
     """A task as the kernel reads it (:func:`bench_of`)."""
 
     task: Task
-    start: Array  # (dof,)
+    starts: Array  # (1, dof)
     goals: Array  # (1, G, 2)
     setup: NDArray[np.void]  # (1,)
     model: MotionModel
@@ -312,10 +301,10 @@ def bench_of(task: Task, model: MotionModel) -> Bench:
     """A task for the kernel. Raises ValueError for a task or a model that no trial can be made
     with: a copy of a task with changed fields is unchecked."""
     check_model(model, radius=task.radius)
-    goals = [check_goal(goal, task.radius)[:2] for goal in task.goals]
+    goals = [check_goal(goal, task.radius) for goal in task.goals]
     return Bench(
         task=task,
-        start=configuration(task.robot, task.q0),
+        starts=configuration(task.robot, task.q0)[None],
         goals=np.array([goals], dtype=np.float64),
         setup=setup_for(task.robot, task.radius, locked_base=task.locked_base, model=model),
         model=model,
@@ -323,7 +312,10 @@ def bench_of(task: Task, model: MotionModel) -> Bench:
 
 
 def reach_all(
-    bench: Bench, hands: NDArray[np.int64], targets: Array, stops: NDArray[np.bool_] | None = None
+    bench: Bench,
+    hands: NDArray[np.int64],
+    targets: Array,
+    stops: NDArray[np.bool_] = ALL_STOP,
 ) -> Reached:
     """What comes of the goals of N trials from the start, of shape ``(N, G, ...)``.
 
@@ -332,9 +324,5 @@ def reach_all(
     made, further ones where it is still missed. ``stops``, of the shape of ``targets`` without the
     last axis: whether a movement ends on arrival, too; each does by default.
     """
-    starts = np.empty((len(hands), len(bench.start)))
-    starts[:] = bench.start
-    if stops is None:
-        stops = np.ones(targets.shape[:3], dtype=np.bool_)
-    arms = Requests(starts, hands, targets, stops, np.array([0, len(hands)]), bench.goals)
+    arms = Requests(bench.starts, hands, targets, stops, bench.goals)
     return reach_with(bench.task.robot, arms, bench.setup)

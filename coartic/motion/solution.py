@@ -252,7 +252,7 @@ def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> 
         return []
     hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
     most = max(len(slots) for of_plan in asked for slots in of_plan)
-    targets = np.full((*hands.shape, most, len(bench.start)), np.nan)
+    targets = np.full((*hands.shape, most, bench.starts.shape[1]), np.nan)
     stops = np.ones(targets.shape[:3], dtype=np.bool_)
     for n, of_plan in enumerate(asked):
         for g, slots in enumerate(of_plan):
@@ -269,7 +269,7 @@ def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> 
 
 def execute_paths(bench: Bench, plan: Plan) -> Execution:
     """Execute a solution in which movements follow paths: one movement after the other."""
-    task, model, subtasks, q = bench.task, bench.model, list[Subtask](), bench.start
+    task, model, subtasks, q = bench.task, bench.model, list[Subtask](), bench.starts[0]
     for g, movements in enumerate(plan):
         done = Subtask([], q, False, 0, 0)
         for m, movement in enumerate(
@@ -284,7 +284,7 @@ def execute_paths(bench: Bench, plan: Plan) -> Execution:
                 setup = bench.setup.copy()
                 setup["looks"], setup["corrects"] = m == 0, movement.target is None
                 goal = bench.goals[:, g : g + 1]
-                here = bench._replace(start=done.q, goals=goal, setup=setup)
+                here = bench._replace(starts=done.q[None], goals=goal, setup=setup)
                 ((part,),) = make_straight(here, [[movements]], [[slots_for([movement])]])
             iterations = done.iterations + part.iterations
             evaluations = done.evaluations + part.evaluations
