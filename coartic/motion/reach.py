@@ -10,6 +10,7 @@ depends neither on the others nor on their number.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
@@ -208,25 +209,31 @@ def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
 
 SHARE = 14 * LANES
 """Arms for a thread, at least: to begin one takes as long as a hundred trials."""
-_IDLE: dict[int, list[Batch]] = {}
+_IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
+"""Arrays for the kernel to work on that nobody uses, by :attr:`Robot.most_links`."""
 ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
 """Movements that all end on arrival, too; see :class:`Requests`."""
 
 
 def blank(arms: Requests) -> Reached:
     """Arrays for what comes of arms, to be filled."""
-    *shape, moves, dof = arms.targets.shape
-    places, counts = np.empty((2, *shape, dof)), np.empty((4, *shape), dtype=np.int64)
-    hit, moved = np.empty(shape, dtype=np.bool_), np.empty((*shape, moves), dtype=np.int64)
-    return Reached(places[0], hit, counts[0], moved, places[1], *counts[1:])
+    count, goals, moves, dof = arms.targets.shape
+    shape = count, goals
+    return Reached(
+        q=np.empty((count, goals, dof)),
+        hit=np.empty(shape, np.bool_),
+        ticks=np.empty(shape, np.int64),
+        moved=np.empty((count, goals, moves), np.int64),
+        corrected=np.empty((count, goals, dof)),
+        corrections=np.empty(shape, np.int64),
+        iterations=np.empty(shape, np.int64),
+        evaluations=np.empty(shape, np.int64),
+    )
 
 
 def batch_for(robot: Robot) -> Batch:
-    """Arrays for the kernel to work on: some that are idle, or new ones."""
-    try:
-        return _IDLE.setdefault(robot.most_links, []).pop()  # no other thread gets it
-    except IndexError:
-        return Batch(runs_for(LANES, robot), lanes_for(robot))
+    """New arrays for the kernel to work on."""
+    return Batch(runs_for(LANES, robot), lanes_for(robot))
 
 
 def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached:
@@ -235,16 +242,19 @@ def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached
     Nothing is checked. In ``arms.targets`` joints without a target are filled in, for goals that
     were attempted. Many arms are shared among threads.
     """
-    count, reached = len(arms.targets), blank(arms)
+    count, reached, idle = len(arms.targets), blank(arms), _IDLE[robot.most_links]
 
     def work(part: slice) -> None:
         some, own = arms, reached
         if part.stop - part.start < count:
             some = Requests._make(each[part] if len(each) == count else each for each in arms)
             own = Reached._make(each[part] for each in reached)
-        batch = batch_for(robot)
+        try:
+            batch = idle.pop()  # no other thread gets it
+        except IndexError:
+            batch = batch_for(robot)
         reach_goals(some, setup, own, batch)
-        _IDLE[robot.most_links].append(batch)
+        idle.append(batch)
 
     if count >= 2 * SHARE:
         in_parts(work, count, SHARE)

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import LARGEST_ENTRY, configuration, follow
 from coartic.motion.outside import note_trials
-from coartic.motion.reach import Bench, Reached, bench_of, reach_all
+from coartic.motion.reach import Bench, bench_of, reach_all
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
 from coartic.text import short_repr
@@ -185,16 +184,16 @@ def execute_many(
             plans.append(error)
     note_trials(len(plans))
     straight = [plan for plan in plans if isinstance(plan, list) and not has_path(plan)]
-    asked = [[slots_for(movements) for movements in plan] for plan in straight]
-    made = make_straight(bench, straight, asked)
-    executions = (execution_of(*each) for each in zip(straight, made, strict=True))
-    found: list[Execution | Refused] = []
+    outcomes = iter(make_straight(bench, straight))
+    executions: list[Execution | Refused] = []
     for plan in plans:
         if not isinstance(plan, list):
-            found.append(plan)
+            executions.append(plan)
+        elif has_path(plan):
+            executions.append(execution_of(plan, make_one_by_one(bench, plan)))
         else:
-            found.append(execute_paths(bench, plan) if has_path(plan) else next(executions))
-    return found
+            executions.append(execution_of(plan, next(outcomes)))
+    return executions
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
@@ -218,15 +217,13 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 Plan = list[list[Movement]]
 """The movements of a solution, goal by goal."""
-Slots = list[Movement | None]
-"""Movements to targets for a goal as the kernel takes them: None first where none is made at once,
-but the hand may be in the goal already."""
 
 
 class Subtask(NamedTuple):
     """What came of a goal."""
 
-    made: list[Movement]
+    movements: list[Movement]
+    """The movements made."""
     q: Array
     hit: bool
     iterations: int
@@ -239,45 +236,75 @@ def has_path(plan: Plan) -> bool:
     return any(movement.kind == "path" for movements in plan for movement in movements)
 
 
-def slots_for(movements: list[Movement]) -> Slots:
-    """Straight movements of a goal as the kernel takes them, up to the first that **A** finds."""
+def slots_for(movements: list[Movement]) -> list[Movement | None]:
+    """Straight movements of a goal as the kernel takes them, up to the first that **A** finds.
+
+    None comes first where no movement is made at once: the hand may be in the goal already.
+    """
     given = takewhile(lambda movement: movement.target is not None, movements)
     made_at_once = bool(movements) and movements[0].kind != "corrective"
     return [*given] if made_at_once else [None, *given]
 
 
-def make_straight(bench: Bench, plans: list[Plan], asked: list[list[Slots]]) -> list[list[Subtask]]:
-    """Make the straight movements of solutions side by side: what came of each goal attempted."""
+def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
+    """Make the movements of plans without paths side by side.
+
+    Returns what came of each goal that was attempted, a list for each plan.
+    """
     if not plans:
         return []
+    slots = [[slots_for(movements) for movements in plan] for plan in plans]
+    most = max(len(each) for of_plan in slots for each in of_plan)
     hands = np.array([[HANDS.index(movements[0].hand) for movements in plan] for plan in plans])
-    most = max(len(slots) for of_plan in asked for slots in of_plan)
-    targets = np.full((*hands.shape, most, bench.starts.shape[1]), np.nan)
-    stops = np.ones(targets.shape[:3], dtype=np.bool_)
-    for n, of_plan in enumerate(asked):
-        for g, slots in enumerate(of_plan):
-            for m, movement in enumerate(slots):
+    targets = np.empty((*hands.shape, most, bench.starts.shape[1]))
+    stops = np.empty(targets.shape[:3], dtype=np.bool_)
+    targets[:], stops[:] = np.nan, True
+    for n, of_plan in enumerate(slots):
+        for g, of_goal in enumerate(of_plan):
+            for m, movement in enumerate(of_goal):
                 if movement is not None:
                     targets[n, g, m] = movement.target
                     stops[n, g, m] = movement.kind != "corrective"
-    reached, looks = reach_all(bench, hands, targets, stops), bool(bench.setup["looks"][0])
-    return [
-        subtasks_of(plan, asked[n], targets[n], Reached._make(f[n] for f in reached), looks)
-        for n, plan in enumerate(plans)
-    ]
+    reached = reach_all(bench, hands, targets, stops)
+    hit, ticks, moved, corrections = reached.hit, reached.ticks, reached.moved, reached.corrections
+    hit, ticks, moved, corrections = map(np.ndarray.tolist, (hit, ticks, moved, corrections))
+    iterations, evaluations = reached.iterations.tolist(), reached.evaluations.tolist()
+    looks, outcomes = bool(bench.setup["looks"][0]), []
+    for n, plan in enumerate(plans):
+        subtasks = []
+        for g, movements in enumerate(plan):
+            goal, hand, of_goal = movements[0].goal, movements[0].hand, slots[n][g]
+            made = [
+                Movement(goal, hand, movement.kind, target, spent)
+                for movement, target, spent in zip(
+                    of_goal, targets[n, g], moved[n][g], strict=False
+                )
+                if movement is not None and spent
+            ]
+            if corrections[n][g]:
+                spent = ticks[n][g] - sum(moved[n][g])
+                made.append(Movement(goal, hand, "corrective", reached.corrected[n, g], spent))
+            looked = looks and of_goal[0] is None
+            evaluated = evaluations[n][g] - looked
+            subtasks.append(Subtask(made, reached.q[n, g], hit[n][g], iterations[n][g], evaluated))
+            if not hit[n][g]:
+                break
+        outcomes.append(subtasks)
+    return outcomes
 
 
-def execute_paths(bench: Bench, plan: Plan) -> Execution:
-    """Execute a solution in which movements follow paths: one movement after the other."""
-    task, model, subtasks, q = bench.task, bench.model, list[Subtask](), bench.starts[0]
+def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
+    """Make the movements of a plan, of which some follow paths, one after the other.
+
+    Returns what came of each goal that was attempted.
+    """
+    task, subtasks, q = bench.task, list[Subtask](), bench.starts[0]
     for g, movements in enumerate(plan):
-        done = Subtask([], q, False, 0, 0)
-        for m, movement in enumerate(
-            [*movements, Movement(g + 1, movements[0].hand, "corrective")]
-        ):
+        hand, done = movements[0].hand, Subtask([], q, False, 0, 0)
+        for m, movement in enumerate([*movements, Movement(g + 1, hand, "corrective")]):
             if movement.waypoints is not None:
-                where = movement.waypoints, movement.hand, task.goals[g], task.radius
-                moved = follow(task.robot, done.q, *where, model=model)
+                where = movement.waypoints, hand, task.goals[g], task.radius
+                moved = follow(task.robot, done.q, *where, model=bench.model)
                 made = [replace(movement, ticks=moved.ticks)]
                 part = Subtask(made, moved.q, moved.hit, 0, moved.evaluations)
             else:
@@ -285,43 +312,19 @@ def execute_paths(bench: Bench, plan: Plan) -> Execution:
                 setup["looks"], setup["corrects"] = m == 0, movement.target is None
                 goal = bench.goals[:, g : g + 1]
                 here = bench._replace(starts=done.q[None], goals=goal, setup=setup)
-                ((part,),) = make_straight(here, [[movements]], [[slots_for([movement])]])
-            iterations = done.iterations + part.iterations
-            evaluations = done.evaluations + part.evaluations
-            done = Subtask(done.made + part.made, part.q, part.hit, iterations, evaluations)
+                ((part,),) = make_straight(here, [[[movement]]])
+            done = Subtask(
+                done.movements + part.movements,
+                part.q,
+                part.hit,
+                done.iterations + part.iterations,
+                done.evaluations + part.evaluations,
+            )
             if done.hit or movement.target is None:
                 break
         subtasks.append(done)
         q = done.q
         if not done.hit:
-            break
-    return execution_of(plan, subtasks)
-
-
-def subtasks_of(
-    plan: Plan, asked: list[Slots], targets: Array, reached: Reached, looks: bool
-) -> list[Subtask]:
-    """What came of the goals of one trial that were attempted, by straight movements alone."""
-    hit, ticks, corrections, iterations, evaluations, moved = (
-        each.tolist()
-        for each in (
-            reached.hit, reached.ticks, reached.corrections, reached.iterations,
-            reached.evaluations, reached.moved,
-        )
-    )  # fmt: skip
-    subtasks = []
-    for g, (movements, slots) in enumerate(zip(plan, asked, strict=True)):
-        made = [
-            Movement(movement.goal, movement.hand, movement.kind, target, spent)
-            for movement, target, spent in zip(slots, targets[g], moved[g], strict=False)
-            if movement is not None and spent
-        ]
-        if corrections[g]:
-            first, target, spent = movements[0], reached.corrected[g], ticks[g] - sum(moved[g])
-            made.append(Movement(first.goal, first.hand, "corrective", target, spent))
-        evaluated = evaluations[g] - (looks and slots[0] is None)
-        subtasks.append(Subtask(made, reached.q[g], hit[g], iterations[g], evaluated))
-        if not hit[g]:
             break
     return subtasks
 
@@ -329,12 +332,18 @@ def subtasks_of(
 def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
     """An execution of the goals that were attempted."""
     made: list[Movement] = []
+    hits: list[Array] = []
+    iterations = evaluations = 0
     for movements, subtask in zip(plan, subtasks, strict=False):
         goal, hand = movements[0].goal, movements[0].hand
-        if subtask.hit and not subtask.made:  # hit on the way: show the hand
-            made.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
-        made += subtask.made
-    hits = [subtask.q for subtask in subtasks if subtask.hit]
+        made += subtask.movements
+        if subtask.hit:
+            hits.append(subtask.q)
+            if not subtask.movements:  # hit on the way: show the hand
+                made.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
+        iterations += subtask.iterations
+        # And a look before the first movement, and one at where that leads.
+        evaluations += subtask.evaluations + 2
     reason = ""
     if len(hits) < len(subtasks):
         reason = (
@@ -346,9 +355,8 @@ def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
         configurations=np.array(hits).reshape(-1, len(subtasks[0].q)),
         ticks=sum(movement.ticks or 0 for movement in made),
         corrections=sum(movement.kind == "corrective" and movement.ticks != 0 for movement in made),
-        iterations=sum(subtask.iterations for subtask in subtasks),
-        # And for each goal a look before the first movement, and one at where that leads.
-        evaluations=sum(subtask.evaluations + 2 for subtask in subtasks),
+        iterations=iterations,
+        evaluations=evaluations,
         reason=reason,
     )
 
@@ -367,63 +375,55 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
         of_goal = plan[-1]
-        where = f"task {task.name!r}, goal {movement.goal}"
-        if movement.hand not in task.hands:
-            raise SolutionError(
-                f"{where}: the robot has no {movement.hand} hand; it has "
-                f"{' and '.join(map(repr, task.hands))}"
-            )
-        if of_goal and movement.hand != of_goal[0].hand:
-            raise SolutionError(f"{where}: two hands for one goal")
-        of_goal.append(check_movement(movement, where))
-    check_points(task, plan)
+        try:
+            of_goal.append(check_movement(task, movement))
+            if movement.hand != of_goal[0].hand:
+                raise SolutionError("two hands for one goal")
+        except (SolutionError, ValueError) as error:
+            where = f"task {task.name!r}, goal {movement.goal}"
+            raise SolutionError(f"{where}: {error}") from None
     given, wanted = [each[0].goal for each in plan], list(range(1, len(task.goals) + 1))
     if given != wanted:
         raise SolutionError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
     return plan
 
 
-def check_movement(movement: Movement, where: str) -> Movement:
-    """A movement that has what its kind needs; a path with its target. Raises SolutionError, which
-    begins with ``where``."""
-    if movement.kind not in KINDS:
-        raise SolutionError(f"{where}: unknown kind {movement.kind!r}; known: {KINDS}")
-    if movement.kind == "path":
-        if movement.waypoints is None or len(movement.waypoints) == 0:
-            raise SolutionError(f"{where}: a path needs waypoints")
-        way = np.array(movement.waypoints, dtype=np.float64)
-        if movement.target is not None and not np.array_equal(movement.target, way[-1]):
-            raise SolutionError(f"{where}: a path's target is its last waypoint")
+def check_movement(task: Task, movement: Movement) -> Movement:
+    """The movement, if it has what its kind needs and leads to configurations that the task allows;
+    a path with its target. Raises SolutionError or ValueError."""
+    kind, target, waypoints = movement.kind, movement.target, movement.waypoints
+    if movement.hand not in task.hands:
+        raise SolutionError(
+            f"the robot has no {movement.hand} hand; it has {' and '.join(map(repr, task.hands))}"
+        )
+    if kind not in KINDS:
+        raise SolutionError(f"unknown kind {kind!r}; known: {KINDS}")
+    if kind == "path":
+        if waypoints is None or len(waypoints) == 0:
+            raise SolutionError("a path needs waypoints")
+        for point in waypoints:
+            check_point(task, point)
+        way = np.array(waypoints, dtype=np.float64)
+        if target is not None and not np.array_equal(target, way[-1]):
+            raise SolutionError("a path's target is its last waypoint")
         return replace(movement, target=way[-1], waypoints=way)
-    if movement.waypoints is not None:
-        raise SolutionError(f"{where}: a {movement.kind} movement has no waypoints")
-    if movement.target is None and movement.kind != "corrective":
-        raise SolutionError(f"{where}: a {movement.kind} movement needs a target")
+    if waypoints is not None:
+        raise SolutionError(f"a {kind} movement has no waypoints")
+    if target is not None:
+        check_point(task, target)
+    elif kind != "corrective":
+        raise SolutionError(f"a {kind} movement needs a target")
     return movement
 
 
-def check_points(task: Task, plan: Plan) -> None:
-    """Raises SolutionError for a target or waypoint that is no configuration of the robot, or that
-    moves a locked base coordinate."""
-    points: list[Array] = []
-    goals: list[int] = []
-    for movements in plan:
-        for movement in movements:
-            way = [] if movement.target is None else [movement.target]
-            points += way if movement.waypoints is None else list(movement.waypoints)
-            goals += [movement.goal] * (len(points) - len(goals))
-    locked = [{"x": 0, "y": 1}[coordinate] for coordinate in task.locked_base]
-    with suppress(ValueError):  # of rows of different lengths
-        array = np.array(points)
-        if array.dtype == np.float64 and array.shape == (len(points), task.robot.dof):
-            within = (np.abs(array) <= LARGEST_ENTRY).all()
-            if within and all((array[:, k] == task.q0[k]).all() for k in locked):
-                return
-    for goal, point in zip(goals, points, strict=True):
-        where = f"task {task.name!r}, goal {goal}"
-        try:
-            checked = configuration(task.robot, point)
-        except ValueError as error:
-            raise SolutionError(f"{where}: {error}") from None
-        if np.any(checked[locked] != task.q0[locked]):
-            raise SolutionError(f"{where}: the target moves a locked base coordinate")
+def check_point(task: Task, point: Any) -> None:
+    """Raises ValueError for what is no configuration of the robot, and SolutionError where it moves
+    a locked base coordinate."""
+    usual = isinstance(point, np.ndarray) and point.dtype == np.float64
+    # A sum of squares is quick to compute, and not below a limit where an entry is NaN.
+    if not usual or point.shape != task.q0.shape or not point @ point <= LARGEST_ENTRY:
+        point = configuration(task.robot, point)
+    for coordinate in task.locked_base:
+        k = "xy".index(coordinate)
+        if point[k] != task.q0[k]:
+            raise SolutionError("the target moves a locked base coordinate")
