@@ -13,6 +13,7 @@ from coartic.analysis.claims.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics import instances
+from coartic.analysis.words import p_value
 from coartic.benchmarks import Selection, run_suite
 
 
@@ -98,6 +99,7 @@ def test_one_task_carries_no_claim(side):
     )
     assert every.p_holm < 0.05 < every.p_without == others.p_holm
     assert every.verdict == "undecided"
+    assert every.evidence.endswith(f"for it {p_value(every.p_without)}.")
 
 
 def test_one_task_refutes_no_claim():

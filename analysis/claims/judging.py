@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from coartic.analysis.statistics.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.words import capital, estimate
+from coartic.analysis.words import capital, estimate, p_value
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
@@ -199,6 +199,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         claims.items(), p, without, opposite, strict=True
     ):
         seen = finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
+        if adjusted[0] < LEVEL <= adjusted[1]:
+            seen += f"; without the task that speaks most for it {p_value(adjusted[1])}"
         rows[name] = {
             "statement": statement,
             "verdict": finding.verdict(*adjusted[1:]),
