@@ -28,7 +28,8 @@ def find_run(prefix: str, folder: Path) -> tuple[Path, Run]:
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-"):
         raise CoarticError(
-            f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c."
+            f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c; "
+            "`coartic animate` also takes a method, with --task TASK."
         )
     folder_of: dict[str, Path] = {}
     for path in sorted(folder.rglob(RUNS_FILE)):

@@ -1,10 +1,12 @@
 """The command line as a user meets it."""
 
 import os
+import re
 import signal
 import sqlite3
 import subprocess
 import sys
+from collections import Counter
 from contextlib import closing
 from pathlib import Path
 
@@ -14,7 +16,9 @@ from typer.main import get_command
 from coartic import __version__
 from coartic.analysis.study import load
 from coartic.benchmarks import pool
+from coartic.benchmarks.run import Progress
 from coartic.cli import COMMANDS, app
+from coartic.cli.terminal import Display
 from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
@@ -98,6 +102,18 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
     )  # fmt: skip
     assert code == 1
     assert "1 failed" in text
+
+
+def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    progress = Progress(63, done=28, timed=Counter(x=28), waiting=Counter(x=35))
+    progress.took["x"] = 2800.0
+    with Display("paper") as display:
+        display.update(progress, f"two-armed-1 {'method' * 20}")
+    shown = re.sub("\x1b[^A-Za-z]*[A-Za-z]|\r", "", capsys.readouterr().err)
+    assert re.search("28/63 0 failed about 58 min 20 s left +two-armed-1", shown)
+    assert len(shown.splitlines()[-1]) % 80 == 0  # drawn in its place, each time as wide
 
 
 def test_check(coartic, tmp_path):

@@ -3,8 +3,10 @@
 import html.parser
 import re
 import shutil
+import sqlite3
 import subprocess
 import xml.etree.ElementTree as ElementTree
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -79,7 +81,7 @@ def test_numbers_are_made_again_from_the_runs(traced, tables_by_name, name):
 def test_trace_goes_from_a_row_to_its_runs(
     traced, tables_by_name, report, monkeypatch, capsys, tmp_path
 ):
-    results = tmp_path
+    results = tmp_path / "results"
     shutil.copytree(report, results / "report")
     shutil.copy(traced.folder / RUNS_FILE, results)
     tables = tables_of(results)
@@ -96,9 +98,24 @@ def test_trace_goes_from_a_row_to_its_runs(
         assert {str(seed), f"−{-reward}"} <= set(line.split())
     people = f"{frame.task.iloc[0]}, {name_of(method)}".replace(" †", "")
     assert call(monkeypatch, capsys, "trace", "methods", people, "--in", results)[1] == text
-    code, _, error = call(monkeypatch, capsys, "trace", "methods", "nothing", "--in", results)
-    assert code == 2
-    assert "no row 'nothing'" in error
+    assert (
+        f"{names[0]} ({people})"
+        in call(monkeypatch, capsys, "trace", "methods", "--in", results)[1]
+    )
+    delete(results / RUNS_FILE, runs[0])
+    for command, said in (
+        (("trace", "methods", "nothing", "--in", results), "no row 'nothing'"),
+        (("trace", "methods", names[0], "--in", results), "the report is older than the runs of"),
+        (("report", tmp_path), f"did you mean {results}?"),
+    ):
+        code, _, error = call(monkeypatch, capsys, *command)
+        assert (code, said in error) == (2, True), error
+
+
+def delete(path, run_id):
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("DELETE FROM results WHERE run_id = ?", (run_id,))
+        db.commit()
 
 
 def test_the_median_run_goes_by_the_names_of_people(traced, tables_by_name):

@@ -45,17 +45,20 @@ def rows_of(table: Path) -> pd.DataFrame:
     return frame
 
 
+def names_of(frame: pd.DataFrame) -> dict[str, str]:
+    """People's names of the rows of a table, as the page has them, by row."""
+    if {"task", "method"} <= {*frame}:
+        pairs = zip(frame.index, frame.task, frame.method, strict=True)
+        return {row: f"{task}, {name_of(method)}".replace(" †", "") for row, task, method in pairs}
+    return {row: name_of(row) for row in map(str, frame.index)}
+
+
 def row_named(table: str, frame: pd.DataFrame, name: str) -> str:
-    """The row of a table that goes by a name, its own or people's, as the page has it.
+    """The row of a table that goes by a name, its own or people's.
 
     Raises CoarticError where there is none.
     """
-    called = {row: name_of(row) for row in map(str, frame.index)}
-    if {"task", "method"} <= {*frame}:
-        pairs = zip(frame.index, frame.task, frame.method, strict=True)
-        called = {
-            row: f"{task}, {name_of(method)}".replace(" †", "") for row, task, method in pairs
-        }
+    called = names_of(frame)
     row = id_named(name, called)
     if row not in called:
         hint = did_you_mean(name, called, {k: words for k, words in called.items() if words != k})

@@ -51,7 +51,7 @@ def output_named(name: str | Path) -> Path:
 
 
 SuiteName = Annotated[
-    str,
+    str | None,
     typer.Argument(
         metavar="SUITE", help="Suite to run (`coartic list` names them), or a TOML file."
     ),

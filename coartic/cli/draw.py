@@ -52,7 +52,8 @@ def draw(
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
-    say(f"{out}: {counted(len(chosen), 'task')}.")
+    drawn = f", of which {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
+    say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
 
 
 def animate(

@@ -88,7 +88,8 @@ def trace(
         raise CoarticError(unknown("table", table, tables))
     frame = traced.rows_of(tables[table])
     if row is None:
-        say(*map(str, frame.index))
+        names = traced.names_of(frame).items()
+        say(*(each if each == words else f"{each} ({words})" for each, words in names))
         return
     row = traced.row_named(table, frame, row)
     ids = str(frame.run_ids.fillna("")[row]).split()
@@ -98,8 +99,11 @@ def trace(
         return
     with open_store(results) as store:
         runs, plan = store.frame("runs"), store.plan()
-    say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])
     behind = runs[runs.run_id.isin(ids)]
+    if len(behind) < len(ids):
+        again = f"coartic report {quote(str(results))}"
+        raise CoarticError(f"the report is older than the runs of {results}: {again}")
+    say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])
     known = {*registry(), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    suite: given.SuiteName,
+    suite: given.SuiteName = None,
     folder: given.Out = None,
     runs: given.RunCount = None,
     trials: given.TrialCount = None,
@@ -49,8 +49,10 @@ def run(
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.run import perform
-    from coartic.benchmarks.suites import load_suite
+    from coartic.benchmarks.suites import load_suite, suites
 
+    if suite is None:
+        raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     registered = registry(method_file or ())

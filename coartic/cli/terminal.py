@@ -83,17 +83,21 @@ class Display:
     def __init__(self, suite: str) -> None:
         from rich import progress
         from rich.console import Console
+        from rich.table import Column
 
         self.done = 0
         self._suite = suite
         self._console = Console(stderr=True, **_AS_IT_IS)
         self._bar = progress.Progress(
-            progress.TextColumn("{task.description}", markup=False),
-            progress.BarColumn(),
+            progress.BarColumn(20),
             progress.MofNCompleteColumn(),
             progress.TextColumn("{task.fields[failed]} failed"),
-            progress.TextColumn("{task.fields[left]}"),
+            progress.TextColumn("{task.fields[left]}", table_column=Column(width=24)),
+            progress.TextColumn(
+                "{task.description}", markup=False, table_column=Column(no_wrap=True, ratio=1)
+            ),
             console=self._console,
+            expand=True,
             transient=False,
         )
         self._task: TaskID | None = None
@@ -134,7 +138,7 @@ class Display:
             self._task,
             completed=progress.done,
             failed=progress.failed,
-            left=time_left(progress),
+            left=time_left(progress) if progress.done else "",
             description=one_line(words),
         )
 

@@ -511,7 +511,9 @@ def open_store(folder: Path) -> Store:
     if not folder.exists():
         raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not os.path.lexists(path):
-        raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}")
+        inside = [f"; did you mean {each.parent}?" for each in folder.glob(f"*/{RUNS_FILE}")]
+        hint = min(inside, default="")
+        raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
     check_files(folder)
     with (
         explain_errors(folder),
