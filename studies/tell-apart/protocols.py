@@ -33,9 +33,11 @@ from coartic.method import Information, Session
 
 HERE = Path(__file__).parent
 PEOPLE = 3
-"""Runs of each model on a task, each with its own practice."""
+"""Runs of a model on a task, each with its own practice, in the second and third contrast; in the
+first one stands for each task."""
 AFTER = [1, 10, 30, 100, 300, 1000, 10000]
 """Trials after the change at which the solution is looked at; the last is all of practice."""
+EVOLVED = 3000
 DISTANCES, EVERY = [0.25, 0.5, 1.0], [0.5, 4.0]
 """By which a goal moves, length units (a link of the arm is 1), and where all models are measured;
 4 is from ``ascending`` to ``descending`` and back."""
@@ -43,6 +45,7 @@ NOISE = 0.05
 """SD of exploration of the learner (the paper's), and of execution in the third contrast."""
 BLOCK = slice(200, 600)
 """Trials of the third contrast, after as many as people need to become familiar."""
+HANDS = {"L": "left", "R": "right"}
 
 
 def changed(task, goals):
@@ -118,14 +121,15 @@ def told_next(before, task, q, hands, g, movements):
 
 
 def evolve(cost, point, rng):
-    """CMA-ES from a point; the best points after :data:`AFTER` trials, the first of which tries it.
+    """CMA-ES from a point; the best points after :data:`AFTER` trials, the first of which tries it,
+    but after :data:`EVOLVED` in place of the last.
 
     It begins anew from the best point where it has converged.
     """
     size = 4 + int(3 * np.log(len(point)))
     strategy = EvolutionStrategy(point, NOISE, size, rng)
     best, trials, seen = cost(point), 1, [point]
-    while trials < AFTER[-1]:
+    while trials < EVOLVED:
         if strategy.has_ended():
             strategy = EvolutionStrategy(point, NOISE, size, rng)
         points = strategy.ask()
@@ -137,7 +141,7 @@ def evolve(cost, point, rng):
                 best, point = needed, tried
             if trials in AFTER:
                 seen.append(point)
-    return seen
+    return [*seen, point]
 
 
 def hit(task, cost, point):
@@ -151,19 +155,19 @@ def hit(task, cost, point):
 
 # ---- The first contrast: an announced change ----
 
-EFFORT = {"nodes": 100, "graphs": 1, "chains": 8, "starts": 8}
+EFFORT = {"nodes": 80, "graphs": 1, "chains": 6, "starts": 6}
 PLANNERS = {
     "planner, all goals": lambda task: plan(
         task, RecedingHorizon, horizon=len(task.goals) - 1, **EFFORT
     ),
-    "planner, next goal": lambda task: plan(task, RecedingHorizon, horizon=1, **EFFORT),
+    "planner, next goal": lambda task: plan(task, TwoGoals),
     "control, next goal": lambda task: plan(task, NextGoal),
     "control, this goal": lambda task: plan(task, NullspaceQP),
 }
 
 
 def change_goals(task, seed):
-    """Rows of a task: a model and person each, at a distance; sums over the goals before a change.
+    """Rows of a task: a model each, for a goal before a change and a distance.
 
     ``dot_N``: shift of the posture at the goal after N trials, times the shift after all of them;
     ``square``: the latter squared. ``ticks_N``: of a trial then. ``same`` and ``anew``: such a
@@ -174,51 +178,45 @@ def change_goals(task, seed):
     if task.name in ("ascending", "descending"):
         other = {"ascending": "descending", "descending": "ascending"}[task.name]
         cases.append((0, 4.0, changed(task, load_task(other).goals)))
-    seeds = [1000 * seed + 10 * n for n in range(PEOPLE)]
-    practised = [run.solution for run in learn_many(task, condition(task), seeds=seeds, jobs=1)]
-    done = [execute(task, movements) for movements in practised]
-    went_on = [look(task, learn(task, condition(task), seed=s + 1, start=m).solution)[0]
-               for s, m in zip(seeds, practised, strict=True)]  # fmt: skip
-    cost = objective(task)
-    points = [evolve(cost.fresh(), cost.x0, np.random.default_rng(s))[-1] for s in seeds]
-    evolved = [hit(task, cost, point)[0] for point in points]
+    practised = learn(task, condition(task), seed=10 * seed).solution
+    done = execute(task, practised)
+    before, hands = done.configurations, [HANDS[letter] for letter in done.hands]
+    more = learn(task, condition(task), seed=10 * seed + 1, start=practised).solution
+    went_on, cost = look(task, more)[0], objective(task)
+    point = evolve(cost.fresh(), cost.x0, np.random.default_rng(10 * seed))[-1]
+    evolved = hit(task, cost, point)[0]
     used = [model for model in PLANNERS if len(task.hands) == 1 or model.startswith("planner")]
     planned = {model: PLANNERS[model](task)[0] for model in used}
     for g, distance, after in cases:
-        others = learn_many(after, condition(task), seeds=[s + 2 for s in seeds], jobs=1)
-        anew = [look(after, run.solution) for run in others]
-        there = np.array([q[g] for q, _ in anew])
-        among = np.mean([np.sum((a - b) ** 2) for n, a in enumerate(there) for b in there[:n]])
 
-        def row(model, person, before, seen, g=g, distance=distance, **more):
+        def row(model, before, seen, g=g, distance=distance, **more):
             shifts = np.array([q[g] for q, _ in seen]) - before[g]
-            dots, ticks = shifts @ shifts[-1], [ticks for _, ticks in seen]
             return {
-                "task": task.name, "distance": distance, "model": model, "person": person,
-                "cases": 1, "square": dots[-1],
-                **{f"dot_{n}": dots[k] for k, n in enumerate(AFTER)},
-                **{f"ticks_{n}": ticks[k] for k, n in enumerate(AFTER)}, **more,
+                "task": task.name, "distance": distance, "model": model, "cases": 1,
+                "square": shifts[-1] @ shifts[-1],
+                **{f"dot_{n}": shifts[k] @ shifts[-1] for k, n in enumerate(AFTER)},
+                **{f"ticks_{n}": seen[k][1] for k, n in enumerate(AFTER)}, **more,
             }  # fmt: skip
 
         for model in used if distance in EVERY else used[:1]:
-            yield row(model, 0, planned[model], [PLANNERS[model](after)] * len(AFTER))
-        for n, s in enumerate(seeds):
-            before = done[n].configurations
-            hands = [{"L": "left", "R": "right"}[letter] for letter in done[n].hands]
-            seen = learned(after, s + 1, practised[n])
-            end = seen[-1][0][g] - before[g]
-            yield row(
-                "learner", n, before, seen, same=(went_on[n][g] - before[g]) @ end,
-                anew=np.mean(np.sum((there - seen[-1][0][g]) ** 2, axis=1)), among=among,
-                ticks_anew=np.mean([ticks for _, ticks in anew]),
-            )  # fmt: skip
-            if distance not in EVERY:
-                continue
-            told = told_next(task, after, before[g], hands, g, practised[n])
-            yield row("learner, told", n, before, learned(after, s + 1, told))
-            there_too = objective(after, cost.hands)
-            best = evolve(there_too, points[n], np.random.default_rng(s + 1))
-            yield row("CMA-ES", n, evolved[n], [hit(after, there_too, point) for point in best])
+            yield row(model, planned[model], [PLANNERS[model](after)] * len(AFTER))
+        seen = learned(after, 10 * seed + 1, practised)
+        same = (went_on[g] - before[g]) @ (seen[-1][0][g] - before[g])
+        if distance not in EVERY:
+            yield row("learner", before, seen, same=same)
+            continue
+        runs = learn_many(after, condition(task), seeds=[10 * seed + 2, 10 * seed + 3], jobs=1)
+        (one, ticks), (other, more) = (look(after, run.solution) for run in runs)
+        yield row(
+            "learner", before, seen, same=same, among=np.sum((one[g] - other[g]) ** 2),
+            anew=np.mean([np.sum((q[g] - seen[-1][0][g]) ** 2) for q in (one, other)]),
+            ticks_anew=(ticks + more) / 2,
+        )  # fmt: skip
+        told = told_next(task, after, before[g], hands, g, practised)
+        yield row("learner, told", before, learned(after, 10 * seed + 1, told))
+        cost = objective(after, cost.hands)
+        best = evolve(cost, point, np.random.default_rng(10 * seed + 1))
+        yield row("CMA-ES", evolved, [hit(after, cost, point) for point in best])
 
 
 # ---- The second contrast: practice from another start ----
@@ -321,21 +319,25 @@ def steps(task, seed):
 
 
 def main(split="i", folder=HERE):
-    """Run the protocols on test instances, or on some development instances."""
-    count, clock = (30, time.process_time()) if split == "i" else (2, time.process_time())
-    one, two = ([f"{family}/v1/{split}{n:03d}" for n in range(count)]
-                for family in ("one-armed", "two-armed"))  # fmt: skip
-    both = [task for pair in zip(one, two, strict=True) for task in pair]
-    chosen = {"steps": (steps, one[: count // 2]), "starts": (start_elsewhere, both),
-              "changes": (change_goals, ["ascending", "descending", *both])}  # fmt: skip
-    for name, (protocol, tasks) in chosen.items():
-        rows = []
-        for number, task in enumerate(tasks):
-            rows += protocol(load_task(task), number)
-            print(f"{name} {task}: {time.process_time() - clock:.0f} s", flush=True)
-            table = pd.DataFrame(rows)
+    """Run the protocols on test instances, or on some development instances.
+
+    A round takes the next instance of both families, so that the rounds that are done are a fair
+    part of all.
+    """
+    clock, rows = time.process_time(), {"changes": [], "starts": [], "steps": []}
+    rounds = [[load_task("ascending"), load_task("descending")]]
+    for n in range(30 if split == "i" else 2):
+        rounds.append([load_task(f"{family}-armed/v1/{split}{n:03d}") for family in ("one", "two")])
+    for number, tasks in enumerate(rounds):
+        for seed, task in enumerate(tasks, 2 * number):
+            rows["changes"] += change_goals(task, seed)
+            rows["starts"] += start_elsewhere(task, seed) if 1 <= number <= 10 else []
+            rows["steps"] += steps(task, seed) if len(task.hands) == 1 and number <= 8 else []
+            print(f"{task.name}: {time.process_time() - clock:.0f} s", flush=True)
+        for name, some in rows.items():
+            table = pd.DataFrame(some)
             if name == "changes":
-                keys = ["task", "distance", "model", "person"]
+                keys = ["task", "distance", "model"]
                 table = table.groupby(keys, sort=False).sum(min_count=1).reset_index()
             table.to_csv(Path(folder) / f"{name}.csv", float_format="%.5g")
 

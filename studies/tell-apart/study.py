@@ -37,7 +37,7 @@ def share_by_task(changes):
             half[row] = np.interp(HALF, ends, logs)
     return shares.assign(
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
-        drift=shares["same"] / shares.square, from_anew=np.sqrt(shares.anew / shares.among),
+        drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
         first=(shares.ticks_1 - shares.ticks_10000) / shares.cases,
         behind=100 * (shares.ticks_10000 / shares.ticks_anew - 1),
     )  # fmt: skip
@@ -94,8 +94,8 @@ def judge_claims(changes, starts, steps):
         ),
         "learner-ends-where-learning-anew-ends": (
             "After the change the learner ends where those end who learn the changed task anew.",
-            rule + "its distance to them, over that between them (root mean squares), below 1.2",
-            mean_beyond("The ratio is {}", shares["from_anew"]["learner"], 1.2, "less"),
+            rule + "logarithm of its distance to them over that between them below 0.1",
+            mean_beyond("The logarithm is {}", shares["from_anew"]["learner"], 0.1, "less"),
         ),
         "learner-ends-as-well": (
             "It ends as well in ticks.",
