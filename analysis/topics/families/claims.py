@@ -13,7 +13,7 @@ from coartic.analysis.claims.judging import Finding, tests_over_tasks
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.statistics.estimates import FEWEST, mean
-from coartic.analysis.topics.families.instances import sample
+from coartic.analysis.topics.families.instances import references
 from coartic.analysis.words import estimate
 from coartic.tasks.optima import KnownOptimum
 
@@ -52,12 +52,14 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
 
 def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
     """The best known of a family's instances but for those of development, for tuning."""
-    instances = sample(read.study)
-    names = instances.families.get(family, ())
-    reported = [name for name in names if read.task(name).split != "development"]
+    reported = {
+        name: best
+        for name, best in references(read.study).items()
+        if read.task(name).family == family and read.task(name).split != "development"
+    }
     if not reported:
         raise MissingError(f"this folder has no instances of {family} that can be judged")
-    return {name: instances.references[name] for name in reported}
+    return reported
 
 
 def earns_more(read: Reader, families: Iterable[str], *pairs: tuple[str, str]) -> Finding:

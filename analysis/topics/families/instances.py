@@ -3,134 +3,78 @@ many coarticulation is there."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import pandas as pd
 
-from coartic import Task
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.optima import gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
-from coartic.analysis.statistics.instances import Runs, Scores
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.statistics.instances import Scores
+from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.coarticulation.placebo import of_placebo
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Instances of families: the tasks of a folder that were drawn."""
-
-    study: Study
-
-    @cached_property
-    def tasks(self) -> dict[str, Task]:
-        """The instances by name."""
-        items = self.study.tasks.items()
-        return {name: task for name, task in items if task.family is not None}
-
-    @cached_property
-    def families(self) -> dict[str, tuple[str, ...]]:
-        """Names of the instances with a reference, by family with its version."""
-        names_by_family: dict[str, list[str]] = {}
-        for name in self.references:
-            names_by_family.setdefault(str(self.tasks[name].family), []).append(name)
-        return {family: tuple(names) for family, names in names_by_family.items()}
-
-    @cached_property
-    def references(self) -> dict[str, KnownOptimum]:
-        """What the solutions of each instance are measured by, where there is any."""
-        known = self.study.best_known
-        return {name: known[name] for name in self.tasks if name in known}
-
-    @cached_property
-    def labels(self) -> tuple[str, ...]:
-        """Methods with their variants but for searches for the optimum, in the plan's order."""
-        cells = self.study.cells.items()
-        return tuple(
-            dict.fromkeys(
-                label
-                for (name, label), cell in cells
-                if name in self.references
-                and not label.startswith(SEARCH)
-                and not locks_base(cell.runs)
-                and len(cell.good)
-            )
-        )
-
-    def label_on(self, name: str, label: str) -> str:
-        """Label of a method on an instance: ``learner`` is the condition that explores most."""
-        return most_exploring(self.tasks[name]) if label == "learner" else label
-
-    def cell(self, name: str, label: str) -> CellRuns | None:
-        """Runs of a method on an instance with a reference; None where none has a solution."""
-        cell = self.study.cells.get((name, self.label_on(name, label)))
-        return cell if cell is not None and name in self.references and len(cell.good) else None
-
-    def gap(self, name: str, label: str, *, to_bound: bool = False) -> Array | None:
-        """Gaps of the solved runs (n,), as shares of the best known reward; None without any.
-
-        The gap to the optimum is at least this. To the proven bound, which it is at most, it is
-        None where nothing is proven.
-        """
-        cell = self.cell(name, label)
-        if cell is None:
-            return None
-        reference = self.references[name]
-        to = reference.bound if to_bound else reference.reward
-        return None if to is None else gap_share(cell.rewards, to)
-
-    def gaps(self, label: str, *, to_bound: bool = False) -> Scores:
-        """Gaps by family, on the instances that the method solved in some run.
-
-        A family without one is left out.
-        """
-        by_family: dict[str, list[Runs]] = {}
-        for family, names in self.families.items():
-            for name in names:
-                gap = self.gap(name, label, to_bound=to_bound)
-                if gap is not None:
-                    by_family.setdefault(family, []).append((gap,))
-        return by_family
-
-    def shared(self, *labels: str) -> dict[str, tuple[str, ...]]:
-        """Names of the instances that all of the methods solved in some run, by family."""
-        by_family = {
-            family: tuple(
-                n for n in names if all(self.gap(n, label) is not None for label in labels)
-            )
-            for family, names in self.families.items()
-        }
-        return {family: names for family, names in by_family.items() if names}
-
-    @cached_property
-    def by_hands(self) -> dict[str, dict[str, int]]:
-        """Best reward of any run of the folder with each hand sequence, by instance.
-
-        The corrective process alone with every sequence counts as well. The best that a sequence
-        can give is at least that.
-        """
-        runs = self.study.runs
-        columns = ["task", "hands", "reward"]
-        alone = [self.study.sequences(name).assign(task=name) for name in self.tasks]
-        every = pd.concat([part[columns] for part in (runs[runs.status == "ok"], *alone)]).dropna()
-        best: dict[str, dict[str, int]] = {name: {} for name in self.tasks}
-        of_instances = every[every.task.isin(best)]
-        for task, hands, reward in zip(
-            of_instances.task, of_instances.hands, of_instances.reward, strict=True
-        ):
-            best[task][hands] = max(int(reward), best[task].get(hands, int(reward)))
-        return best
+@cached
+def references(study: Study) -> dict[str, KnownOptimum]:
+    """What solutions of each instance of a family are measured by, where there is any."""
+    known = study.best_known
+    drawn = [name for name, task in study.tasks.items() if task.family is not None]
+    return {name: known[name] for name in drawn if name in known}
 
 
 @cached
-def sample(study: Study) -> Sample:
-    """The instances of a folder, which may have none."""
-    return Sample(study)
+def solved(study: Study) -> pd.DataFrame:
+    """A row for each method on each instance that it solved in some run, family by family.
+
+    Without searches for the optimum. Columns ``family``, ``task``, ``label`` (``learner`` is the
+    condition that explores most on the instance), and of the solved runs, shape ``(n,)``: ``gap``
+    to the best known reward, as a share of it, and ``to_bound``, which the gap to the optimum is
+    at most; None where nothing is proven.
+    """
+    labels = [label for label in dict.fromkeys(label for _, label in study.cells)
+              if not label.startswith(SEARCH)]  # fmt: skip
+    rows = []
+    for name, best in references(study).items():
+        for shown in ("learner", *labels):
+            label = most_exploring(study.tasks[name]) if shown == "learner" else shown
+            cell = study.cells.get((name, label))
+            if cell is not None and len(cell.good) and not locks_base(cell.runs):
+                bound = None if best.bound is None else gap_share(cell.rewards, best.bound)
+                gap = gap_share(cell.rewards, best.reward)
+                rows.append((study.tasks[name].family, name, shown, gap, bound))
+    frame = pd.DataFrame(rows, columns=["family", "task", "label", "gap", "to_bound"])
+    place = {family: number for number, family in enumerate(frame.family.unique())}
+    return frame.sort_values("family", key=lambda of: of.map(place), kind="stable")
+
+
+def by_family(rows: pd.DataFrame, column: str) -> Scores:
+    """Values of instances by family, without instances that have none."""
+    rows = rows[rows[column].notna()]
+    return {
+        str(family): [(values,) for values in of_family[column]]
+        for family, of_family in rows.groupby("family", sort=False)
+    }
+
+
+@cached
+def best_by_hands(study: Study) -> dict[str, dict[str, int]]:
+    """Best reward of any run of the folder with each hand sequence, by instance.
+
+    The corrective process alone with every sequence counts as well. The best that a sequence can
+    give is at least that.
+    """
+    drawn = [name for name, task in study.tasks.items() if task.family is not None]
+    runs, columns = study.runs, ["task", "hands", "reward"]
+    alone = [study.sequences(name).assign(task=name) for name in drawn]
+    every = pd.concat([part[columns] for part in (runs[runs.status == "ok"], *alone)]).dropna()
+    best: dict[str, dict[str, int]] = {name: {} for name in drawn}
+    for row in every.groupby(["task", "hands"], as_index=False).reward.max().to_dict("records"):
+        if row["task"] in best:
+            best[row["task"]][row["hands"]] = int(row["reward"])
+    return best
 
 
 THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
@@ -147,7 +91,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     value for each run that has one. A sign without any is left out.
     """
     by_cell = {}
-    for name in sample(study).references:
+    for name in references(study):
         for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
@@ -160,12 +104,11 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     return by_cell
 
 
-def scores_of(sample: Sample, label: str, sign: str) -> dict[str, list[Runs]]:
+def signs_by_family(study: Study, label: str, sign: str) -> Scores:
     """A sign of a condition by family, of the instances that have a value."""
-    by_cell, scores = signs(sample.study), {}
-    for family, names in sample.families.items():
-        values = [by_cell.get((name, label), {}).get(sign) for name in names]
-        instances: list[Runs] = [(of_runs,) for of_runs in values if of_runs is not None]
-        if instances:
-            scores[family] = instances
+    scores: dict[str, list[tuple[Array]]] = {}
+    for name in references(study):
+        values = signs(study).get((name, label), {}).get(sign)
+        if values is not None:
+            scores.setdefault(str(study.tasks[name].family), []).append((values,))
     return scores

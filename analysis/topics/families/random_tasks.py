@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from coartic.analysis.methods import (
     LEARNERS,
     PLACEBO,
     is_variant,
+    most_exploring,
     name_of,
 )
 from coartic.analysis.optima import gap_share
@@ -31,7 +32,14 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import other_tasks, value
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.instances import THERE, sample, scores_of
+from coartic.analysis.topics.families.instances import (
+    THERE,
+    best_by_hands,
+    by_family,
+    references,
+    signs_by_family,
+    solved,
+)
 from coartic.analysis.words import interval_in_words, number
 from coartic.robot import Array
 
@@ -58,29 +66,30 @@ _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 @table("method, instances, gap[], to_bound[], in *")
 def family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
-    instances = sample(study)
-    two_armed = [
-        name
-        for name, tasks in instances.families.items()
-        if len(instances.tasks[tasks[0]].hands) > 1
-    ]
+    every = solved(study)
+    two_armed = {
+        str(study.tasks[name].family)
+        for name in references(study)
+        if len(study.tasks[name].hands) > 1
+    }
     rows: list[tuple[str, Row]] = []
-    for label in ("learner", *(name for name in instances.labels if not is_variant(name))):
-        scores, bounded = (instances.gaps(label, to_bound=to) for to in (False, True))
-        if not scores:
-            continue
-        row: Row = {"method": label, "instances": sum(map(len, scores.values())), "gap": math.nan}
-        for name, gaps in (("gap", scores), ("to_bound", bounded)):
-            if two_armed and set(two_armed) <= gaps.keys():
-                row |= interval(name, other_tasks({family: gaps[family] for family in two_armed}))
-        for family in instances.families:
-            row[f"in {family}"] = (
-                other_tasks({family: scores[family]}).value if family in scores else math.nan
-            )
+    for label in (name for name in every.label.unique() if not is_variant(name)):
+        of_label = every[every.label == label]
+        row: Row = {"method": label, "instances": len(of_label), "gap": math.nan}
+        for column in ("gap", "to_bound"):
+            scores = by_family(of_label, column)
+            if two_armed and two_armed <= scores.keys():
+                both = {family: part for family, part in scores.items() if family in two_armed}
+                row |= interval(column, other_tasks(both))
+        gaps = by_family(of_label, "gap")
+        for family in every.family.unique():
+            part = {family: gaps[family]} if family in gaps else {}
+            row[f"in {family}"] = other_tasks(part).value if part else math.nan
         cells = [
             cell
             for (task, name), cell in study.cells.items()
-            if task in instances.tasks and name == instances.label_on(task, label)
+            if study.tasks[task].family is not None
+            and name == (most_exploring(study.tasks[task]) if label == "learner" else label)
         ]
         rows.append((label, row | runs_of(*cells)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
@@ -94,12 +103,12 @@ def told_apart(first: Array, second: Array) -> bool:
     return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
-def each_and_all(by_family: dict[str, OfFamily]) -> Iterator[tuple[str, dict[str, OfFamily]]]:
+def each_and_all(parts: Mapping[str, OfFamily]) -> Iterator[tuple[str, Mapping[str, OfFamily]]]:
     """Every family by itself, and ``all`` of them where there are several."""
-    for family, part in by_family.items():
+    for family, part in parts.items():
         yield family, {family: part}
-    if len(by_family) > 1:
-        yield ALL, by_family
+    if len(parts) > 1:
+        yield ALL, parts
 
 
 def family_cells(study: Study, family: str, labels: Iterable[str]) -> list[CellRuns]:
@@ -119,23 +128,24 @@ def exploration(study: Study) -> Rows:
     sequences make, as if each run got the best that is known with its hands; the rest is what
     joints make of them.
     """
-    instances = sample(study)
 
     def share(cell: CellRuns) -> Array:
-        return -gap_share(cell.rewards, instances.references[cell.task].reward)
+        return -gap_share(cell.rewards, references(study)[cell.task].reward)
 
     def share_by_hands(cell: CellRuns) -> Array:
-        best_of, best = instances.by_hands[cell.task], instances.references[cell.task].reward
+        best_of, best = best_by_hands(study)[cell.task], references(study)[cell.task].reward
         return np.array([best_of[str(hands)] for hands in cell.good.hands]) / abs(best)
 
     for first, second in CONTRASTS:
         less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
         contrast = f"{name_of(first)} over {less}"
-        for family, names in each_and_all(instances.shared(first, second)):
-            cells = {
-                of: [(study.cells[name, first], study.cells[name, second]) for name in of_family]
-                for of, of_family in names.items()
-            }
+        every = solved(study)
+        names = every[every.label == first].merge(every.task[every.label == second])
+        pairs = {
+            str(family): [(study.cells[name, first], study.cells[name, second]) for name in tasks]
+            for family, tasks in names.groupby("family", sort=False).task
+        }
+        for family, cells in each_and_all(pairs):
             scores, by_hands = (
                 {of: [(measure(a), measure(b)) for a, b in pairs] for of, pairs in cells.items()}
                 for measure in (share, share_by_hands)
@@ -161,9 +171,8 @@ def exploration(study: Study) -> Rows:
 @table("sign, method, family, instances, there, mean[]")
 def family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
-    instances = sample(study)
     for label, sign in itertools.product((*LEARNERS, PLACEBO), THERE):
-        for family, scores in each_and_all(scores_of(instances, label, sign)):
+        for family, scores in each_and_all(signs_by_family(study, label, sign)):
             means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]
             row: Row = {
                 "sign": SIGNS[sign].in_short,
@@ -184,19 +193,15 @@ def instance_gaps(study: Study) -> pd.DataFrame:
     Columns ``method``, ``family``, ``task``, ``gap`` (mean over runs), ``mean[]`` about other
     tasks of the family, ``instances``.
     """
-    instances = sample(study)
-    rows: list[Row] = []
-    for label in instances.labels:
-        for family, scores in instances.gaps(label).items() if " " not in label else ():
-            mean = interval("mean", other_tasks({family: scores}))
-            names = instances.shared(label)[family]
-            rows += [
-                {"method": label, "family": family, "task": name, "gap": float(np.mean(runs)),
-                 **mean, "instances": len(scores)}
-                for name, (runs,) in zip(names, scores, strict=True)
-            ]  # fmt: skip
     columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
-    return pd.DataFrame(rows, columns=columns)
+    parts = [pd.DataFrame(columns=columns)]
+    rows = solved(study).rename(columns={"label": "method"})
+    rows = rows[~rows.method.str.contains(" ") & (rows.method != "learner")]
+    for _, part in rows.groupby(["method", "family"], sort=False):
+        mean = interval("mean", other_tasks(by_family(part, "gap")))
+        part = part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))
+        parts.append(part[columns])
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 @figure(
@@ -249,7 +254,7 @@ def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: s
 
 def on_random_tasks(study: Study) -> str:
     """How far the nearest methods end from the best known reward, over families with two arms."""
-    instances = sample(study)
+    best = references(study).values()
     gaps = family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
     if not len(gaps):
         return ""
@@ -258,11 +263,10 @@ def on_random_tasks(study: Study) -> str:
         f"{number(100 * row['gap'], 1)} %"
         for row in gaps.to_dict("records")
     ]
-    proven = sum(reference.proven for reference in instances.references.values())
     return (
-        f"Gaps to the best known reward on {len(instances.references)} random tasks: "
+        f"Gaps to the best known reward on {len(best)} random tasks: "
         f"{', '.join(ends)} (mean over families with two arms). It is proven to be the optimum on "
-        f"{proven} of them."
+        f"{sum(each.proven for each in best)} of them."
     )
 
 
