@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
-    from coartic.analysis.pages import fill_page, interval
+    from coartic.analysis.pages import fill_page
     from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.signatures.two_contexts import TwoContexts
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
     from coartic.analysis.study import Study, load
+    from coartic.analysis.words import interval
 
 __all__ = [
     "SIGNS", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps", "interval",
@@ -25,13 +26,14 @@ __all__ = [
 _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
-    "pages": ("fill_page", "interval"),
+    "pages": ("fill_page",),
     "signatures.context_tests": ("beyond_p",),
     "signatures.signs": ("SIGNS",),
     "signatures.two_contexts": ("TwoContexts",),
     "statistics.estimates": ("mean",),
     "statistics.instances": ("other_tasks",),
     "study": ("Study", "load"),
+    "words": ("interval",),
 }
 
 

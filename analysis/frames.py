@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.estimates import Estimate, interval, mean
+from coartic.analysis.statistics.estimates import Estimate, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 
@@ -94,7 +94,7 @@ def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
             there = group[name].dropna().to_numpy(dtype=np.float64)
-            row |= interval(name, mean(there)) if len(there) else {}
+            row |= mean(there).columns(name) if len(there) else {}
         rows.append(row)
     ends = [f"{name}{end}" for name in columns for end in ("", "_low", "_high")]
     return pd.DataFrame(rows, columns=[*by, "rows", *ends])
@@ -143,7 +143,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         by_task = {str(task): runs.gap.to_numpy() for task, runs in solved.groupby("task")}
         solved_all = by_task and set(by_task) == every
         rows[method] = {
-            **interval("gap", task_mean(by_task) if solved_all else Estimate(np.nan)),
+            **(task_mean(by_task) if solved_all else Estimate(np.nan)).columns("gap"),
             "tasks": len(by_task),
             "runs": len(of_method),
             "failed": int(of_method.reward.isna().sum()),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from coartic.analysis.words import interval_in_words, listed, number, p_value
+from coartic.analysis.words import interval, listed, number, p_value
 
 
 def fill_page(template: Path, **values: Any) -> str:
@@ -45,33 +44,6 @@ def fill_page(template: Path, **values: Any) -> str:
     environment.globals |= {"interval": interval, "expect": expect, **values}
     environment.filters |= {"number": number, "p_value": p_value, "listed": listed}
     return environment.get_template(template.name).render()
-
-
-def interval(row: Mapping[Any, Any], column: str, digits: int = 1, scale: float = 1.0) -> str:
-    """Write a number of a table with its interval.
-
-    Parameters
-    ----------
-    row : mapping
-        Has ``column``, ``column_low`` and ``column_high``, as a row of what ``means`` returns.
-    column : str
-        Name of the number.
-    digits : int
-        Decimals.
-    scale : float
-        Factor, such as 100 for a share in per cent.
-
-    Returns
-    -------
-    str
-        Such as ``7.8 [7.3, 8.1]``; the number alone where the ends are missing.
-
-    Examples
-    --------
-    >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100)
-    '7.8 [7.3, 8.1]'
-    """
-    return interval_in_words(row, column, digits, scale)
 
 
 def expect(holds: bool, what: str) -> str:

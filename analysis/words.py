@@ -92,11 +92,35 @@ def estimate(value: Estimate, digits: int | None = None, unit: str = "") -> str:
     return f"{number(value.value, digits)}{unit} {interval}".strip()
 
 
-def interval_in_words(
-    row: Mapping[Any, Any], name: str, digits: int = 1, scale: float = 1.0, unit: str = ""
+def interval(
+    row: Mapping[Any, Any], column: str, digits: int = 1, scale: float = 1.0, unit: str = ""
 ) -> str:
-    """A number of a table with its unit and its interval: ``2.1 % [1.3, 2.9]``."""
-    value, low, high = (scale * float(row[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    """Write a number of a table with its interval.
+
+    Parameters
+    ----------
+    row : mapping
+        Has ``column``, ``column_low`` and ``column_high``, as a row of what ``means`` returns.
+    column : str
+        Name of the number.
+    digits : int
+        Decimals.
+    scale : float
+        Factor, such as 100 for a share in per cent.
+    unit : str
+        What stands behind the number, such as ``" %"``.
+
+    Returns
+    -------
+    str
+        Such as ``7.8 [7.3, 8.1]``; the number alone where the ends are missing.
+
+    Examples
+    --------
+    >>> interval({"gap": 0.078, "gap_low": 0.073, "gap_high": 0.081}, "gap", scale=100, unit=" %")
+    '7.8 % [7.3, 8.1]'
+    """
+    value, low, high = (scale * float(row[f"{column}{end}"]) for end in ("", "_low", "_high"))
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 

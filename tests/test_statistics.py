@@ -124,7 +124,7 @@ def test_a_difference_to_a_known_number_is_of_one_sample():
 
 
 def test_degenerate_samples():
-    columns = statistics.interval("gap", statistics.Estimate(2.0, 1.0, 3.0))
+    columns = statistics.Estimate(2.0, 1.0, 3.0).columns("gap")
     assert columns == {"gap": 2.0, "gap_low": 1.0, "gap_high": 3.0}
     assert math.isnan(statistics.mean([4.0, 5.0]).low)
     assert statistics.mean([4.0, 5.0, 6.0]).low < 5

@@ -61,12 +61,9 @@ class Estimate:
     least_p: float = math.nan
     """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
 
-
-def interval(name: str, estimate: Estimate | None) -> dict[str, float]:
-    """Three columns of a table: an estimate and both ends of its interval; none without it."""
-    if estimate is None:
-        return {}
-    return {name: estimate.value, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+    def columns(self, name: str) -> dict[str, float]:
+        """Three columns of a table: the number and both ends of its interval."""
+        return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 
 def vector(values: ArrayLike) -> Array:

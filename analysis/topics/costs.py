@@ -18,13 +18,12 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
 from coartic.analysis.settings import name_in, shown_methods
 from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.estimates import interval
 from coartic.analysis.statistics.running_times import RunningTimes
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import interval_in_words, number, two_figures
+from coartic.analysis.words import interval, number, two_figures
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
@@ -125,7 +124,7 @@ def runtimes(study: Study) -> Rows:
         row: Row = {"method": method, "reached": running_times.share_reached(times)}
         for name, spend, share in COSTS:
             if (method, spend) in costs(study):
-                row |= interval(name, running_times.budget_for(costs(study)[method, spend], share))
+                row |= running_times.budget_for(costs(study)[method, spend], share).columns(name)
         if scores.groups(study)[method] == scores.BY_TRIAL:
             of_method = scores.compared(study)[method]
             for task in (task for task in scores.initial_and_optimum(study) if task in of_method):
@@ -232,7 +231,7 @@ def what_it_costs(study: Study) -> str:
         f"Of the reward targets between the initial solution and the optimum, reached: {reached}."
     )
     if len(rows) == 2 and np.isfinite(halves).all():
-        ours, theirs = (interval_in_words(row, "trials_to_half", digits=0) for row in rows)
+        ours, theirs = (interval(row, "trials_to_half", digits=0) for row in rows)
         text = (
             f"For half of the reward targets between the initial solution and the optimum, the "
             f"learner needs {ours} trials, {names[1]} {theirs}: a ratio of "

@@ -21,7 +21,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import capital, interval_in_words, marked, number, p_value, plural
+from coartic.analysis.words import capital, interval, marked, number, p_value, plural
 
 TRIES = *methods.PLACEBOS, "corrective-alone/every"
 """Methods that take the best of their trials: they learn nothing from one for the next."""
@@ -204,7 +204,7 @@ def draw_group(
             axes.plot(ends, [-place, -place], color=color, linewidth=1.4)
         shape = "D" if methods.is_learner(row["method"]) else "o"
         (dot,) = axes.plot(row["gap"], -place, shape, **mark)
-        words = interval_in_words(row, "gap", unit=" %")
+        words = interval(row, "gap", unit=" %")
         style.tip(dot, f"{name_in(study, row['method'])}: {words}, {row['runs']} runs")
         beside: Any = {"textcoords": "offset points", "va": "center"}
         axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
@@ -249,7 +249,7 @@ def nearest(study: Study) -> str:
 
 def gap_in_words(row: Any) -> str:
     """A gap in per cent with its interval, ``7.3 % [6.9, 7.8]``."""
-    return interval_in_words(row, "gap", scale=100, unit=" %")
+    return interval(row, "gap", scale=100, unit=" %")
 
 
 def beside(study: Study, rows: pd.DataFrame) -> str:

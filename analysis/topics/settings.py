@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from coartic.analysis.settings import compares_settings, name_in, varied
-from coartic.analysis.statistics.estimates import LEVEL, interval, mean
+from coartic.analysis.statistics.estimates import LEVEL, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.words import interval_in_words, marked, number
+from coartic.analysis.words import interval, marked, number
 
 MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
@@ -36,7 +36,7 @@ def settings(study: Study) -> Rows:
                 "method": cell.label,
                 "runs": len(cell.runs),
                 "solved": len(cell.good),
-                **interval("reward", mean(cell.rewards)),
+                **mean(cell.rewards).columns("reward"),
                 "behind": cells[0].rewards.mean() - cell.rewards.mean(),
                 "p_holm": corrected,
                 "least_p": least_p,
@@ -50,7 +50,7 @@ def best_settings(study: Study) -> str:
     for task, of_task in rows.groupby("task", sort=False):
         first, *others = of_task.to_dict("records")
         best = name_in(study, first["method"])
-        text = f"{task}: {best}, {interval_in_words(first, 'reward')} ticks"
+        text = f"{task}: {best}, {interval(first, 'reward')} ticks"
         if others:
             second = others[0]
             surely = "significant" if second["p_holm"] < LEVEL else "no significant difference"

@@ -13,7 +13,7 @@ from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import LEARNER
-from coartic.analysis.statistics.estimates import interval, mean
+from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.paper.published import published_cell
@@ -41,7 +41,7 @@ def tasks(study: Study) -> Rows:
             row |= {
                 "initial": cell.good.initial_reward.dropna().mean(),
                 "condition": condition,
-                **interval("learned", mean(cell.rewards)),
+                **mean(cell.rewards).columns("learned"),
                 "published": paper.summary.mean if paper and paper.summary else None,
                 "published_sd": paper.summary.sd if paper and paper.summary else None,
                 **runs_of(cell),

@@ -71,9 +71,9 @@ def best_by_hands(study: Study) -> dict[str, dict[str, int]]:
     alone = [study.sequences(name).assign(task=name) for name in drawn]
     every = pd.concat([part[columns] for part in (runs[runs.status == "ok"], *alone)]).dropna()
     best: dict[str, dict[str, int]] = {name: {} for name in drawn}
-    for row in every.groupby(["task", "hands"], as_index=False).reward.max().to_dict("records"):
-        if row["task"] in best:
-            best[row["task"]][row["hands"]] = int(row["reward"])
+    for task, of_task in every.groupby("task"):
+        if task in best:
+            best[str(task)] = of_task.groupby("hands").reward.max().astype(int).to_dict()
     return best
 
 

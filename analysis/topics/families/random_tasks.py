@@ -27,7 +27,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.optima import gap_share
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import LEVEL, interval
+from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import other_tasks, value
 from coartic.analysis.study import CellRuns, Study, cached
@@ -40,7 +40,7 @@ from coartic.analysis.topics.families.instances import (
     signs_by_family,
     solved,
 )
-from coartic.analysis.words import interval_in_words, number
+from coartic.analysis.words import interval, number
 from coartic.robot import Array
 
 OfFamily = TypeVar("OfFamily")
@@ -80,7 +80,7 @@ def family_gaps(study: Study) -> Rows:
             scores = by_family(of_label, column)
             if two_armed and two_armed <= scores.keys():
                 both = {family: part for family, part in scores.items() if family in two_armed}
-                row |= interval(column, other_tasks(both))
+                row |= other_tasks(both).columns(column)
         gaps = by_family(of_label, "gap")
         for family in every.family.unique():
             part = {family: gaps[family]} if family in gaps else {}
@@ -157,9 +157,9 @@ def exploration(study: Study) -> Rows:
                 "contrast": contrast,
                 "family": family,
                 "instances": len(values),
-                **interval("gain", other_tasks(scores)),
+                **other_tasks(scores).columns("gain"),
                 "median": float(np.median(values)),
-                **interval("by_hands", other_tasks(by_hands)),
+                **other_tasks(by_hands).columns("by_hands"),
                 "better": int((values > 0).sum()),
                 "worse": int((values < 0).sum()),
                 "told_apart": sum(told_apart(*runs) for runs in of_instances),
@@ -180,7 +180,7 @@ def family_signs(study: Study) -> Rows:
                 "family": family,
                 "instances": len(means),
                 "there": sum(mean > THERE[sign] for mean in means),
-                **interval("mean", other_tasks(scores)),
+                **other_tasks(scores).columns("mean"),
                 **runs_of(*family_cells(study, family, (label,))),
             }
             yield f"{sign}, {label}, {family}", row
@@ -198,7 +198,7 @@ def instance_gaps(study: Study) -> pd.DataFrame:
     rows = solved(study).rename(columns={"label": "method"})
     rows = rows[~rows.method.str.contains(" ") & (rows.method != "learner")]
     for _, part in rows.groupby(["method", "family"], sort=False):
-        mean = interval("mean", other_tasks(by_family(part, "gap")))
+        mean = other_tasks(by_family(part, "gap")).columns("mean")
         part = part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))
         parts.append(part[columns])
     return pd.concat(parts[1:] or parts, ignore_index=True)
@@ -275,7 +275,7 @@ def exploration_pays(study: Study) -> str:
     rows = exploration(study)
     initial = rows.contrast.astype(str).str.endswith(INITIAL_SOLUTION)
     gains = [
-        f"{row['contrast']} {interval_in_words(row, 'gain', scale=100, unit=' %')}, better on "
+        f"{row['contrast']} {interval(row, 'gain', scale=100, unit=' %')}, better on "
         f"{row['better']} of {row['instances']} tasks"
         for row in rows[(rows.family == ALL) & ~initial].to_dict("records")
     ]

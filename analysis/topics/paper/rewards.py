@@ -13,7 +13,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, missing
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
-from coartic.analysis.statistics.estimates import interval, standard_deviation
+from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.paper.published import (
@@ -22,7 +22,7 @@ from coartic.analysis.topics.paper.published import (
     published_alone,
     published_cell,
 )
-from coartic.analysis.words import interval_in_words, marked
+from coartic.analysis.words import interval, marked
 from coartic.learner.learning import TRIALS
 
 _MARKS = {
@@ -79,7 +79,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
             }
             if summary and len(rewards):
                 apart = difference_to_printed(rewards, summary.mean, summary.sd, summary.runs)
-                row |= interval("difference", apart)
+                row |= apart.columns("difference")
                 if (cell.good.trials == TRIALS).all():
                     row["verdict"] = verdict(apart, row["margin"])
             rows.append(row)
@@ -208,7 +208,7 @@ def rewards_reproduced(study: Study) -> str:
             condition, task = row["cell"].label.removeprefix(LEARNER), row["cell"].task
             text += (
                 f" {condition} on {marked(study.tasks[task])} is "
-                f"{interval_in_words(row, 'difference')} ticks from the printed mean: its interval "
+                f"{interval(row, 'difference')} ticks from the printed mean: its interval "
                 "leaves out 0, not corrected for the number of rewards."
             )
     return text
