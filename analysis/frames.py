@@ -196,6 +196,6 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
                       for _, run in of_task.groupby("run")], dtype=np.float64)
             for _, of_task in of_method.groupby("task")
         ]  # fmt: skip
-        trials, share = running_times.ecdf(times)
+        trials, share = running_times.share_by_budget(times)
         rows.append(pd.DataFrame({"method": method, "trials": trials, "share": share}))
     return pd.concat(rows, ignore_index=True)

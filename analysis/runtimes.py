@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis import methods as known
-from coartic.analysis.statistics.running_times import ecdf
-from coartic.analysis.study import CellRuns, Study, load
+from coartic.analysis.statistics.running_times import share_by_budget
+from coartic.analysis.study import Study, load
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.costs import SPENDS, TARGETS, times_of
 from coartic.errors import CoarticError
@@ -96,17 +96,13 @@ def runtimes(
             if not compared[name].keys() >= {*tasks}:
                 continue
             of_group = [compared[name][task] for task in tasks]
-            if not methods and is_single_condition(name, of_group):
-                continue
+            single = len({cell.label for cell in of_group}) == 1
+            if not methods and single and name.startswith(known.TOGETHER):
+                continue  # the learner's conditions together are one of them here
             for spend in SPENDS:
                 times = [times_of(study, cell, spend, shares) for cell in of_group]
                 if all(map(len, times)):
-                    budgets, reached = map(np.ndarray.tolist, ecdf(times))
+                    budgets, reached = map(np.ndarray.tolist, share_by_budget(times))
                     steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
                     rows += [(group, name, spend, *step) for step in steps]
     return pd.DataFrame(rows, columns=["group", "method", "spend", "budget", "share"])
-
-
-def is_single_condition(method: str, cells: Sequence[CellRuns]) -> bool:
-    """Whether a method is the learner's conditions together, and on these cells one of them."""
-    return method.startswith(known.TOGETHER) and len({cell.label for cell in cells}) == 1

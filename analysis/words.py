@@ -147,11 +147,6 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def plural(count: float, thing: str) -> str:
-    """``1 run``, ``20 runs``."""
-    return f"{number(count)} {thing}{'' if count == 1 else 's'}"
-
-
 def capital(text: str) -> str:
     """A text with a capital first letter."""
     return text[:1].upper() + text[1:]

@@ -115,13 +115,13 @@ def test_claims_are_counted_by_verdict():
     ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
     assert counts(entries.verdict) == numbers
-    assert verdicts.mostly_undecided(entries)  # two of four
-    assert not verdicts.mostly_undecided(entries[:-1])
-    assert verdicts.in_words(entries[:-1]) == (
+    half = verdicts.verdicts_in_words(entries)
+    assert half.startswith("Too little to judge the paper: of 4 claims 2 are undecided")
+    assert verdicts.verdicts_in_words(entries[:-1]) == (
         "Supported: the posture depends on the next goal. Undecided: the reward for the whole task "
         "makes the difference. Of 1 other claim: not supported 1."
     )
-    assert verdicts.in_words(entries[:1]) == (
+    assert verdicts.verdicts_in_words(entries[:1]) == (
         "In its main point, yes: the posture depends on the next goal."
     )
 
@@ -393,7 +393,7 @@ def test_the_shortest_reach():
     task = load_task("ascending")
     alone = corrective_trial(task, "RRR").configurations
     lengths = [
-        shortest_reach(task, q, "right", goal, alone[goal - 1], starts=2)
+        shortest_reach(task, q, "right", goal, alone[goal - 1])
         for goal, q in ((1, task.q0), (2, alone[0]))
     ]
     assert lengths[0] == pytest.approx(1.4)

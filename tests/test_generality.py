@@ -13,7 +13,7 @@ from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.study import one_by_one
 from coartic.analysis.tables import TABLES
 from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
-from coartic.analysis.topics.families.instances import references, signs, solved
+from coartic.analysis.topics.families.instances import best_of_instances, signs, solved
 from coartic.tasks.families import instances_in
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -78,8 +78,8 @@ def test_gaps_are_between_the_best_known_and_the_bound():
     name = "two-armed/v1/i000"
     gap, to_bound = on(study, name, EC4)
     assert (gap.mean(), to_bound.mean()) == pytest.approx((40 / 500, 90 / 450))
-    assert not references(study)[name].proven
-    assert references(study)["two-armed/v1/i001"].proven
+    assert not best_of_instances(study)[name].proven
+    assert best_of_instances(study)["two-armed/v1/i001"].proven
     assert on(study, name, EC1) is None
     assert (on(study, name, "learner")[0] == gap).all()
     assert list(solved(study).family.unique()) == [*ONE, *TWO]
@@ -88,9 +88,9 @@ def test_gaps_are_between_the_best_known_and_the_bound():
 def test_a_method_that_beats_the_search_makes_the_best_known():
     """Never a gap below 0, and it is counted."""
     study = rewarded({**RISING, EC4: lambda n: -480 if n == 2 else -540})
-    assert references(study)["long/v1/i002"].reward == -476
+    assert best_of_instances(study)["long/v1/i002"].reward == -476
     assert on(study, "long/v1/i002", EC4)[0].min() == 0
-    assert sum(of.reward > BEST for of in references(study).values()) == 2
+    assert sum(of.reward > BEST for of in best_of_instances(study).values()) == 2
     assert on(rewarded(RISING, optima=False), "long/v1/i002", EC4)[1] is None
 
 

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.methods import EC1, PLACEBO
 from coartic.analysis.signatures import context_tests, subtasks
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
-from coartic.analysis.signatures.manifold import motor_equivalence, movable, subspaces
+from coartic.analysis.signatures.manifold import motor_equivalence, movable
 from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.solutions import Solutions
@@ -188,7 +189,7 @@ def test_parts_of_two_contexts():
     """Mean postures that differ by self-motion: the hand stays, which its Jacobian tells."""
     task, q = load_task("ascending"), posture(1.0, right_1=0.4, right_2=-0.5, right_3=0.6)
     joints = movable(task, "right")
-    null, _ = subspaces(task.robot.jacobian(q, "right")[:, joints])
+    null = linalg.null_space(task.robot.jacobian(q, "right")[:, joints])
     noise = 1e-4 * rng(3).standard_normal((6, 10))
     moved = np.array(q)
     moved[joints] += 0.02 * null[:, 0]

@@ -117,7 +117,7 @@ def test_crossings_by_brute_force():
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
         assert (crossing.low, crossing.high) == resampled_ends(spends, level)
-    steps, shares = running_times.ecdf(spends)
+    steps, shares = running_times.share_by_budget(spends)
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
     assert running_times.share_reached(spends) == pytest.approx(share(1e300))

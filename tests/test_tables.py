@@ -102,15 +102,15 @@ def test_ranking(study):
 
 def test_methods(study):
     shown = ["runs", "solved", "reward", "reward_sd", "gap", "hands", "trials",
-             "forward_kinematics", "told", "corrections", "other_arm"]  # fmt: skip
+             "forward_kinematics"]  # fmt: skip
     sd = math.sqrt((2**2 + 1**2 + 3**2) / 2)
     expected = {
-        f"{ONE} {CMA}": (3, 3, -293.0, 0.0, 1 / 292, "LRLR 3", 100, 1e5, "AT", 0, "still"),
-        f"{ONE} {PLAN}": (1, 1, -296.0, NONE, 4 / 292, "LRLR", 0, 500, "KR", 0, "still"),
-        f"{ONE} {EC1}": (3, 3, -302.0, sd, 10 / 292, "LRLR 3", 1000, 1e6, "AT", 0, "still"),
-        f"{TWO} {CMA}": (3, 3, -470.0, 0.0, 5 / 465, "LRLR 3", 100, 1e5, "AT", 0, "still"),
-        f"{TWO} {EC4}": (3, 3, -480.0, 0.0, 15 / 465, "LRLR 3", 1000, 1e6, "AT", 0, "still"),
-        f"{TWO} {PLAN}": (1, 1, -500.0, NONE, 35 / 465, "LRLR", 0, 500, "KR", 0, "still"),
+        f"{ONE} {CMA}": (3, 3, -293.0, 0.0, 1 / 292, "LRLR 3", 100, 1e5),
+        f"{ONE} {PLAN}": (1, 1, -296.0, NONE, 4 / 292, "LRLR", 0, 500),
+        f"{ONE} {EC1}": (3, 3, -302.0, sd, 10 / 292, "LRLR 3", 1000, 1e6),
+        f"{TWO} {CMA}": (3, 3, -470.0, 0.0, 5 / 465, "LRLR 3", 100, 1e5),
+        f"{TWO} {EC4}": (3, 3, -480.0, 0.0, 15 / 465, "LRLR 3", 1000, 1e6),
+        f"{TWO} {PLAN}": (1, 1, -500.0, NONE, 35 / 465, "LRLR", 0, 500),
     }
     same(TABLES["methods"](study), {
         name: dict(zip(shown, cells, strict=True)) for name, cells in expected.items()

@@ -93,11 +93,6 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     return {label: given[label] for label in dict.fromkeys(labels)}
 
 
-def column_width(inches: float) -> float:
-    """Width in inches of a figure that needs so many: one column or two."""
-    return ONE if inches <= ONE else TWO
-
-
 def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
     """Rows and columns of so many panels; two or three columns by default."""
     columns = min(columns or (2 if panels <= 6 else 3), panels)
@@ -203,7 +198,7 @@ def curve(name: str, *artists: Artist) -> None:
         artist.set_gid(f"{CURVE}{name};{artist.get_gid() or ''}")
 
 
-def entry(label: str, **line: Any) -> Line2D:
+def legend_line(label: str, **line: Any) -> Line2D:
     """What a legend says of a line or mark that looks so."""
     return Line2D([], [], label=label, **line)
 

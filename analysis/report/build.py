@@ -13,14 +13,14 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
-from coartic.analysis.report.render import TONES, csv_table, html_table, latex_table
+from coartic.analysis.report.render import TONES, html_table, latex_table
 from coartic.analysis.sections import FIGURES, SECTIONS
 from coartic.analysis.study import Study, cached
 from coartic.analysis.tables import TABLES
@@ -46,7 +46,7 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
     for name, table in TABLES.items():
         frame = table(study)
         if len(frame):
-            files[f"tables/{name}.csv"] = csv_table(frame).encode()
+            files[f"tables/{name}.csv"] = frame.to_csv(lineterminator="\n").encode()
             if for_paper:
                 caption = captions.get(name) or name.replace("-", " ").capitalize()
                 notes = about.notes_of(study, frame.columns)
@@ -131,31 +131,30 @@ def sections(study: Study) -> list[dict[str, Any]]:
 
 
 @cache
-def templates(*, escape: bool) -> Environment:
-    """The templates beside this file; ``escape``: for HTML."""
+def template(name: str) -> Template:
+    """A template beside this file; texts that it shows are escaped where it is of HTML."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         undefined=StrictUndefined,
-        autoescape=escape,
+        autoescape=name.endswith(".html.jinja"),
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
         finalize=lambda value: about.shown(value) if type(value) is str else value,
     )
     environment.filters |= {"number": number, "listed": listed, "inert": inert}
-    return environment
+    return environment.get_template(name)
 
 
 def page(study: Study) -> str:
     """The page of HTML, which needs no other file and no network."""
     here = Path(__file__).parent
-    template = templates(escape=True).get_template("page.html.jinja")
     scripts = [(here / name).read_text("utf-8") for name in ("page.js", "address.js")]
     try:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
         links = []
-    return template.render(
+    return template("page.html.jinja").render(
         title=title(study),
         description=" ".join(text for _, text in about.answers(study)),
         styles=(here / "page.css").read_text("utf-8") + text_of("play.css"),
@@ -174,15 +173,11 @@ def page(study: Study) -> str:
 
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
-    return (
-        templates(escape=False)
-        .get_template("summary.md.jinja")
-        .render(
-            title=title(study),
-            answers=about.answers(study),
-            provenance=about.provenance(study),
-            figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
-        )
+    return template("summary.md.jinja").render(
+        title=title(study),
+        answers=about.answers(study),
+        provenance=about.provenance(study),
+        figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
     )
 
 

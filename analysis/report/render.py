@@ -1,4 +1,4 @@
-"""Tables as text: CSV, HTML and LaTeX.
+"""Tables as HTML and LaTeX.
 
 :data:`~coartic.analysis.COLUMNS` says how columns are called and formatted. A column that
 ends in ``_low``, ``_high`` or ``_sd`` is shown behind the one that it belongs to.
@@ -35,36 +35,29 @@ FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
 
 
 def column_of(name: str) -> Column:
-    """How a column is shown; those of tasks, families and models go by these."""
+    """How a column is shown; those of tasks and families go by these."""
     kind, _, what = name.partition(" ")
-    if kind == "of":
-        return Column(what)
     if name.startswith("half on "):
         return Column(page=False)
-    if kind in ("on", "in"):
+    if kind in ("on", "in") and what:
         return Column(f"{what.partition('/')[0]} (%)", 1, percent=True)
     return COLUMNS.get(name, Column())
 
 
-def header_of(frame: pd.DataFrame, name: str) -> str:
-    """What stands above a column; a task by its name, with † where it is reconstructed."""
-    if name in (own := frame.attrs.get("headers", {})):
-        return str(own[name])
-    kind, _, task = name.partition(" ")
-    if kind == "on" and (known := frame.attrs.get("tasks", {}).get(task)):
-        return f"{known} (%)"
-    return column_of(name).header or name.replace("_", " ")
-
-
 def columns_of(frame: pd.DataFrame) -> dict[str, str]:
-    """Columns of a table that the page and LaTeX show, with their headers."""
-    headers = {}
+    """Columns of a table that the page and LaTeX show, with their headers.
+
+    A task goes by its name, with † where it is reconstructed.
+    """
+    headers, tasks = {}, frame.attrs.get("tasks", {})
     names = list(frame.columns)
     if "verdict" in names:  # it is what one looks for, also where a screen has room for two columns
         names.insert(1, names.pop(names.index("verdict")))
     for name in names:
         if not name.endswith(_COMPANIONS) and column_of(name).page:
-            header = header_of(frame, name)
+            header = column_of(name).header or name.replace("_", " ")
+            if name.startswith("on ") and name[3:] in tasks:
+                header = f"{tasks[name[3:]]} (%)"
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
             interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
             headers[name] = f"{header}{interval}"
@@ -175,8 +168,3 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
     body = body.replace(begin, f"\\footnotesize\n{FITS}{begin}", 1)
     body = body.replace(end, f"{end}}}{below}", 1)
     return f"{PACKAGES}\n{body}"
-
-
-def csv_table(frame: pd.DataFrame) -> str:
-    """The raw values, with the run ids behind each row."""
-    return str(frame.to_csv(lineterminator="\n"))

@@ -93,7 +93,9 @@ def permutation_p(
     weights, exact = divisions(len(first), len(second), rng, resamples)
     observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
     null = np.concatenate([np.linalg.norm(rows @ pool, axis=1) for rows in weights])
-    return p_value(null, float(np.linalg.norm(observed @ pool)), exact=exact)
+    # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
+    reached = float((null >= float(np.linalg.norm(observed @ pool)) * (1 - 1e-9)).sum())
+    return reached / len(null) if exact else (1 + reached) / (1 + len(null))
 
 
 def divisions(
@@ -122,15 +124,6 @@ def divisions(
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Numbers of the runs in a group, drawn without replacement ``size`` times, (size, chosen)."""
     return rng.random((size, runs)).argpartition(chosen - 1, axis=1)[:, :chosen]
-
-
-def p_value(null: Array, observed: float, *, exact: bool) -> float:
-    """Share of permutations ``(m,)`` with so large a statistic or a larger one, 0 < p ≤ 1.
-
-    Where permutations are drawn, the observed one counts as one more (Davison & Hinkley 1997).
-    """
-    reached = float((null >= observed * (1 - 1e-9)).sum())
-    return reached / len(null) if exact else (1 + reached) / (1 + len(null))
 
 
 def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:

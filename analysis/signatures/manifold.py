@@ -1,4 +1,4 @@
-"""What differs in joint space, by whether the hand feels it.
+"""Split posture differences into parts that move the hand and parts that do not.
 
 The Jacobian of the hand divides joint space into its nullspace, in which displacements
 leave the hand where it is to first order (the uncontrolled manifold, linearised), and the
@@ -22,18 +22,11 @@ def movable(task: Task, hand: Hand) -> Array:
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
-def subspaces(jacobian: Array) -> tuple[Array, Array]:
-    """Orthonormal bases of nullspace and of its complement, ``(k, d)`` each.
-
-    ``jacobian`` has shape ``(2, k)``: the columns of the joints that can move.
-    """
-    return linalg.null_space(jacobian), linalg.orth(jacobian.T)
-
-
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """The motor-equivalent and the other part of a difference between configurations.
 
-    ``difference`` has shape ``(k,)``, length unit and rad mixed. Each part, ≥ 0, is its length
+    ``difference`` has shape ``(k,)``, length unit and rad mixed; ``jacobian`` ``(2, k)``, of the
+    joints that can move. Each part, ≥ 0, is its length
     over the root of the dimension of its space, so that a difference in a random direction has
     equal parts. A difference between contexts is motor-equivalent where the first exceeds the
     second: the same subgoal reached by another posture. Caveat: hits of one disc bound the
@@ -43,6 +36,6 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     """
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
-        for basis in subspaces(jacobian)
+        for basis in (linalg.null_space(jacobian), linalg.orth(jacobian.T))
     )
     return equivalent, other

@@ -34,7 +34,7 @@ def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
     return values[order], np.concatenate(weights)[order], runs
 
 
-def ecdf(times: RunningTimes) -> tuple[Array, Array]:
+def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
     """Budgets at which the share of targets reached rises, and the share from there on."""
     values, weights, _ = pairs(times)
     last = np.append(values[1:] != values[:-1], True)[: len(values)]
@@ -64,18 +64,12 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
         return Estimate(budget(weights))
     rng = np.random.default_rng(SEED)
     resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
-    drawn = np.concatenate([times_drawn(size, resamples, rng) for size in sizes], axis=1)
+    # How often each run is drawn: a byte each, as there may be many runs; none is drawn 256 times.
+    drawn = np.empty((resamples, sum(sizes)), dtype=np.uint8)
+    for of_task in np.split(drawn, np.cumsum(sizes)[:-1], axis=1):
+        size = of_task.shape[1]
+        for row in of_task:
+            row[:] = rng.multinomial(size, np.full(size, 1 / size))
     budgets = [budget(weights * counts[runs]) for counts in drawn]
     low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
     return Estimate(budget(weights), float(low), float(high))
-
-
-def times_drawn(size: int, resamples: int, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """How often each of so many runs is drawn in each resample, shape ``(resamples, size)``.
-
-    A byte each, as there may be many runs: none is drawn 256 times.
-    """
-    shares, drawn = np.full(size, 1 / size), np.empty((resamples, size), dtype=np.uint8)
-    for row in drawn:
-        row[:] = rng.multinomial(size, shares)
-    return drawn

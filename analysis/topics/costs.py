@@ -158,7 +158,7 @@ def draw_costs(study: Study) -> Parts:
     style.letters(panels)
     ends = data[data.spend == spends[-1]].groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share)
-    entries = [style.entry(name_in(study, label), **look) for label, look in looks.items()]
+    entries = [style.legend_line(name_in(study, label), **look) for label, look in looks.items()]
     style.legend(drawing, entries, 3)
     shares = spoken(ends, "{method} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
@@ -175,7 +175,7 @@ def ecdf_curves(study: Study) -> pd.DataFrame:
     for label in methods.in_order(shown_methods(study, runtimes(study).index)):
         for spend in PANELS:
             if (label, spend) in costs(study):
-                budget, share = running_times.ecdf(costs(study)[label, spend])
+                budget, share = running_times.share_by_budget(costs(study)[label, spend])
                 count = min(len(budget), ECDF_STEPS)
                 at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
                 rows = {"budget": budget[at], "share": share[at]}

@@ -94,11 +94,11 @@ def draw_learning(study: Study) -> Parts:
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
-        style.entry(name_in(study, label), linewidth=1.3, **look)
+        style.legend_line(name_in(study, label), linewidth=1.3, **look)
         for label, look in looks_in(study, labels).items()
     ]
-    handles += [style.entry("initial solution", **style.INITIAL)]
-    handles += [style.entry(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
+    handles += [style.legend_line("initial solution", **style.INITIAL)]
+    handles += [style.legend_line(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")

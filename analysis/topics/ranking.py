@@ -21,7 +21,8 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import capital, interval, marked, number, p_value, plural
+from coartic.analysis.words import capital, interval, marked, number, p_value
+from coartic.text import counted
 
 TRIES = *methods.PLACEBOS, "corrective-alone/every"
 """Methods that take the best of their trials: they learn nothing from one for the next."""
@@ -278,7 +279,7 @@ def from_files(study: Study) -> str:
         if learner and math.isnan(row["better"]):
             text += "; the runs are too few, or too alike, to tell it from the learner"
         elif learner:
-            text += f"; against the learner it is better on {plural(row['better'], 'task')}"
+            text += f"; against the learner it is better on {counted(int(row['better']), 'task')}"
             text += f" and worse on {number(row['worse'])}"
         text += "."
     more = len(rows) - MOST_FOREIGN

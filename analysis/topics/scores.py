@@ -31,25 +31,12 @@ from coartic.analysis.words import marked, tally
 from coartic.method import Information
 from coartic.robot import Array
 
-TOLD_LETTERS = {
-    Information.GOALS: "G",
-    Information.FORWARD_KINEMATICS: "F",
-    Information.JACOBIAN: "J",
-    Information.CORRECTIVE_PROCESS: "A",
-    Information.REWARD_BY_TRIAL: "T",
-    Information.REWARD_BY_SUBTASK: "U",
-    Information.KINEMATIC_MODEL: "K",
-    Information.REWARD_FORMULA: "R",
-    Information.SECONDARY_OBJECTIVES: "S",
-}
-"""A letter for each kind of information, in the order in which the tables show them."""
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",
     "using the reward as a formula",
     "not using the reward",
 )
 """What methods are told of the reward and make use of."""
-STILL = 1e-9  # rad of joint travel that a solver's rounding leaves
 
 
 @cached
@@ -141,12 +128,6 @@ def is_compared(study: Study, label: str) -> bool:
     return shown and not is_search(label)
 
 
-def told(runs: pd.DataFrame) -> str:
-    """A letter for each kind of information that runs were told (:data:`TOLD_LETTERS`)."""
-    names = set(", ".join(runs.told.unique()).split(", "))
-    return "".join(letter for item, letter in TOLD_LETTERS.items() if item.value in names)
-
-
 @cached
 def groups(study: Study) -> dict[str, str]:
     """Which of :data:`GROUPS` each method belongs to.
@@ -157,9 +138,9 @@ def groups(study: Study) -> dict[str, str]:
     of_label = {}
     for label in dict.fromkeys(label for _, label in study.cells):
         runs = pd.concat([cell.runs for key, cell in study.cells.items() if key[1] == label])
-        letters = told(runs)
-        learns = TOLD_LETTERS[Information.REWARD_BY_TRIAL] in letters and (runs.trials > 1).any()
-        by_formula = TOLD_LETTERS[Information.REWARD_FORMULA] in letters
+        told = ", ".join(runs.told.unique()).split(", ")
+        learns = Information.REWARD_BY_TRIAL.value in told and (runs.trials > 1).any()
+        by_formula = Information.REWARD_FORMULA.value in told
         of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
     together = {name: EC1 for name in labels_by_task(study) if name not in of_label}
     return of_label | {name: of_label[label] for name, label in together.items()}
@@ -208,16 +189,14 @@ def floats(values: pd.Series) -> Array:
 
 
 @table(
-    "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, told, "
-    "corrections, jacobians, movement_ticks, other_arm, median_run",
+    "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, "
+    "median_run",
 )
 def methods(study: Study) -> Rows:
     """Every method on every task: mean reward, gap, hands and what a run spends (medians).
 
     Within a task searches for the optimum come first, then the highest mean reward.
-    ``corrections``: corrective movements in all solutions; ``other_arm``: whether the arm that is
-    not chosen keeps ``still`` in all solutions or ``moves``; ``median_run``: beginning of the id of
-    the run whose reward is nearest the median.
+    ``median_run``: beginning of the id of the run whose reward is nearest the median.
     """
     cells = [cell for cell in study.cells.values() if cell.task in one_by_one(study)]
     places = list(study.tasks)
@@ -237,14 +216,10 @@ def methods(study: Study) -> Rows:
             "reward_sd": standard_deviation(cell.rewards),
             "gap": cell_gap(study, cell),
             "hands": hands if len(good) > 1 else "".join(good.hands),
-            "told": told(runs),
-            "corrections": int(good.solution_corrections.sum()),
+            "trials": median(runs.trials),
+            "forward_kinematics": median(runs.forward_kinematics),
             "solve_s": median(solve_times(good)),
         }
-        spent = ("trials", "forward_kinematics", "jacobians", "movement_ticks")
-        row |= {name: median(runs[name]) for name in spent}
         if len(good):
-            still = (floats(good.other_arm_travel) <= STILL).all()
-            row["other_arm"] = "still" if still else "moves"
             row["median_run"] = str(good.run_id.iloc[typical_run(cell)])[:SHORT_ID]
         yield f"{cell.task} {cell.label}", row | runs_of(cell)

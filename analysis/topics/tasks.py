@@ -87,9 +87,8 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         0.42,
     )
     size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
-    drawing, panels = style.panels(
-        (rows, columns), (style.column_width(size[0]), size[1]), len(tasks)
-    )
+    size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
+    drawing, panels = style.panels((rows, columns), size, len(tasks))
     drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0)
@@ -109,11 +108,11 @@ def draw_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_ylabel("y (length unit)")
     hands = {hand for task in tasks for hand in task.hands}
     arms = [
-        style.entry(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
+        style.legend_line(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
         for hand, look in MARKERS.items()
         if hand in hands
     ]
     circle: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
-    goal = style.entry("goal", linestyle="", color=style.INK, **circle)
+    goal = style.legend_line("goal", linestyle="", color=style.INK, **circle)
     style.legend(drawing, [*arms, goal], 3)
     return drawing

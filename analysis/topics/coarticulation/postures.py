@@ -20,8 +20,9 @@ from coartic.analysis.topics.coarticulation.placebo import difference
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.coarticulation.tables import contexts
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import number, p_value, plural
+from coartic.analysis.words import number, p_value
 from coartic.drawing import MARKERS
+from coartic.text import counted
 
 _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
 
@@ -110,7 +111,7 @@ def next_goal(study: Study) -> str:
     if contrast is None:
         return ""
     shared, placebo = contrast.contexts, contrast.placebo
-    goal, runs = shared.goal, plural(shared.n, "run")
+    goal, runs = shared.goal, counted(shared.n, "run")
     who = f"{name_of(shared.method)} hits goal {goal} in postures"
     spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
     p = ", ".join(filter(None, (runs, p_value(shared.p))))

@@ -18,7 +18,7 @@ from coartic.tasks.optima import KnownOptimum
 
 
 @cached
-def references(study: Study) -> dict[str, KnownOptimum]:
+def best_of_instances(study: Study) -> dict[str, KnownOptimum]:
     """What solutions of each instance of a family are measured by, where there is any."""
     known = study.best_known
     drawn = [name for name, task in study.tasks.items() if task.family is not None]
@@ -37,7 +37,7 @@ def solved(study: Study) -> pd.DataFrame:
     labels = [label for label in dict.fromkeys(label for _, label in study.cells)
               if not label.startswith(SEARCH)]  # fmt: skip
     rows = []
-    for name, best in references(study).items():
+    for name, best in best_of_instances(study).items():
         for shown in ("learner", *labels):
             label = most_exploring(study.tasks[name]) if shown == "learner" else shown
             cell = study.cells.get((name, label))
@@ -73,7 +73,8 @@ def best_by_hands(study: Study) -> dict[str, dict[str, int]]:
     best: dict[str, dict[str, int]] = {name: {} for name in drawn}
     for task, of_task in every.groupby("task"):
         if task in best:
-            best[str(task)] = of_task.groupby("hands").reward.max().astype(int).to_dict()
+            highest = of_task.groupby("hands").reward.max()
+            best[str(task)] = {str(hands): int(highest[hands]) for hands in highest.index}
     return best
 
 
@@ -91,7 +92,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     value for each run that has one. A sign without any is left out.
     """
     by_cell = {}
-    for name in references(study):
+    for name in best_of_instances(study):
         for label in (*LEARNERS, PLACEBO):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
@@ -107,7 +108,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
 def signs_by_family(study: Study, label: str, sign: str) -> Scores:
     """A sign of a condition by family, of the instances that have a value."""
     scores: dict[str, list[tuple[Array]]] = {}
-    for name in references(study):
+    for name in best_of_instances(study):
         values = signs(study).get((name, label), {}).get(sign)
         if values is not None:
             scores.setdefault(str(study.tasks[name].family), []).append((values,))

@@ -35,8 +35,8 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.families.instances import (
     THERE,
     best_by_hands,
+    best_of_instances,
     by_family,
-    references,
     signs_by_family,
     solved,
 )
@@ -69,7 +69,7 @@ def family_gaps(study: Study) -> Rows:
     every = solved(study)
     two_armed = {
         str(study.tasks[name].family)
-        for name in references(study)
+        for name in best_of_instances(study)
         if len(study.tasks[name].hands) > 1
     }
     rows: list[tuple[str, Row]] = []
@@ -130,10 +130,10 @@ def exploration(study: Study) -> Rows:
     """
 
     def share(cell: CellRuns) -> Array:
-        return -gap_share(cell.rewards, references(study)[cell.task].reward)
+        return -gap_share(cell.rewards, best_of_instances(study)[cell.task].reward)
 
     def share_by_hands(cell: CellRuns) -> Array:
-        best_of, best = best_by_hands(study)[cell.task], references(study)[cell.task].reward
+        best_of, best = best_by_hands(study)[cell.task], best_of_instances(study)[cell.task].reward
         return np.array([best_of[str(hands)] for hands in cell.good.hands]) / abs(best)
 
     for first, second in CONTRASTS:
@@ -254,7 +254,7 @@ def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: s
 
 def on_random_tasks(study: Study) -> str:
     """How far the nearest methods end from the best known reward, over families with two arms."""
-    best = references(study).values()
+    best = best_of_instances(study).values()
     gaps = family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
     if not len(gaps):
         return ""

@@ -12,20 +12,13 @@ from coartic.analysis.signatures.manifold import movable
 from coartic.analysis.statistics.estimates import SEED
 from coartic.robot import Array
 
-STARTS = 8
-"""Random starts of the search for the shortest reach, beside the given one."""
-SPREAD = 0.3
-"""SD of the random starts about the given one: length unit, rad."""
 
-
-def shortest_reach(
-    task: Task, q: Array, hand: Hand, goal: int, guess: Array, *, starts: int = STARTS
-) -> float:
+def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) -> float:
     """Least joint-space distance from ``q`` to a configuration that hits a goal.
 
     ``goal`` counts from 1; ``guess`` is a configuration near one that hits it, shape
     ``(dof,)``. Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints
-    that can move the hand, from ``guess`` and random starts about it: the best local minimum,
+    that can move the hand, from ``guess`` and eight random starts about it: the best local minimum,
     so at least as long as the global one. Infinite where none is found. Length unit and rad
     mixed.
     """
@@ -50,7 +43,7 @@ def shortest_reach(
     first = (guess - q)[joints]
     rng = np.random.default_rng(SEED)
     best = math.inf
-    for start in (first, *(first + rng.normal(0, SPREAD, (starts, len(joints))))):
+    for start in (first, *(first + rng.normal(0, 0.3, (8, len(joints))))):
         reach = optimize.minimize(
             lambda change: (change @ change, 2 * change),
             start,

@@ -9,7 +9,8 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.topics.paper.rewards import beside_paper
-from coartic.analysis.words import capital, listed, plural
+from coartic.analysis.words import capital, listed
+from coartic.text import counted
 
 
 def papers_claims(study: Study) -> pd.DataFrame:
@@ -34,13 +35,14 @@ def claims(study: Study) -> Rows:
         yield claim.id, {**judged, **row}
 
 
-def mostly_undecided(judged: pd.DataFrame) -> bool:
-    """Whether half of the claims are undecided: they lack runs or trials."""
-    return 2 * counts(judged.verdict)["undecided"] >= len(judged)
-
-
-def in_words(judged: pd.DataFrame) -> str:
-    """The verdicts on the claims that carry the paper's point, and how many others have each."""
+def verdicts_in_words(judged: pd.DataFrame) -> str:
+    """Verdicts on the claims that carry the paper's point, and how many others have each."""
+    n = counts(judged.verdict)
+    if 2 * n["undecided"] >= len(judged):  # they lack runs or trials
+        return (
+            f"Too little to judge the paper: of {len(judged)} claims {n['undecided']} are "
+            f"undecided, {n['supported']} supported. Tasks, methods, runs or trials are missing."
+        )
     central: dict[str, list[str]] = {}
     for name, verdict in judged.verdict.items():
         if short := CLAIMS[str(name)].short:
@@ -55,7 +57,7 @@ def in_words(judged: pd.DataFrame) -> str:
     if list(central) == ["supported"]:
         words = [f"In its main point, yes: {listed(central['supported'])}."]
     each = ", ".join(f"{verdict} {count}" for verdict, count in of_others if count)
-    words += [f"Of {plural(len(others), 'other claim')}: {each}."] * bool(each)
+    words += [f"Of {counted(len(others), 'other claim')}: {each}."] * bool(each)
     return " ".join(words)
 
 
@@ -64,11 +66,5 @@ def claims_hold(study: Study) -> str:
     judged = papers_claims(study)
     if judged.empty:
         return ""
-    n, text = counts(judged.verdict), in_words(judged)
-    if mostly_undecided(judged):
-        text = (
-            f"Too little to judge the paper: of {len(judged)} claims {n['undecided']} are "
-            f"undecided, {n['supported']} supported. Tasks, methods, runs or trials are missing."
-        )
     failed = (cell for cells in judged.failed for cell in cells)
-    return text + failed_runs(study, failed, ", which leaves claims undecided")
+    return verdicts_in_words(judged) + failed_runs(study, failed, ", which leaves claims undecided")
