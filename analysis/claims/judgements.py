@@ -1,7 +1,8 @@
 """The paper's claims judged on a results folder: tests corrected together, one verdict each.
 
 - *Supported*: what the claim says is seen, and the largest p-value of its tests, which must all
-  hold (intersection-union test), is below 5 % after Holm's correction.
+  hold (intersection-union test), is below 5 % after Holm's correction; tests over random tasks
+  also without the task that speaks most for the claim.
 - *Not supported*: it is not seen, and the opposite of one of its tests is significant (smallest
   p-value of the opposites times their number, below 5 % after Holm's correction).
 - *Depends on the goals*: it would be supported at our goals, but at most half of the sets of goals
