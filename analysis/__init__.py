@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
     from coartic.analysis.pages import fill_page
+    from coartic.analysis.running_times import runtimes
     from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.signatures.two_contexts import TwoContexts
@@ -20,13 +21,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SIGNS", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps", "interval",
-    "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking",
+    "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking", "runtimes",
 ]  # fmt: skip
 
 _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
     "pages": ("fill_page",),
+    "running_times": ("runtimes",),
     "signatures.context_tests": ("beyond_p",),
     "signatures.signs": ("SIGNS",),
     "signatures.two_contexts": ("TwoContexts",),

@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.analysis.runtimes import runtimes
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
     from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
@@ -70,12 +69,10 @@ __all__ = [
     "objective",
     "parse_task",
     "problems",
-    "runtimes",
     "trajectory",
 ]
 
 _HOMES = {
-    "analysis.runtimes": ("runtimes",),
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
     "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),

@@ -193,7 +193,7 @@ class Objective:
         shape of ``targets``, ticks; infinite for targets that are not reached so far."""
         wanted = real_array("targets", targets)
         evaluations, costs = np.array([*self._better, (np.inf, -np.inf)]).T
-        found = evaluations[np.searchsorted(-costs, -wanted)]
+        found = evaluations[np.searchsorted(-costs, -np.nan_to_num(wanted, nan=-np.inf))]
         return float(found) if wanted.ndim == 0 else found
 
     @property

@@ -27,7 +27,11 @@ ALLOWED = {
 }
 # The command line sits on top of all four; nothing imports it.
 COMMAND_LINE = ("coartic/cli/", "coartic/__main__.py")
-FRONT_DOOR = "coartic/__init__.py"  # which hands out functions of all of them
+BY_NAME = {
+    "coartic/__init__.py": "the API, whose names are at home in coartic (the test below)",
+    "coartic/runs/card.py": "the code of a method, which can be anybody's",
+}
+"""Modules of ``coartic`` that import by a name that only running shows, and what."""
 
 
 def sources():
@@ -64,9 +68,22 @@ def test_imports_point_one_way():
         relative = path.relative_to(ROOT).as_posix()
         package = relative.split("/")[0]
         others = {package_of(name) for name in imported(path)} & set(PACKAGES) - {package}
-        if not relative.startswith((*COMMAND_LINE, FRONT_DOOR)):
+        if not relative.startswith(COMMAND_LINE):
             assert others <= ALLOWED[package], path
             assert not any(name.startswith("coartic.cli") for name in imported(path)), path
+
+
+def test_coartic_imports_nothing_above_by_name():
+    """Nor by a function that imports what it is told."""
+    by_name = re.compile(r"import_module|__import__|importlib\.util|^def __getattr__", re.MULTILINE)
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in sorted((ROOT / "coartic").rglob("*.py"))
+        if by_name.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == {*BY_NAME}
+    homes = {home.split(".")[1] for home in importlib.import_module("coartic").HOME.values()}
+    assert not homes & {"analysis", "baselines", "benchmarks", "cli"}
 
 
 def module_of(path):

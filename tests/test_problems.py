@@ -59,7 +59,8 @@ def test_the_history_is_that_of_the_costs_one_by_one():
     for target in np.unique(lowest):
         due = np.flatnonzero(lowest <= target)[0]
         assert many.evaluations_to(target) == many.evaluations_to(target + 0.5) == due
-    assert many.evaluations_to([lowest[-1] - 1, lowest[0]]).tolist() == [np.inf, 0]
+    never = [lowest[-1] - 1, np.nan, -np.inf]
+    assert many.evaluations_to([*never, lowest[0]]).tolist() == [np.inf] * 3 + [0]
 
 
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():

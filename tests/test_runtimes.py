@@ -5,8 +5,8 @@ import math
 import pandas as pd
 import pytest
 
-import coartic
 from coartic import CoarticError, load_task
+from coartic.analysis import runtimes
 from coartic.analysis.topics.costs import SPENDS
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -63,7 +63,7 @@ GROUPS = {
 @pytest.mark.parametrize("by", GROUPS)
 @pytest.mark.parametrize("targets", [(0.5,), (0.25, 0.5, 1.0), [n / 20 for n in range(1, 21)]])
 def test_shares_are_those_of_all_pairs(study, by, targets):
-    curves = coartic.runtimes(study, by=by, targets=targets)
+    curves = runtimes(study, by=by, targets=targets)
     assert set(curves.group) == {*GROUPS[by]}
     for (group, method), steps in curves[curves.spend == "trials"].groupby(["group", "method"]):
         for trials in range(6):
@@ -76,39 +76,41 @@ def test_shares_are_those_of_all_pairs(study, by, targets):
     named = set(zip(curves.group, curves.method, strict=True))
     assert named == ran | {(group, PLAN) for group in GROUPS[by]}
     if not by and len(targets) == 20:
-        assert coartic.runtimes(study).equals(curves)
+        assert runtimes(study).equals(curves)
 
 
 def test_budgets_to_a_share(study):
     """Of the targets at half (-305.5 and -570) the first run of ascending hits its own at trial 4,
     the second at 3, and that of two-armed at 3; evaluations are 10 a trial."""
-    curves = coartic.runtimes(study, methods=["own", PLAN], targets=[0.5])
+    curves = runtimes(study, methods=["own", PLAN], targets=[0.5])
     half = curves[curves.share >= 0.5].groupby(["method", "spend"]).budget.min()
     assert half["own"][list(SPENDS)].tolist() == [3.0, 30.0, pytest.approx(0.25 * 3 / 5)]
     assert half[PLAN][list(SPENDS)].tolist() == [0.0, 7.0, 0.25]
-    top = coartic.runtimes(study, targets=[1.0]).groupby("method").share.max()
+    top = runtimes(study, targets=[1.0]).groupby("method").share.max()
     assert (top["own"], top[PLAN]) == (0.25, 0.0)
 
 
 def test_methods_that_are_named_share_their_tasks(study):
     """The learner has runs on one of the two tasks alone."""
-    curves = coartic.runtimes(study, methods=["own", LEARNER], targets=[0.5, 1.0])
+    curves = runtimes(study, methods=["own", LEARNER], targets=[0.5, 1.0])
     for method, steps in curves[curves.spend == "trials"].groupby("method"):
         assert steps.share.max() == share_by_hand([TWO], method, [0.5, 1.0], 5)
     assert {*curves.method} == {"own", LEARNER}
-    assert {*coartic.runtimes(study, by="task", methods=LEARNER).group} == {TWO}
-    assert {*coartic.runtimes(study, methods="null-space control, current goal").method} == {PLAN}
+    assert {*runtimes(study, by="task", methods=LEARNER).group} == {TWO}
+    assert {*runtimes(study, methods="null-space control, current goal").method} == {PLAN}
 
 
 def test_what_cannot_be_shown(study, tmp_path):
-    for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]]):
+    for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]], None):
         with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
-            coartic.runtimes(study, targets=targets)
+            runtimes(study, targets=targets)
     with pytest.raises(CoarticError, match="'genus'; it must be 'task' or 'family'"):
-        coartic.runtimes(study, by="genus")
+        runtimes(study, by="genus")
     with pytest.raises(CoarticError, match="unknown method 'owm'; did you mean 'own'"):
-        coartic.runtimes(study, methods=["owm"])
+        runtimes(study, methods=["owm"])
+    with pytest.raises(CoarticError, match="unknown method '5'"):
+        runtimes(study, methods=[5])
     with pytest.raises(CoarticError, match="no task has a known optimum"):
-        coartic.runtimes(MadeUp(study, optima={}))
+        runtimes(MadeUp(study, optima={}))
     with pytest.raises(CoarticError, match="does not exist"):
-        coartic.runtimes(tmp_path / "nowhere")
+        runtimes(tmp_path / "nowhere")

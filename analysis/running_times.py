@@ -15,6 +15,7 @@ from coartic.analysis.study import Study, load
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.costs import SPENDS, TARGETS, times_of
 from coartic.errors import CoarticError
+from coartic.inputs import brief_value
 from coartic.robot import Array
 from coartic.text import id_named, unknown
 
@@ -64,7 +65,9 @@ def runtimes(
     study = results if isinstance(results, Study) else load(results)
     shares = np.asarray(targets, dtype=np.float64)
     if shares.ndim != 1 or not shares.size or not ((shares > 0) & (shares <= 1)).all():
-        raise CoarticError(f"targets are {list(targets)}: needed are numbers above 0 and up to 1")
+        raise CoarticError(
+            f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
+        )
     if by is not None and by not in get_args(By):
         raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
     cells = {
@@ -72,9 +75,8 @@ def runtimes(
         for method, labels in scores.labels_by_task(study).items()
     }
     called = {name: known.name_of(name) for name in cells}
-    methods = [
-        id_named(name, called) for name in ([methods] if isinstance(methods, str) else methods)
-    ]
+    wanted = [methods] if isinstance(methods, str) else map(str, methods)
+    methods = [id_named(name, called) for name in wanted]
     for name in methods:
         if name not in cells:
             raise CoarticError(unknown("method", name, cells, called))
