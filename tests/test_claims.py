@@ -121,6 +121,9 @@ def test_claims_are_counted_by_verdict():
         "Supported: the posture depends on the next goal. Undecided: the reward for the whole task "
         "makes the difference. Of 1 other claim: not supported 1."
     )
+    assert verdicts.verdicts_in_words(entries.iloc[[0, 1, 3]]).endswith(
+        "Of 2 other claims: not supported 1, without the runs here 1."
+    )
     assert verdicts.verdicts_in_words(entries[:1]) == (
         "In its main point, yes: the posture depends on the next goal."
     )

@@ -37,8 +37,8 @@ from coartic.analysis import (
 HERE = Path(__file__).parent
 PLANNER = "receding-horizon"
 OTHERS = [
-    "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "placebo/guesses",
-    "corrective-alone/given",
+    "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
+    "random-search/climbing", "placebo/guesses", "corrective-alone/given",
 ]  # fmt: skip
 ARMS = ["one arm", "two arms"]
 MANY = ["fourteen-one/v1", "fourteen-two/v1"]
@@ -245,7 +245,7 @@ def draw(table):
             figures.means(axes, rows, y=column, label=arms, **line)
         line |= {"label": f"{arms}, seven", "markerfacecolor": "white"}
         figures.means(panels[2], seven, y="together", **line)
-        for method, dash in (("dual-process", "dotted"), ("cma-es", "dashdot")):
+        for method, dash in (("dual-process", "dotted"), ("cma-es/bandit", "dashdot")):
             for gap in rows.gap[rows.method.str.startswith(method)]:
                 panels[0].axhline(100 * gap, color=color, linestyle=dash, linewidth=1)
     panels[1].axhline(GAIN, color="black", linewidth=0.7, linestyle="dashed")
