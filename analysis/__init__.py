@@ -1,4 +1,4 @@
-"""What stored runs say: estimates, tests, tables, figures. Imports ``coartic`` and reads records.
+"""Read stored runs: estimates, tests, tables, figures. Imports ``coartic`` and reads records.
 
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """
@@ -40,7 +40,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """What is imported when it is asked for: not every command needs all of it."""
+    """Import a name when it is asked for: not every command needs all of them."""
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"coartic.analysis.{home}"), name)

@@ -1,4 +1,4 @@
-"""What to cite: the software, the paper, and the works behind methods, solvers and analysis.
+"""Citations: the software, the paper, and the works behind methods, solvers and analysis.
 
 The works are the entries of ``references.bib``, which are printed as they stand there.
 """

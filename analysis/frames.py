@@ -26,7 +26,7 @@ def check_columns(frame: pd.DataFrame, *names: str) -> None:
 
 
 def gaps(frame: pd.DataFrame) -> pd.Series:
-    """How far each run ends from the best known reward of its task.
+    """Gap of each run to the best known reward of its task.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the analysis knows of the built-in methods: names, looks and the works behind them.
+"""Names and looks of the built-in methods, and the works behind them.
 
 ``methods.toml`` has a row for each. A method of somebody else has none and goes by its id.
 """
@@ -43,7 +43,7 @@ class KnownMethod(FileData):
     name: str
     """Its one name, in figures, tables and sentences."""
     algorithm: str
-    """What it is a form of; a ranking counts algorithms."""
+    """Its algorithm, of which a ranking shows the best form."""
     look: tuple[Color, Dash] | None = None
     """Colour and dash in all figures; None: one that is free."""
     headline: bool = False
@@ -100,7 +100,7 @@ def is_search(label: str) -> bool:
 
 
 def algorithm_of(label: str) -> str:
-    """What a method is a form of; a method without a row is its own algorithm."""
+    """Algorithm of a method; a method without a row is its own."""
     method = label.partition(" ")[0]
     if label.startswith(TOGETHER):
         method = EC4
@@ -126,7 +126,7 @@ def name_of(label: str) -> str:
 
 
 def look_alike(label: str) -> str:
-    """Whose look a method has: the learner over all tasks that of its two-armed condition."""
+    """Label of the method whose look this one has: EC4 for the learner over all tasks."""
     if label == "learner":
         return EC4
     if not label.startswith(TOGETHER):
@@ -136,7 +136,7 @@ def look_alike(label: str) -> str:
 
 
 def main_methods(labels: Iterable[str]) -> list[str]:
-    """Those of ``labels`` that stand for their algorithms, in the order of figures; else all.
+    """Labels that stand for their algorithms, in the order of figures; all if none does.
 
     The learner over all tasks, with the condition that explores most, takes the place of its
     single conditions.

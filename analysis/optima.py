@@ -1,4 +1,4 @@
-"""The optimum of each task: the best reward known, and what is proven about it.
+"""The optimum of each task: the best known reward and the proven bound.
 
 What is shipped is in :mod:`coartic.tasks.optima`. Searches for the optimum in a results folder of
 the user's own count as well, so a table for the user's own task has gaps as soon as the task's
@@ -55,8 +55,8 @@ def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, Kno
 def best_known(
     runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, KnownOptimum]
 ) -> dict[str, KnownOptimum]:
-    """What solutions of each task are measured by: its optimum as it is known, and of an instance
-    of a family at least the best of these runs. Rewards of 0, which leave no gap, do not count."""
+    """Best known reward by task: of an instance of a family at least the best of these runs.
+    Rewards of 0, which leave no gap, do not count."""
     known = dict(optima)
     highest = runs[runs.status == "ok"].groupby("task").reward.max()
     for name, task in tasks.items():

@@ -41,13 +41,13 @@ class Section:
     figure: str = ""
     """Id of the picture."""
     sentence: Callable[[Study], str] | None = None
-    """What was found, where the runs say something: with enough runs, with too few, and how many
-    failed."""
+    """Returns the finding in words, for enough runs and for too few, with the number that failed;
+    empty where the runs say nothing."""
     answer: str = ""
-    """Word before the sentence on the terminal and in the first screen of the page; none: it is
-    not there."""
+    """Word before the sentence on the terminal and on the first screen of the page; empty: it
+    stands on neither."""
     note: str = ""
-    """What a reader must know to read picture and table."""
+    """Explains picture and table."""
     single: bool = True
     """Whether it is about single tasks: left out for many random ones."""
 

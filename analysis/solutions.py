@@ -1,4 +1,4 @@
-"""Solutions of one method on one task, and what they are compared with."""
+"""Executed solutions of one method on one task, and the initial solution."""
 
 from __future__ import annotations
 

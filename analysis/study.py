@@ -38,7 +38,7 @@ CellKey = tuple[str, str]
 
 @dataclass(frozen=True)
 class CellRuns:
-    """One method with parameters on one task, and its runs."""
+    """Runs of one method with its parameters on one task."""
 
     task: str
     method: str
@@ -63,7 +63,7 @@ class CellRuns:
 
 
 def typical_run(cell: CellRuns) -> int:
-    """Index among the solved runs of the one whose reward is nearest to their median."""
+    """Index of the solved run whose reward is nearest to their median."""
     return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())
 
 
@@ -72,7 +72,7 @@ Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
 """Runs of a cell whose solutions are executed again for the signatures."""
 MOST_INSTANCES = 8
-"""Instances that a report has one by one; more are shown together, by family."""
+"""Instances that a report shows singly; more are shown together, by family."""
 
 
 def cached(
@@ -109,7 +109,7 @@ def load(folder: str | Path) -> Study:
 
 
 def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
-    """Stored runs with what is known of their tasks, their parameters and their gaps in columns.
+    """Return stored runs with columns for facts of their tasks, parameters and gaps.
 
     A parameter whose name is that of a stored column is left out: ``trials`` are those made,
     ``hands`` those of the solution.
@@ -138,7 +138,7 @@ class Study:
 
     folder: Path
     plan: Plan
-    """What was asked for."""
+    """Tasks, methods, parameters and number of runs of the suite."""
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     runs: pd.DataFrame

@@ -1,4 +1,4 @@
-"""What makes a function a table of the report, and the words of columns."""
+"""Tables of the report: their decorator, and headers and formats of columns."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHORT_ID = 8
 
 
 class Column(NamedTuple):
-    """How a column is called and shown; ``columns.toml`` says what the fields are."""
+    """Header and format of a column; ``columns.toml`` explains the fields."""
 
     header: str = ""
     digits: int | None = None
@@ -31,7 +31,7 @@ class Column(NamedTuple):
 
 
 COLUMNS = {name: Column(**row) for name, row in read_beside(__file__, "columns").items()}
-"""How columns are called and shown; those that are not here go by their names."""
+"""Headers and formats of columns; other columns go by their names."""
 
 
 def table(

@@ -1,4 +1,4 @@
-"""Is what a results folder says true? Every stored solution is executed again.
+"""Check a results folder: execute every stored solution again.
 
 It needs Python and NumPy, and nothing of coartic. ``python verify.py FOLDER`` opens
 ``FOLDER/runs.sqlite`` and checks of every run that its solution (and of a learner its first and
@@ -228,7 +228,7 @@ def check_rules(task: Any, movements: list[MoveRow]) -> None:
 
 
 class Report(NamedTuple):
-    """What was found."""
+    """Result of the check."""
 
     runs: int  # checked
     movements: int  # executed
@@ -290,7 +290,7 @@ def check_all(db: sqlite3.Connection) -> Report:
 
 
 def schema(db: sqlite3.Connection) -> list[list[str]]:
-    """What the file says of its tables, views, indexes and triggers, without columns of joints."""
+    """Tables, views, indexes and triggers of the file, without columns of joints."""
     rows = db.execute("SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name")
     joint = re.compile(r", (base_[xy]|(left|right)_[0-9]+) REAL")
     of = {"movements": joint, "waypoints": joint}
@@ -306,7 +306,7 @@ def fixed(method: str) -> dict[str, Any]:
 
 
 def other_reading(db: sqlite3.Connection) -> str:
-    """How runs read the paper otherwise than this version does, as ``ties=right``, or nothing."""
+    """Another reading of the paper than this version's, as ``ties=right``, or nothing."""
     for method, *texts in db.execute("SELECT method, model, parameters FROM settings"):
         for text, now in zip(texts, (MODEL, fixed(method)), strict=True):
             for name, value in json.loads(text).items():
@@ -337,7 +337,7 @@ def check_identity(row: Any) -> None:
 
 
 def check_cells(db: sqlite3.Connection) -> Iterator[str]:
-    """What the tables that say which runs are shown, and as what, say otherwise than the runs."""
+    """Cells that show other runs than they say, a sentence each."""
     query = """SELECT position, variant, defaults, cells.parameters AS chosen,
         settings.parameters AS complete, settings.definition AS executed, tasks.definition AS shown,
         settings.code = methods.code AS same_code FROM cells

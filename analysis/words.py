@@ -125,7 +125,7 @@ def interval(
 
 
 def marked(task: Task) -> str:
-    """The one name of a task for people, with † where it is reconstructed (:data:`RECONSTRUCTED`).
+    """Title of a task, with † where it is reconstructed (:data:`RECONSTRUCTED`).
 
     Its title; a variant that shares the title of its task has what is particular besides.
     """

@@ -1,4 +1,4 @@
-"""What a claim is. The paper's are lists in ``claims.py`` of topics ``paper`` and ``families``."""
+"""A claim. The paper's are lists in ``claims.py`` of topics ``paper`` and ``families``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Claim:
     quote: str
     """A few words of the paper by which the place can be found."""
     test: str
-    """How it is judged, in words."""
+    """The test, in words."""
     judge: Callable[[Reader], Finding]
     group: Literal["paper", "beside", "families", "exact"] = "paper"
     """With which claims it is corrected: with those on the paper's seven cells; those that take

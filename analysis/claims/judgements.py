@@ -77,6 +77,6 @@ def with_names(text: str, study: Study) -> str:
 
 
 def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:
-    """How many claims have each verdict; 0 for those that none has."""
+    """Number of claims with each verdict, including 0."""
     numbers = Counter(verdicts)
     return {verdict: numbers[verdict] for verdict in get_args(Verdict)}

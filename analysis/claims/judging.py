@@ -28,7 +28,7 @@ Verdict = Literal["supported", "not supported", "undecided", "depends on the goa
 
 @dataclass(frozen=True)
 class Finding:
-    """What was seen of one claim, before any correction of its tests."""
+    """Evidence and tests of one claim, before any correction."""
 
     holds: bool | None
     """Whether what the claim says is seen; None where that cannot be said."""

@@ -22,7 +22,7 @@ largest excess, so that any other margin can be put in its place."""
 HALFWAY = 0.5
 """Similar to a plan means nearer to it than halfway from the initial solution."""
 TICKS = ROUNDING
-"""What a movement can lose to rounding alone. Every claim about the ticks of single movements has
+"""Ticks that a movement can lose to rounding alone. Every claim about ticks of single movements has
 to show more. Rewards of whole tasks are compared as they are: rounding is the same on both sides.
 Only the sacrifice of the first movement was tested against 1 at first; the claims about the chosen
 arm and the first movement in *overall-reward* were tested against 0. That was changed after results

@@ -1,4 +1,4 @@
-"""What claims read of a results folder, with a record of the runs that each claim has read."""
+"""Access of claims to a results folder, with a record of the runs that each claim read."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ class Measurement:
 
     task: str
     who: str
-    """Whose they are: ``EC2``, ``replay of EC1``, ``initial``, ``random guesses``."""
+    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random guesses``."""
     numbers: Array
     """Shape ``(runs,)``; ``()`` of one number, which is exact."""
     quantity: str = ""
-    """What is measured, in words; empty for rewards."""
+    """The measured quantity, in words; empty for rewards."""
     printed: str = ""
     """The reward that the paper prints, in words; empty where it prints none."""
 
     @property
     def name(self) -> str:
-        """Where they are from."""
+        """Task and method."""
         return f"{self.task}, {self.who}"
 
     @property
@@ -211,7 +211,7 @@ def printed_reward(task: str, label: str) -> str:
 
 
 def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:
-    """What the folder has of some values."""
+    """Return the values that the folder has."""
     for read in reads:
         with suppress(MissingError):
             yield read()

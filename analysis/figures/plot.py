@@ -38,7 +38,7 @@ from coartic.text import one_line
 FORMATS = (".svg", ".pdf", ".png")
 DPI = 300
 MAGNIFIED = 1.3
-"""Of figures on the page: 8 pt in print are as large as its text."""
+"""Enlarges figures on the page, so that their 8 pt are as large as its text."""
 _FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
@@ -57,13 +57,13 @@ class Plot:
     title: str
     caption: str
     alt: str
-    """What is seen, for those who cannot see it."""
+    """Alternative text: describes the figure for people who cannot see it."""
     figure: Figure
     data: pd.DataFrame
-    """What is drawn, tidy: enough to draw it again."""
+    """The drawn numbers as a tidy frame, enough to draw them again."""
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """The picture that a notebook shows."""
         return picture(self.figure, ".png")
 
 
@@ -93,7 +93,7 @@ def figure(
 
 
 def dagger(tasks: Iterable[Task]) -> str:
-    """What the dagger means, for a caption; empty where no task is reconstructed."""
+    """Meaning of the dagger, for a caption; empty where no task is reconstructed."""
     return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
 
 

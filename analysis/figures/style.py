@@ -39,9 +39,9 @@ COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
 BACKGROUND = "#ffffff"
 TIP = "tip:"
-"""How the id of a mark with a :func:`tip` begins."""
+"""Beginning of the id of a mark with a :func:`tip`."""
 CURVE = "curve:"
-"""How the id of what belongs to a :func:`curve` begins."""
+"""Beginning of the id of marks of a :func:`curve`."""
 _COLORS: Mapping[Color, str] = {
     "blue": "#0072b2",
     "sky": "#56b4e9",
@@ -69,7 +69,7 @@ styled = style.context(["default", RC])
 
 
 Look = dict[str, Any]
-"""How the lines of a method are drawn: ``color`` and ``linestyle``."""
+"""Looks of a method's lines: ``color`` and ``linestyle``."""
 
 
 def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]:
@@ -188,7 +188,7 @@ def means(
 
 
 def tip(artist: Artist, text: str) -> None:
-    """What a picture in a page of HTML says when the pointer rests on a mark."""
+    """Set the text that a page of HTML shows when the pointer rests on a mark."""
     artist.set_gid(f"{artist.get_gid() or ''}{TIP}{text}")
 
 
@@ -199,7 +199,7 @@ def curve(name: str, *artists: Artist) -> None:
 
 
 def legend_line(label: str, **line: Any) -> Line2D:
-    """What a legend says of a line or mark that looks so."""
+    """Return an entry for a legend: a line or mark with its label."""
     return Line2D([], [], label=label, **line)
 
 

@@ -1,1 +1,1 @@
-"""The report of a results folder: a document, and what it is rendered to."""
+"""The report of a results folder: its page, tables and summary."""

@@ -1,4 +1,4 @@
-"""What a folder answers, what its runs cannot show, and what they were made with."""
+"""Answers of a folder, the limits of its runs, and the code that made them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def visible_sections(study: Study) -> list[Section]:
 
 @cached
 def sentences(study: Study) -> dict[str, str]:
-    """What was found, by the section's id; without sections whose runs say nothing."""
+    """Sentences of findings by the section's id; sections without one are left out."""
     visible = visible_sections(study)
     texts = {each.id: each.sentence(study) for each in visible if each.sentence is not None}
     return {name: shown(text) for name, text in texts.items() if text}
@@ -42,7 +42,7 @@ def answers(study: Study) -> list[tuple[Section, str]]:
 
 @cached
 def limits(study: Study) -> dict[str, Any]:
-    """What the results cannot show, as far as it depends on the folder."""
+    """Facts that limit the conclusions from these runs."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     learners = [cell for cell in study.cells.values() if cell.method.startswith(LEARNER)]
@@ -69,7 +69,7 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """What must stand beside numbers of these columns wherever they are copied."""
+    """Notes that belong to numbers of these columns."""
     unproven, columns = limits(study)["unproven"], set(columns)
     if not unproven or not columns & {"gap", "optimum"}:
         return []
@@ -77,7 +77,7 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
 
 
 def notes_on_tables(study: Study) -> str:
-    """What a reader of the CSV files must know, a line each."""
+    """Notes for readers of the CSV files, a line each."""
     tasks = [study.tasks[name] for name in sorted(one_by_one(study), key=list(study.tasks).index)]
     daggers = (
         [f"{RECONSTRUCTED} ({listed(map(marked, their))})"]
@@ -95,7 +95,7 @@ def notes_on_tables(study: Study) -> str:
 
 @cached
 def provenance(study: Study) -> dict[str, Any]:
-    """Which runs, how many, made with what and when."""
+    """Suite, folder, seed, version, commit and date of the runs, and their number."""
     made_with = study.made_with
     return {
         "suite": study.suite,

@@ -1,7 +1,7 @@
 """The figure to play with, of `coartic play`, with the runs of a folder.
 
-It begins with the runs as they are stored, whose movements it executes again; who moves a goal has
-the learner, or another one, answer anew.
+It begins with the stored runs, whose movements it executes again. When a goal is moved, the learner
+or another method answers anew.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def shortened(task: Task, made: Execution) -> tuple[Movement, ...]:
 
 
 def rounded(movement: Movement, q0: Array, digits: int) -> Movement:
-    """A movement with so many decimals; what stands as at the start still does."""
+    """Round the target to so many decimals; joints that keep their start value stay exact."""
     target = movement.target
     if target is None:
         return movement

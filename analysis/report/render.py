@@ -31,11 +31,11 @@ TONES = {
 PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
 FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
-"""Makes what follows as wide as the text where it is wider."""
+"""Shrinks a table that is wider than the text."""
 
 
 def column_of(name: str) -> Column:
-    """How a column is shown; those of tasks and families go by these."""
+    """Header and format of a column; columns of tasks and families go by their names."""
     kind, _, what = name.partition(" ")
     if name.startswith("half on "):
         return Column(page=False)
@@ -65,7 +65,7 @@ def columns_of(frame: pd.DataFrame) -> dict[str, str]:
 
 
 def is_number(values: pd.Series) -> bool:
-    """Whether a column holds numbers; one without any value counts as such."""
+    """Whether a column holds numbers, or no value at all."""
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
@@ -143,7 +143,7 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
-    """A table for a paper, with booktabs: what the page shows, numbers to the right.
+    """Return the table of the page in LaTeX, with booktabs.
 
     It is made smaller where it is wider than the text. ``notes`` stand below it, with what a dagger
     means where there is one.

@@ -1,4 +1,4 @@
-"""From a row of a report's table to the runs behind it."""
+"""The runs behind a row of a report's table."""
 
 from __future__ import annotations
 

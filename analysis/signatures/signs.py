@@ -20,7 +20,7 @@ from coartic.robot import Array
 
 @dataclass(frozen=True)
 class Sign:
-    """How a sign is measured, and in which words."""
+    """A sign of coarticulation and its words."""
 
     each: Callable[[Solutions], Array]
     """The sign of each run, shape ``(n,)``; NaN where a run has none."""

@@ -85,7 +85,7 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """How much nearer the arm brings its hand to its next goal while it waits, shape ``(G,)``.
+    """Share of the way to its next goal that a hand covers while it waits, shape ``(G,)``.
 
     (d_held - d)/d_initial: d is the distance of the hand that is not chosen to the next goal it
     will hit, at the moment the current goal is hit; d_held the same if the arm had kept its joints

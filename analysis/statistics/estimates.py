@@ -78,7 +78,7 @@ def vector(values: ArrayLike) -> Array:
 
 
 def samples_of(first: ArrayLike, second: ArrayLike | float) -> tuple[Array, ...]:
-    """Two samples, or where ``second`` is a number one sample of differences to it."""
+    """Two samples; one sample of differences where ``second`` is a number."""
     if np.ndim(second) == 0:
         return (np.subtract(vector(first), second, dtype=np.float64),)
     return vector(first), vector(second)

@@ -1,4 +1,4 @@
-"""Running times: what runs have spent when they reach targets.
+"""Running times: costs at which runs reach targets.
 
 After COCO (Hansen et al. 2021). The ECDF of running times is the share of pairs of run and target
 that are reached within a budget. It is exact, not read off a grid.
@@ -19,8 +19,8 @@ BUDGET_RESAMPLES = 1_999
 _MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
 _FEWEST_RESAMPLES = 200
 RunningTimes = Sequence[Array]
-"""Running times of one method: for each task, which count alike, what every run had spent at every
-target, shape ``(runs, targets)``; infinite where the target is not reached."""
+"""Running times of one method: for each task the cost at which every run reached every target,
+shape ``(runs, targets)``; infinite where the target is not reached."""
 
 
 def pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:

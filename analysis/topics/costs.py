@@ -1,4 +1,4 @@
-"""What it costs to come near the optimum: running times to reward targets.
+"""Cost of coming near the optimum: running times to reward targets.
 
 Targets are rewards evenly spaced between those of the initial solution and of the optimum.
 """
@@ -27,7 +27,7 @@ from coartic.analysis.words import interval, number, two_figures
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
-"""What can be spent: columns of ``runs``; ``solve_s`` is wall time in s."""
+"""Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
 TARGETS = np.arange(1, 21) / 20
 """Targets, as shares of the way from the initial solution to the optimum."""
 COSTS = (
@@ -36,7 +36,7 @@ COSTS = (
     ("kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`runtimes`: what is spent to reach which share of the targets."""
+"""Columns of :func:`runtimes`: kind of cost, and share of the targets."""
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
 """Spends that the figure of costs has a panel of, and their axes."""
 ECDF_STEPS = 150
@@ -56,7 +56,7 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) -> Array:
-    """What each run of a cell had spent when it reached each target, shape ``(runs, targets)``.
+    """Cost at which each run of a cell reached each target, shape ``(runs, targets)``.
 
     Infinite where it did not. A planner reaches all of its targets at the end. Kinematics
     evaluations and time are known as totals of the run and spread evenly over its trials, which is
@@ -115,7 +115,7 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
     "seconds_to_half[], half on *",
 )
 def runtimes(study: Study) -> Rows:
-    """What it costs to reach a quarter and half of the targets; ``half on``: median trials to the
+    """Cost of a quarter and of half of the targets; ``half on``: median trials to the
     target halfway, by task, infinite where most runs never reach it."""
     for method, cells in cells_compared(study).items():
         if (method, "trials") not in costs(study):
@@ -219,7 +219,7 @@ def learner_and_rival(study: Study) -> pd.DataFrame:
 
 
 def what_it_costs(study: Study) -> str:
-    """What the learner pays for half of the targets, beside its rival."""
+    """Trials that the learner and its rival need for half of the targets."""
     rows = learner_and_rival(study).to_dict("records")
     if not rows:
         return ""

@@ -1,4 +1,4 @@
-"""How many of the runs behind an answer failed, as a sentence that follows it."""
+"""The sentence that counts failed runs behind an answer."""
 
 from __future__ import annotations
 

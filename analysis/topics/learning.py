@@ -1,4 +1,4 @@
-"""How fast it is learned: rewards by trial."""
+"""Speed of learning: rewards by trial."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who comes nearest to the optimum: gaps of methods over all tasks."""
+"""Ranking: gaps of methods to the optimum over all tasks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from coartic.analysis.words import capital, interval, marked, number, p_value
 from coartic.text import counted
 
 TRIES = *methods.PLACEBOS, "corrective-alone/every"
-"""Methods that take the best of their trials: they learn nothing from one for the next."""
+"""Methods that take the best of their trials and learn nothing between them."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
 
@@ -86,7 +86,7 @@ def against_learner(study: Study) -> Rows:
 
 @table("method, knows, gap[], better, worse, on *, runs")
 def ranking(study: Study) -> Rows:
-    """Gap to the optimum over all tasks and on each single one, grouped by what methods know."""
+    """Gap to the optimum over all tasks and on each, grouped by the use of the reward."""
     over, tested = main_gaps(study).set_index("method"), against_learner(study)
     single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
     for method in [*over.index, *solved_some(study, over.index)]:
@@ -163,7 +163,7 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     "are run once have no interval. Diamonds and bold names: the paper's learner.",
 )
 def draw_ranking(study: Study) -> Parts:
-    """Gap to the optimum of every method over all tasks, or on the one that there is."""
+    """Draw the gap to the optimum of every method, a mean over tasks."""
     rows = main_gaps(study)
     if not len(rows):
         raise missing(study, "no method with a solution to every run and a known optimum")
@@ -185,7 +185,7 @@ def draw_ranking(study: Study) -> Parts:
 
 
 def optimum_in_words(study: Study) -> str:
-    """What gaps are to: where an optimum is not proven, it is the best known reward."""
+    """``optimum``, or ``best known reward`` where an optimum is not proven."""
     proven = all(best.proven for best in study.optima.values())
     return "optimum" if proven else "best known reward"
 
@@ -217,7 +217,7 @@ def draw_group(
 
 
 def nearest(study: Study) -> str:
-    """Who comes nearest to the optimum, and where the learner ends."""
+    """The method nearest to the optimum, and the place of the learner."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
     learn = by_trial[~by_trial.method.isin(TRIES)].reset_index(drop=True)
     rows = next((rows for rows in (learn, by_formula, others, by_trial) if len(rows)), learn)
@@ -265,7 +265,7 @@ def beside(study: Study, rows: pd.DataFrame) -> str:
 
 
 def as_declared(method: str) -> str:
-    """That what a method is told is its author's word, where it is not built in."""
+    """Remark on a method that is not built in: its author declares what it is told."""
     return "" if methods.is_built_in(method) else "; what it is told is as its author declares"
 
 

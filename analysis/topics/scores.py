@@ -1,4 +1,4 @@
-"""Scores: the runs that are compared, one a row, and the table of methods.
+"""Scores: a frame of the runs that are compared, and the table of methods.
 
 Methods are compared on tasks whose optimum and initial solution are known. The learner explores
 one-armed and two-armed tasks under different conditions, so that one method joins them:
@@ -36,7 +36,7 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward as a formula",
     "not using the reward",
 )
-"""What methods are told of the reward and make use of."""
+"""Groups of methods by their use of the reward."""
 
 
 @cached
@@ -105,7 +105,7 @@ def common_tasks(study: Study) -> list[str]:
 
 @cached
 def scores(study: Study) -> pd.DataFrame:
-    """Runs of the methods that are compared, one a row, for :func:`coartic.analysis.ranking`.
+    """Return a row for each run of the compared methods, for :func:`coartic.analysis.ranking`.
 
     Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
     ``reward`` (NaN for a run without a solution) and ``best_known``.
@@ -157,7 +157,7 @@ def best_condition(study: Study, task: str) -> str | None:
 
 
 def cell_gap(study: Study, cell: CellRuns) -> float:
-    """Gap of a cell's mean reward to the optimum; NaN where one of both is not known."""
+    """Gap of a cell's mean reward to the optimum; NaN where either is unknown."""
     best = study.optima.get(cell.task)
     if best is None or best.reward == 0 or not len(cell.good) or locks_base(cell.runs):
         return math.nan
@@ -193,7 +193,7 @@ def floats(values: pd.Series) -> Array:
     "median_run",
 )
 def methods(study: Study) -> Rows:
-    """Every method on every task: mean reward, gap, hands and what a run spends (medians).
+    """Every method on every task: mean reward, gap, hands and costs (medians).
 
     Within a task searches for the optimum come first, then the highest mean reward.
     ``median_run``: beginning of the id of the run whose reward is nearest the median.

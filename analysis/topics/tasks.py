@@ -57,7 +57,7 @@ def tasks(study: Study) -> Rows:
     "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
 def draw_start_and_goals(study: Study) -> Parts:
-    """Start configuration and goals of each task, one panel for each."""
+    """Draw start configuration and goals, a panel for each task."""
     shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
     if not shown:
         raise missing(study, "only random tasks, too many to show each")
@@ -76,7 +76,7 @@ def draw_start_and_goals(study: Study) -> Parts:
 
 @style.styled
 def draw_tasks(tasks: Sequence[Task]) -> Figure:
-    """Start configuration and goals of some tasks in one panel each."""
+    """Draw start configuration and goals of some tasks, a panel for each."""
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
     rows, columns = style.grid(len(tasks))

@@ -1,1 +1,1 @@
-"""How movements depend on the goals around them: contexts, signatures."""
+"""Coarticulation: contexts and signatures."""

@@ -102,7 +102,7 @@ class Difference(NamedTuple):
 
 @cached
 def difference(study: Study) -> Difference | None:
-    """How postures at the first shared goal depend on the next goal; None without two tasks."""
+    """Postures at the first shared goal before two next goals; None without two tasks."""
     contexts = shared_goal(study)
     if contexts is None:
         return None

@@ -1,4 +1,4 @@
-"""What coarticulation is: one goal, hit in another posture when another goal comes next."""
+"""Coarticulation: one goal is hit in different postures before different goals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_two_postures(study: Study) -> Parts:
-    """The postures at one goal before two others, overlaid: all runs faint, their means strong."""
+    """Draw postures at one goal before two others: thin every run, thick their means."""
     shared = shared_goal(study)
     if shared is None:
         raise missing(study, "no method has solved runs on two tasks that share their first goals")
@@ -138,7 +138,7 @@ def next_goal(study: Study) -> str:
 
 
 def joints_or_hand(study: Study) -> str:
-    """In how many methods the next goal changes more of what leaves the hand in place."""
+    """Number of methods in which the next goal moves the joints more than the hand."""
     rows = contexts(study)
     rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
     if not len(rows):

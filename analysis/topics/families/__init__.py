@@ -1,1 +1,1 @@
-"""What holds on families of random tasks."""
+"""Results on families of random tasks."""

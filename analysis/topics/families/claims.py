@@ -22,7 +22,7 @@ OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
 Comparing = tuple[str, Callable[[str], Higher]]
-"""What stands behind the name of a family, and a comparison on a task."""
+"""Words behind the name of a family, and a comparison on a task."""
 
 
 def in_every_family(read: Reader, families: Iterable[str], *comparisons: Comparing) -> Finding:

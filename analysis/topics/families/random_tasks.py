@@ -1,4 +1,4 @@
-"""What holds on random tasks: gaps, more exploration against less, signs of coarticulation."""
+"""Results on random tasks: gaps, more exploration against less, signs of coarticulation."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ CONTRASTS = (
 arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
 differ in nothing but the hands that they try."""
 INITIAL_SOLUTION = "the initial solution"
-"""How the column of contrasts names it."""
+"""Its name in the column of contrasts."""
 ALL = "all"
-"""What stands in the column of families for the mean over all of them, each counting alike."""
+"""In the column of families: the mean over all of them, each counting alike."""
 MOST_GAPS = 4
 """Methods whose gaps a sentence tells."""
 _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
@@ -96,7 +96,7 @@ def family_gaps(study: Study) -> Rows:
 
 
 def told_apart(first: Array, second: Array) -> bool:
-    """Whether runs on one instance tell two methods apart, at 5 % and by itself."""
+    """Whether runs on one instance differ significantly (5 %, uncorrected)."""
     if not np.ptp(first) and not np.ptp(second):
         return bool(first[0] != second[0])
     other = second if len(second) > 1 else float(second[0])
@@ -253,7 +253,7 @@ def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: s
 
 
 def on_random_tasks(study: Study) -> str:
-    """How far the nearest methods end from the best known reward, over families with two arms."""
+    """Gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study).values()
     gaps = family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
     if not len(gaps):
@@ -271,7 +271,7 @@ def on_random_tasks(study: Study) -> str:
 
 
 def exploration_pays(study: Study) -> str:
-    """What each condition gains on the one below it, over all families."""
+    """Gain of each condition on the next lower one, over all families."""
     rows = exploration(study)
     initial = rows.contrast.astype(str).str.endswith(INITIAL_SOLUTION)
     gains = [

@@ -1,1 +1,1 @@
-"""What the paper prints and claims, and what these runs say of it."""
+"""Printed rewards and claims of the paper beside these runs."""

@@ -49,7 +49,7 @@ class Summary(NamedTuple):
 
 
 class PublishedCell(NamedTuple):
-    """What the paper prints about one task under one condition."""
+    """Printed rewards of one task under one condition."""
 
     summary: Summary | None
     """Mean and spread over all runs."""
@@ -69,7 +69,7 @@ def published_alone(task: str, kind: str) -> Summary | None:
 
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
-    """What is printed about a cell; None for a cell that the paper does not have."""
+    """Printed rewards of a cell; None for a cell that the paper does not have."""
     said: dict[tuple[str, str | None], dict[str, Any]] = {
         (entry["kind"], entry.get("hands")): entry
         for entry in ENTRIES.values()

@@ -34,7 +34,7 @@ _MARKS = {
 
 
 def published_of(cell: CellRuns) -> PublishedCell | None:
-    """What the paper prints about a cell: about its own learner as it stands."""
+    """Printed rewards of a cell; None but for the paper's own learner."""
     if not cell.method.startswith(LEARNER) or cell.variant:
         return None
     return published_cell(cell.task, cell.method.removeprefix(LEARNER))
@@ -192,7 +192,7 @@ def draw_row(axes: Axes, y: float, row: Any) -> None:
 
 
 def rewards_reproduced(study: Study) -> str:
-    """How many printed rewards agree with ours, and which of the undecided are off."""
+    """Number of printed rewards that agree with ours, and undecided ones that are off."""
     rows = [row for row in beside_paper(study) if not row["hands"] and row["verdict"]]
     if not rows:
         return ""
