@@ -70,7 +70,7 @@ SECTIONS = (
         "Coarticulation",
         "Does the next goal change the movement?",
         table="contexts",
-        caption="Postures at a goal that two tasks share before they differ",
+        caption="Postures at a goal that two tasks share",
         figure="postures",
         sentence=postures.next_goal,
         answer="Coarticulation",
@@ -111,13 +111,12 @@ SECTIONS = (
         "Ranking",
         "Who comes nearest to the optimum?",
         table="ranking",
-        caption="Gap to the optimum or, where it is not proven, to the best known reward, in per "
-        "cent of it",
+        caption="Gap to the optimum, or to the best known reward where no optimum is proven",
         figure="ranking",
         sentence=ranking.nearest,
         answer="Nearest",
-        note="Methods are grouped by what they know about the reward: the value after each trial, "
-        "its formula, or nothing; of each algorithm the best setting counts. Intervals describe "
+        note="Methods are grouped by their use of the reward: its value after each trial, its "
+        "formula, or nothing; of each algorithm the best setting counts. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
@@ -128,7 +127,7 @@ SECTIONS = (
         "Cost",
         "What does it cost?",
         table="runtimes",
-        caption="What it takes to reach a quarter and half of the targets",
+        caption="Cost of reaching a quarter and half of the targets",
         figure="runtimes",
         sentence=costs.what_it_costs,
         answer="Cost",
@@ -212,7 +211,7 @@ SECTIONS = (
         "All methods",
         "What did every method do on every task?",
         table="methods",
-        caption="Reward, gap to the optimum, hands and what a run spends (medians)",
+        caption="Reward, gap to the optimum, hands and costs of a run (medians)",
         note="Every method works on the same robot. Its movements are scored by a function hidden "
         "from the method. Times are seconds of solving.",
     ),

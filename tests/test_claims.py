@@ -116,7 +116,7 @@ def test_claims_are_counted_by_verdict():
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
     assert counts(entries.verdict) == numbers
     half = verdicts.verdicts_in_words(entries)
-    assert half.startswith("Too little to judge the paper: of 4 claims 2 are undecided")
+    assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
     assert verdicts.verdicts_in_words(entries[:-1]) == (
         "Supported: the posture depends on the next goal. Undecided: the reward for the whole task "
         "makes the difference. Of 1 other claim: not supported 1."
@@ -125,7 +125,7 @@ def test_claims_are_counted_by_verdict():
         "Of 2 other claims: not supported 1, without the runs here 1."
     )
     assert verdicts.verdicts_in_words(entries[:1]) == (
-        "In its main point, yes: the posture depends on the next goal."
+        "All central claims are supported: the posture depends on the next goal."
     )
 
 

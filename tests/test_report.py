@@ -248,7 +248,7 @@ def test_few_runs_say_so(tmp_path):
     few = run_and_write(tmp_path / "few", cells=one, runs=1, trials=30)
     texts = {section.answer: text for section, text in answers(few)}
     assert texts["Coarticulation"].startswith("Too few runs to tell")
-    assert texts["Paper"].startswith("Too little to judge the paper")
+    assert texts["Paper"].startswith("Too few runs to judge the paper")
     alone = select_cells(
         load_suite("comparison"), KNOWN, tasks=["ascending"], methods=["corrective-alone/given"]
     )

@@ -360,7 +360,7 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_t
 @pytest.mark.parametrize(
     ("made_up", "seen", "answer"),
     [
-        ({"apart": 2.0}, True, "Yes: depending on the next goal"),
+        ({"apart": 2.0}, True, "Yes. Depending on the next goal"),
         ({"apart": 0.5}, False, "Not shown:"),
         ({"apart": 0.5, "of_placebo": 2.0}, False, "Not shown:"),
         ({"apart": 0.0}, False, "No significant difference:"),

@@ -23,7 +23,7 @@ from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import interval, number, two_figures
+from coartic.analysis.words import interval, number
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
@@ -226,16 +226,14 @@ def what_it_costs(study: Study) -> str:
     names = ["the learner", *(methods.name_of(row["method"]) for row in rows[1:])]
     halves = [row["trials_to_half"] for row in rows]
     ends = [f"{number(100 * row['reached'], 0)} %" for row in rows]
-    reached = ", ".join(map(" ".join, zip(names, ends, strict=True)))
-    text = (
-        f"Of the reward targets between the initial solution and the optimum, reached: {reached}."
-    )
+    reached = " and ".join(f"{name} reaches {end}" for name, end in zip(names, ends, strict=True))
+    text = f"Of the reward targets between initial solution and optimum, {reached}."
     if len(rows) == 2 and np.isfinite(halves).all():
         ours, theirs = (interval(row, "trials_to_half", digits=0) for row in rows)
         text = (
-            f"For half of the reward targets between the initial solution and the optimum, the "
-            f"learner needs {ours} trials, {names[1]} {theirs}: a ratio of "
-            f"{two_figures(halves[0] / halves[1])}. In the end {ends[0]} and {ends[1]} are reached."
+            f"To get halfway from the initial solution to the optimum, the learner needs {ours} "
+            f"trials; {names[1]} needs {theirs}. In the end they reach {ends[0]} and {ends[1]} of "
+            "the reward targets."
         )
     cells = [
         (task, cell.label)

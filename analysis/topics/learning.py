@@ -201,4 +201,4 @@ def how_fast(study: Study) -> str:
     ]
     if not after:
         return ""
-    return f"Half of what the learner gains is there after about {', '.join(after)} (median run)."
+    return f"The learner makes half of its gain in about {', '.join(after)} (median run)."

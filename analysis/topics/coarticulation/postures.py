@@ -122,10 +122,10 @@ def next_goal(study: Study) -> str:
             f"Too few runs to tell whether the next goal changes postures at goal {goal} ({runs})."
         )
     elif not contrast.differ:
-        text = f"No significant difference: the {who} {apart}."
+        text = f"No significant difference: before different goals, the {who} {apart}."
     elif contrast.seen:
         beside = f"; random guesses lie {guesses}" if guesses else ""
-        text = f"Yes: depending on the next goal, the {who} {apart}{beside}."
+        text = f"Yes. Depending on the next goal, the {who} that clearly differ: {apart}{beside}."
     elif guesses:
         text = f"Not shown: the {who} {apart}; random guesses lie {guesses}."
     else:
@@ -144,4 +144,5 @@ def joints_or_hand(study: Study) -> str:
     if not len(rows):
         return ""
     larger = int((rows.equivalent > rows.other).sum())
-    return f"In {larger} of {len(rows)} methods the next goal moves the joints more than the hand."
+    which = f"all {len(rows)}" if larger == len(rows) else f"{larger} of {len(rows)}"
+    return f"In {which} methods the next goal moves the joints more than the hand."

@@ -264,9 +264,9 @@ def on_random_tasks(study: Study) -> str:
         for row in gaps.to_dict("records")
     ]
     return (
-        f"Gaps to the best known reward on {len(best)} random tasks: "
-        f"{', '.join(ends)} (mean over families with two arms). It is proven to be the optimum on "
-        f"{sum(each.proven for each in best)} of them."
+        f"On {len(best)} random tasks methods end behind the best known reward by this much (mean "
+        f"over families with two arms): {', '.join(ends)}. On {sum(each.proven for each in best)} "
+        "tasks this reward is proven to be the optimum."
     )
 
 

@@ -199,8 +199,8 @@ def rewards_reproduced(study: Study) -> str:
     verdicts = [row["verdict"] for row in rows]
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
-        f"Of the {len(rows)} learned rewards that the paper prints, {agree} agree with ours within "
-        f"1 %, {differ} differ; undecided: {undecided}."
+        f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
+        f"1 % and differ from {differ}; {undecided} are undecided."
     )
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0

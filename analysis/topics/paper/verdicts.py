@@ -40,7 +40,7 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
     n = counts(judged.verdict)
     if 2 * n["undecided"] >= len(judged):  # they lack runs or trials
         return (
-            f"Too little to judge the paper: of {len(judged)} claims {n['undecided']} are "
+            f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
             f"undecided, {n['supported']} supported. Tasks, methods, runs or trials are missing."
         )
     central: dict[str, list[str]] = {}
@@ -55,7 +55,7 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
     ]
     words = [f"{capital(verdict)}: {listed(texts)}." for verdict, texts in central.items()]
     if list(central) == ["supported"]:
-        words = [f"In its main point, yes: {listed(central['supported'])}."]
+        words = [f"All central claims are supported: {listed(central['supported'])}."]
     each = ", ".join(f"{verdict} {count}" for verdict, count in of_others if count)
     words += [f"Of {counted(len(others), 'other claim')}: {each}."] * bool(each)
     return " ".join(words)
