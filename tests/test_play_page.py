@@ -230,11 +230,8 @@ def test_it_plays_holds_at_hits_and_saves_pictures(opened, tmp_path):
         page.get_by_role("button", name="Save PNG").click()
     assert download.value.path().read_bytes().startswith(b"\x89PNG")
     page.get_by_role("button", name="Record").click()
-    for tick in range(100, 130, 5):
-        page.get_by_role("slider", name="Tick").fill(str(tick))
-        page.evaluate(DRAWN)
     with page.expect_download() as download:
-        page.get_by_role("button", name="Stop and save").click()
+        page.get_by_role("button", name="Stop and save").click()  # as soon as it says so
     assert re.fullmatch(r"coartic\.(webm|mp4)", download.value.suggested_filename)
     assert download.value.path().stat().st_size > 1000
     page.get_by_role("button", name="Record").wait_for()

@@ -930,9 +930,19 @@ class Play {
       this.save(new Blob(parts, { type: recorder.mimeType }), `coartic.${recorder.mimeType.split(/[/;]/)[1]}`);
       this.note("The recording is saved.");
     };
-    recorder.start();
+    let begun = false;
+    recorder.onstart = () => {
+      begun = true;
+      this.find("record").textContent = "Stop and save";
+      this.note("Recording the picture.");
+    };
+    // A recorder begins with a picture that is drawn, on a busy machine a second and many pictures later.
+    const draw = () => {
+      this.draw();
+      if (!begun) requestAnimationFrame(draw);
+    };
     this.recorder = recorder;
-    this.find("record").textContent = "Stop and save";
-    this.note("Recording the picture.");
+    recorder.start();
+    draw();
   }
 }
