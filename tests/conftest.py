@@ -82,7 +82,7 @@ def report(traced, tmp_path_factory):
     return made_once(tmp_path_factory, "traced-report", make) / "report"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     """Chromium, driven by Playwright."""
     from playwright.sync_api import sync_playwright

@@ -136,11 +136,13 @@ assert not modules & set(coartic.__all__), "a module would hide what has its nam
 """
 
 
+@pytest.mark.process
 def test_the_package_imports_what_is_asked_for():
     """Every public name is there, under its own name whatever is imported first."""
     subprocess.run([sys.executable, "-c", FRESH], cwd=ROOT, check=True)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("command", "said", "unneeded"),
     [
@@ -224,6 +226,7 @@ def without_posix(out):
     assert runs.process_peak_mb.isna().all()
 
 
+@pytest.mark.process
 def test_nothing_needs_what_posix_alone_has(tmp_path):
     """As on Windows."""
     apart(without_posix, tmp_path / "out")

@@ -9,6 +9,8 @@ from axe_playwright_python.sync_playwright import Axe
 from coartic.analysis.study import typical_run
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 
+pytestmark = pytest.mark.browser
+
 
 @pytest.fixture(scope="module")
 def address(report):
@@ -67,6 +69,11 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     assert page.locator(f"#{claim} dl").is_visible()
 
 
+FRAMES = (
+    """async () => { for (let n = 0; n < 10; n += 1) await new Promise(requestAnimationFrame); }"""
+)
+
+
 def part(page, name):
     """A part of the figure to play with."""
     return page.locator(f".play [data-is={name}]")
@@ -87,7 +94,7 @@ def test_the_figure_plays_by_keyboard(opened):
     page.keyboard.press("Space")
     page.get_by_role("button", name="Play").wait_for()
     stopped = tick(page)
-    page.wait_for_timeout(300)
+    page.evaluate(FRAMES)
     assert tick(page) == stopped
     page.keyboard.press("Tab")  # one tick back
     page.keyboard.press("Enter")
@@ -163,7 +170,7 @@ def test_the_address_holds_the_view(opened, address):
     moving = opened(reduced_motion="no-preference")
     moving.locator(".play").scroll_into_view_if_needed()
     moving.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
-    moving.wait_for_timeout(300)
+    moving.evaluate(FRAMES)
     assert "play-link" not in moving.url
     part(page, "preset").focus()
     part(page, "preset").select_option("2")
@@ -178,7 +185,7 @@ def test_the_address_holds_the_view(opened, address):
     again = opened(link=page.url, reduced_motion="reduce")
     part(again, "count").get_by_text("56 of").wait_for()
     assert again.evaluate(STATE) == page.evaluate(STATE) != untouched
-    again.wait_for_timeout(300)
+    again.evaluate(FRAMES)
     assert again.url == page.url
     top = "document.getElementById('runtimes').getBoundingClientRect().top"
     assert abs(again.evaluate(top)) < 2

@@ -95,6 +95,7 @@ def test_seed_jobs_and_budget_reach_the_runs(coartic, monkeypatch, tmp_path):
     assert list(runs.trials) == [12, 12]
 
 
+@pytest.mark.process
 def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
     code, text, _ = coartic(
         "run", "paper", "--tasks", "ascending", "--methods", "test/dies",
@@ -182,6 +183,7 @@ coartic.__main__.main()
 """
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(
     ("moment", "name", "times"),
@@ -206,6 +208,7 @@ def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, n
     assert len(words.splitlines()) == 1
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform == "win32", reason="the file starts a program of POSIX")
 def test_what_a_method_file_starts_ends_with_the_command(tmp_path):
     (tmp_path / "mine.py").write_text("import subprocess\nsubprocess.Popen(['sleep', '999'])\n")
@@ -228,8 +231,8 @@ def call_apart(place, command):
     return done.returncode, words
 
 
-@pytest.mark.parametrize("place", ["short", "long" * 30])  # the system takes no long socket
-def test_modules_in_the_working_folder_are_not_imported(tmp_path, place):
+@pytest.mark.process
+def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     """By no process of a command that is installed, whatever a stranger has put there."""
     program, gift = tmp_path / "bin" / "program.py", tmp_path / "gift"
     program.parent.mkdir()
@@ -238,7 +241,7 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path, place):
     for name in ("coartic", "multiprocessing", "numba", "numpy", "socket", "threading"):
         (gift / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'w').close()")
     command = [sys.executable, program, *map(str, SMALL), "--jobs", "2", "--out", "out"]
-    temporary = tmp_path / place
+    temporary = tmp_path / ("long" * 30)  # the system takes no long socket
     temporary.mkdir()
     environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)}
     done = subprocess.run(command, cwd=gift, env=environment, capture_output=True, check=False)
@@ -271,12 +274,11 @@ def test_draw(coartic, tmp_path):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_animate(coartic, tmp_path):
-    out = tmp_path / "out"
-    assert coartic(*SMALL, "--out", out)[0] == 0
+    out, film, near = tmp_path / "out", tmp_path / "film.gif", tmp_path / "near.toml"
+    near.write_text(GOOD.replace("[5.0, 1.0], [5.0, 2.0]", "[4.7, 0.1], [4.8, 0.1]"))
+    assert coartic("run", "paper", "--tasks", near, "--trials", 5, "--out", out)[0] == 0
     run_id = load(out).runs.run_id[0]
-    film = tmp_path / "film.gif"
-    small = ("--width", 200)
-    assert coartic("animate", run_id, "--in", out, "--out", film, *small)[0] == 0
+    assert coartic("animate", run_id, "--in", out, "--out", film, "--width", 200)[0] == 0
     assert film.read_bytes().startswith(b"GIF89a")
 
 
@@ -298,6 +300,7 @@ def kb(file):
     return len(file.read_bytes()) // 1000
 
 
+@pytest.mark.process
 def test_entry_points():
     """The installed script and ``python -m coartic``, in processes of their own."""
     for command in (
@@ -308,6 +311,7 @@ def test_entry_points():
         assert text == f"coartic {__version__}\n"
 
 
+@pytest.mark.process
 def test_settings_of_matplotlib_in_a_folder_are_not_read(tmp_path):
     """They may name programs, and the folder may be a stranger's."""
     (tmp_path / "matplotlibrc").write_text("text.usetex: True")

@@ -17,17 +17,22 @@ WITH_TRIALS = {LEARNER, "random_search", "cma_es"}
 """Methods that take the number of trials from the learner."""
 
 
-@pytest.fixture
-def after(monkeypatch):
-    """The methods whose code is another after a change in a file of the package."""
+def codes():
+    return {name: code_of(file) for name, file in FILES.items()}
 
-    def codes():
-        return {name: code_of(file) for name, file in FILES.items()}
+
+@pytest.fixture(scope="module")
+def before():
+    return codes()
+
+
+@pytest.fixture
+def after(before, monkeypatch):
+    """The methods whose code is another after a change in a file of the package."""
 
     def change(place, old, new):
         read, changed = Path.read_bytes, (PACKAGE / place).resolve()
         assert old in read(changed)
-        before = codes()
         with monkeypatch.context() as patch:
             patch.setattr(
                 Path,

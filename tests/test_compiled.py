@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numba
 import numpy as np
+import pytest
 
 from tests.support.forks import apart, forget
+
+pytestmark = pytest.mark.process
 
 ROOT = Path(__file__).parent.parent
 KERNEL = """

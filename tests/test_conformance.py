@@ -19,6 +19,8 @@ from tests.support.strategies import tiny_task
 from tests.support.suites import BROKEN, InProcess
 from tests.support.suites import KNOWN as BUILT_IN
 
+pytestmark = pytest.mark.process
+
 OPTIMUM = {
     entry.task: entry.reward
     for entry in entries()

@@ -206,6 +206,7 @@ def test_the_robot_is_drawn():
     assert (before != env.render()).any()
 
 
+@pytest.mark.process
 def test_importing_the_environments_compiles_nothing():
     code = "import sys, coartic.gym; assert not {'numba', 'matplotlib', 'torch'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

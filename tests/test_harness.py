@@ -116,6 +116,7 @@ def test_long_runs_begin_first_and_the_time_left_is_that_of_their_methods(tmp_pa
     ]
 
 
+@pytest.mark.process
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     """In this process and in two others: the same but for the timings."""
     same_results(run_and_write(tmp_path, executor=Local(2)), results)

@@ -18,7 +18,10 @@ from tests.support.strategies import PAPER_CELLS, sample, solve, uneven_task
 
 MODEL = FOLDER / "model.js"
 NODE = shutil.which("node")
-pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed")
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(NODE is None, reason="Node is not installed"),
+]
 
 TASKS = [
     *("ascending", "descending", "two-armed-1", "two-armed-2"),

@@ -11,6 +11,8 @@ from coartic.analysis.signatures.context_tests import context_dependence
 from coartic.play import page as pages
 from tests.support.strategies import changed
 
+pytestmark = pytest.mark.browser
+
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):

@@ -132,6 +132,7 @@ AT_IMPORT = {
 }
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("done", AT_IMPORT)
 def test_what_a_file_does_when_it_is_imported_is_no_matter_here(done, coartic, tmp_path):
     def state():

@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
@@ -19,6 +20,8 @@ from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import Job
 from tests.support.processes import all_end, folders_of_session, processes
 from tests.support.suites import KNOWN, made_once, planned, run_and_write
+
+pytestmark = pytest.mark.process
 
 METHODS = """
 import itertools, os, signal, sys, tempfile, threading, time
@@ -54,7 +57,7 @@ class Again(Does):
 """
 HONEST = -319  # what these movements are worth
 HANDLED = {
-    "hangs": ("time.sleep(999)", "timeout", "wall time limit of 23 s exceeded"),
+    "hangs": ("time.sleep(999)", "timeout", "wall time limit of 1.4 s exceeded"),
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 1 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 1 s exceeded"),
@@ -123,25 +126,31 @@ def entries(folder, bodies):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Of runs in the same workers, then others, then this project's."""
+    """Of runs in the same workers, then others, then this project's; wall time ends one run, and
+    CPU time all others, however long they have to wait for it."""
     task = load_task("ascending")
 
     def make(folder):
         folder.mkdir()
         does, again = entries(folder, [(name, body) for name, (body, _, _) in HANDLED.items()])
-        cells = [Cell(task, does, {"what": name}) for name in HANDLED]
-        cells += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
-        run_and_write(
-            folder / "out", cells, executor=Local(2, patience_s=20.0), runs=1,
-            time_limit_s=1.0, trial_budget=3,
-        )  # fmt: skip
+        hangs, *others = [Cell(task, does, {"what": name}) for name in HANDLED]
+        others += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
+        for name, cells, patience_s, limit_s in (
+            ("hangs", [hangs], 0.5, 0.3),
+            ("others", others, 600.0, 1.0),
+        ):
+            run_and_write(
+                folder / name, cells, executor=Local(2, patience_s=patience_s), runs=1,
+                time_limit_s=limit_s, trial_budget=3,
+            )  # fmt: skip
 
     return made_once(tmp_path_factory, "pool", make)
 
 
 @pytest.fixture(scope="module")
 def runs(folder):
-    return load(folder / "out").runs.set_index("label")
+    both = [load(folder / name).runs for name in ("hangs", "others")]
+    return pd.concat([runs.astype(object) for runs in both]).set_index("label")
 
 
 @pytest.mark.parametrize("name", HANDLED)
@@ -165,13 +174,13 @@ def test_other_work_on_the_core_changes_no_outcome(tmp_path):
         while time.process_time() < end: pass
         return Result(corrected(session))"""
     names = ["short", "long", "longer", "longest"]
-    seconds = {name: "0.7" if name == "short" else "99" for name in names}
+    seconds = {name: "0.3" if name == "short" else "99" for name in names}
     bodies = [(name, burn.replace("self.seconds", seconds[name])) for name in names]
     task, (does, _) = load_task("ascending"), entries(tmp_path, bodies)
     cells = [Cell(task, does, {"what": name}) for name in names]
-    study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=1.5)
+    study = run_and_write(tmp_path / "out", cells, executor=Local(4), runs=1, time_limit_s=0.6)
     assert study.runs.status.tolist() == ["ok"] + ["timeout"] * 3
-    assert set(study.runs.reason[1:]) == {"CPU time limit of 1.5 s exceeded"}
+    assert set(study.runs.reason[1:]) == {"CPU time limit of 0.6 s exceeded"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test looks into /proc")
@@ -201,18 +210,25 @@ def test_what_a_worker_prints_is_bounded(tmp_path):
 @pytest.mark.parametrize("whom", ["worker", "server"])
 def test_what_somebody_kills_is_repeated(tmp_path, whom):
     """A process at work, or the server that forks them."""
-    body = "time.sleep(0.2); return Result(corrected(session))"
+    body = """try:
+            open(__file__ + ".first", "x").close()
+        except FileExistsError:  # all others wait until somebody is killed
+            while not os.path.exists(__file__ + ".killed"): time.sleep(0.01)
+        return Result(corrected(session))"""
     task, (does, _) = load_task("ascending"), entries(tmp_path, [("honest", body)])
     cells, killed = [Cell(task, replace(does, stochastic=True))], []
 
     def kill(progress, _):
-        forked = {k: p for k, p in processes().items() if "multiprocessing.forkserver" in p[3]}
-        server = [pid for pid, (parent, *_) in forked.items() if parent == os.getpid()]
-        worker = [pid for pid, (parent, *_) in forked.items() if parent in server]
-        if progress.done == 1:
+        if progress.done != 1:
+            return
+        while not killed:
+            forked = {k: p for k, p in processes().items() if "multiprocessing.forkserver" in p[3]}
+            server = [pid for pid, (parent, *_) in forked.items() if parent == os.getpid()]
+            worker = [pid for pid, (parent, *_) in forked.items() if parent in server]
             killed.extend(server if whom == "server" else worker)
-            for pid in killed:
-                os.kill(pid, signal.SIGKILL)
+        for pid in killed:
+            os.kill(pid, signal.SIGKILL)
+        (tmp_path / "mine.py.killed").touch()
 
     perform(planned(cells, runs=8), tmp_path / "out", executor=Local(2), watch=kill)
     assert killed

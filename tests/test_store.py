@@ -22,6 +22,7 @@ from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.benchmarks.worker import fail
+from coartic.runs import store as store_module
 from coartic.runs.run import Score
 from coartic.runs.store import FORMAT, RUNS_FILE, Store, explain_errors, open_store, writing
 from tests.support.strategies import tiny_task
@@ -188,6 +189,7 @@ def perform_until_killed(folder, progress):
     perform(plan, folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
 
 
+@pytest.mark.process
 @pytest.mark.skipif(
     sys.platform != "linux",
     reason="forks a process that has imported everything, which is safe on Linux alone",
@@ -230,17 +232,20 @@ def test_one_writes_and_nobody_else_meanwhile(undisturbed, tmp_path):
     same_results(load(tmp_path), undisturbed)
 
 
-@pytest.mark.filterwarnings("ignore:another program has .* open. waiting")
+@pytest.mark.filterwarnings("always:another program has .* open. waiting")
 @pytest.mark.parametrize("begin", ["BEGIN", "BEGIN EXCLUSIVE"])
-def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, begin):
-    """Also where its program keeps the file for a while, in the middle of a transaction."""
-    held = []
+def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, begin, monkeypatch):
+    """Also where its program keeps the file, in the middle of a transaction, until the run says
+    that it waits."""
+    held, said = [], threading.Event()
+    monkeypatch.setattr(store_module, "WAIT_S", 0.05)
+    monkeypatch.setattr(warnings, "showwarning", lambda *_: said.set())
 
     def read():
         reader = sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)
         reader.execute(begin)
         held.append(reader.execute("SELECT count(*) FROM results").fetchall())
-        time.sleep(1.5)
+        said.wait(60)
         held.append(reader.execute("SELECT count(*) FROM results").fetchall())
         reader.close()
 
@@ -249,6 +254,7 @@ def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, be
 
         def perform(self, jobs):
             for pair in super().perform(jobs):
+                said.clear()
                 program = threading.Thread(target=read)
                 program.start()
                 while len(held) % 2 == 0:

@@ -266,6 +266,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("kernel", ["Haswell", "Prescott"])
 def test_a_folder_is_sound_under_other_kernels_of_blas(true_folder, kernel):
     """As in another lab, whose processor has them."""

@@ -143,7 +143,7 @@ GONE = frozenset(
 )
 """Suites and methods of version 1 that are no longer here."""
 _ROWS = 2_000  # that are read at once
-_WAIT_S = 1.0  # for another program, before more is done about it
+WAIT_S = 1.0  # for another program, before more is done about it
 _LOCK_TRIES = 20
 
 _MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
@@ -517,7 +517,7 @@ def open_store(folder: Path) -> Store:
     check_files(folder)
     with (
         explain_errors(folder),
-        connect(f"{path.absolute().as_uri()}?mode=rw", 5 * _WAIT_S) as connection,
+        connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S) as connection,
     ):
         connection.execute("PRAGMA query_only = ON")
         if not has_tables(connection, folder):
@@ -559,7 +559,7 @@ def check_known(connection: sqlite3.Connection, folder: Path) -> None:
 
 def open_content(content: bytes, name: str) -> Store:
     """The runs of a results folder whose file is in memory, to be read; ``name`` stands for it."""
-    with connect(":memory:", _WAIT_S) as connection:
+    with connect(":memory:", WAIT_S) as connection:
         connection.deserialize(content)
     return Store(Path(name), connection)
 
@@ -594,7 +594,7 @@ def writing(folder: Path) -> Iterator[Store]:
         check_files(folder)
         with (
             explain_errors(folder),
-            connect(str(folder / RUNS_FILE), _WAIT_S) as connection,
+            connect(str(folder / RUNS_FILE), WAIT_S) as connection,
         ):
             has_tables(connection, folder)  # or it is left as it is
             # No write-ahead log: it is unsafe on network disks, and a second file.
@@ -624,7 +624,7 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
             try:
                 fcntl.flock(opened, how)
             except BlockingIOError:
-                time.sleep(_WAIT_S / _LOCK_TRIES)
+                time.sleep(WAIT_S / _LOCK_TRIES)
                 continue
             except OSError:
                 pass
