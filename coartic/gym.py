@@ -7,9 +7,10 @@ Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``T
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -123,7 +124,7 @@ class Robots:
         self.joints = np.array([*base, *arms])
         self.starts, self.goals = np.zeros((number, width)), np.zeros((number, goals, 2))
         self.counts, self.kinds = np.zeros(number, np.int64), np.full(number, -1)
-        self.kind_of: dict[Any, int] = {}
+        self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
         self.task, self.goal = np.zeros((2, num_envs), np.int64)
         self.q, self.view = np.zeros((num_envs, width)), np.arange(ahead + 1)
         entries = (len(hands) > 1) + len(self.joints)
@@ -139,17 +140,12 @@ class Robots:
         if self.kinds[number] < 0:
             check_model(self.model, radius=task.radius)
             self.tasks[number] = task
-            self.starts[number, self.places(task.robot)] = task.q0
+            self.starts[number, places_of(task.robot, self.links)] = task.q0
             self.goals[number, : len(task.goals)] = task.goal_array
             self.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
             self.kinds[number] = self.kind_of.setdefault(kind, len(self.kind_of))
         return task
-
-    def places(self, robot: Robot) -> NDArray[np.int64]:
-        """Where the entries of its configurations are among those of all robots, ``(dof,)``."""
-        left, right = (BASE_DOF + np.arange(len(robot.arm(hand).links)) for hand in HANDS)
-        return np.concatenate([np.arange(BASE_DOF), left, self.links + right])
 
     def begin(self, rows: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
         """Put robots at the start of the tasks of these numbers."""
@@ -176,10 +172,10 @@ class Robots:
         chosen = real_array("actions", actions)
         if chosen.shape != (shape := (len(rows), *self.action_space.shape)):
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        if np.isnan(chosen).any():
+        if math.isnan(chosen.min()):
             row = int(np.isnan(chosen).any(axis=1).argmax())
             raise ValueError(f"the action of robot {row} has NaN; it must be numbers")
-        chosen = np.clip(chosen, -1.0, 1.0)
+        chosen = np.minimum(np.maximum(chosen, -1.0), 1.0)
         away = np.zeros((len(rows), self.q.shape[1]))
         away[:, self.joints] = REACH * chosen[:, -len(self.joints) :]
         other = (chosen[:, 0] > 0.5) & (len(self.sides) > 1)
@@ -188,20 +184,25 @@ class Robots:
             of_kind = np.flatnonzero(kinds == kind)
             if not len(of_kind):
                 continue
-            some, places = rows[of_kind], self.places(robot)
+            some, places = rows[of_kind], places_of(robot, self.links)
             q, goals = self.q[some[:, None], places], self.goals[self.task[some], self.goal[some]]
-            reach = partial(reach_unchecked, locked_base=locked, model=self.model)
-            sides = np.tile(self.sides[:, None], len(some))
-            corrected = [
-                reach(robot, q, side, goals, radius, looks=False).corrected for side in sides
-            ]
-            ways = np.nan_to_num(np.linalg.norm(np.array(corrected) - q, axis=2), nan=np.inf)
-            hand = np.where(other[of_kind], 1 - ways.argmin(axis=0), ways.argmin(axis=0))
-            middle = np.choose(hand[:, None], corrected)
+            reach = partial(
+                reach_unchecked, robot, radius=radius, locked_base=locked, model=self.model
+            )
+            each = len(self.sides), len(some), len(places)  # hands of all robots, one call
+            starts, ends = np.broadcast_to(q, each), np.broadcast_to(goals, (*each[:2], 2))
+            sides = np.repeat(self.sides, len(some))
+            alone = reach(starts.reshape(-1, each[2]), sides, ends.reshape(-1, 2), looks=False)
+            corrected = alone.corrected.reshape(each)
+            ways = np.sqrt(((corrected - q) ** 2).sum(axis=2))
+            ways[np.isnan(ways)] = np.inf
+            hand = ways.argmin(axis=0)
+            hand = np.where(other[of_kind], 1 - hand, hand)
+            middle = corrected[hand, np.arange(len(some))]
             moved = away[of_kind[:, None], places]
             moved[:, ["xy".index(axis) for axis in locked]] = 0.0
             targets = np.where(np.isnan(middle), q, middle) + moved
-            reached = reach(robot, q, self.sides[hand], goals, radius, targets)
+            reached = reach(q, self.sides[hand], goals, targets=targets)
             self.q[some[:, None], places] = reached.q
             self.goal[some] += reached.hit
             rewards[of_kind] = np.where(reached.hit, -reached.ticks, -FAILED)
@@ -211,6 +212,14 @@ class Robots:
         """Names of tasks, and whether all goals are hit."""
         task = self.task[rows]
         return {"task": self.names[task], "is_success": self.goal[rows] == self.counts[task]}
+
+
+@cache
+def places_of(robot: Robot, links: int) -> NDArray[np.int64]:
+    """Where the entries of a robot's configurations are among those of robots with so many links an
+    arm, ``(dof,)``."""
+    left, right = (BASE_DOF + np.arange(len(robot.arm(hand).links)) for hand in HANDS)
+    return np.concatenate([np.arange(BASE_DOF), left, links + right])
 
 
 ONLY = np.zeros(1, np.int64)
@@ -270,7 +279,9 @@ class TaskEnv(gymnasium.Env):
         figure = Figure(figsize=(6, 4))
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(axes, task, self.robots.q[0, self.robots.places(task.robot)], weight=1.5)
+        draw_robot(
+            axes, task, self.robots.q[0, places_of(task.robot, self.robots.links)], weight=1.5
+        )
         fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < self.robots.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()

@@ -133,11 +133,13 @@ class Meter:
     SOLVER: ClassVar[tuple[str, ...]] = (
         "forward_kinematics",
         "jacobians",
+        "corrective_iterations",
         "gradients",
         "hessians",
         "solver_iterations",
     )
-    """Counters that a method states itself: what a solver evaluates."""
+    """Counters that a method states itself: what its solver evaluates, or a corrective process that
+    it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
         """Add to counters."""
@@ -457,17 +459,15 @@ class Session:
         note_trials(0 if self._of_run else 1)
         reached = reach_all(self._bench, codes, targets[:, :, None])
         completed = bool(reached.hit[0, -1])
-        ticks, corrections, iterations, evaluations = (
-            sum(each[0].tolist())
-            for each in (
-                reached.ticks,
-                reached.corrections,
-                reached.iterations,
-                reached.evaluations,
-            )
-        )
+        ticks = sum(reached.ticks[0].tolist())
         reward = -ticks if completed else None
-        self._count(pack_rewards([reward]), ticks, corrections, iterations, evaluations)
+        self._count(
+            pack_rewards([reward]),
+            ticks,
+            sum(reached.corrections[0].tolist()),
+            sum(reached.iterations[0].tolist()),
+            sum(reached.evaluations[0].tolist()),
+        )
         return reward
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -522,7 +522,8 @@ class Session:
     # What the method has to state itself.
 
     def spend(self, **counts: int) -> None:
-        """Add to counters that the session cannot see: a solver's evaluations, say.
+        """Add to counters that the session cannot see: evaluations of a solver, and iterations of a
+        corrective process that the method runs itself, which are Jacobians, too.
 
         Raises ValueError for a negative count, for one beyond :data:`MOST_COUNT` in all, and for
         one that the session keeps itself.

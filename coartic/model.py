@@ -11,8 +11,8 @@ from coartic.inputs import brief_value, check_limits
 class MotionModel(NamedTuple):
     """Constants of the paper's model; docs/model.md says where each comes from.
 
-    A named tuple, so that the compiled kernels take it as it is. Another one is made with keyword
-    arguments, ``MotionModel(gain=0.1)``, or from one: ``PAPER._replace(gain=0.1)``.
+    Another one is made with keyword arguments, ``MotionModel(gain=0.1)``, or from one:
+    ``PAPER._replace(gain=0.1)``.
     """
 
     step: float = 0.01

@@ -304,11 +304,12 @@ class Objective:
 
     def _trials_of(self, points: Array, codes: Any) -> tuple[NDArray[np.int64], Array]:
         """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
-        targets = np.full((len(points), self.joints.size), np.nan)
-        targets[:, self._entries] = points
+        targets = np.empty((len(points), *self.joints.shape))
+        targets[:] = np.nan
+        targets.reshape(len(points), -1)[:, self._entries] = points
         if codes is None:
             codes = self._codes if len(points) == 1 else np.repeat(self._codes, len(points), axis=0)
-        return codes, targets.reshape(len(points), *self.joints.shape)
+        return codes, targets
 
     def _check(self, points: Array) -> None:
         """Raises ValueError for goals that are NaN in part, and for entries that are infinite or

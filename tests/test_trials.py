@@ -95,7 +95,8 @@ def test_a_locked_base_stays_where_it_starts():
 
 def test_a_counter_holds_so_many_in_all():
     session = Session(load_task("ascending"), 0, TOLD)
-    session.spend(hessians=2**62)
+    session.spend(hessians=2**62, corrective_iterations=3, jacobians=3)
+    assert session.meter.corrective_iterations == 3
     with pytest.raises(ValueError, match="counts to"):
         session.spend(hessians=2**62)
 

@@ -184,6 +184,6 @@ def correct(
     run, figures = runs[0], slice(robot.dof)
     run["target"][figures] = configuration(robot, q)
     run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
-    setup = setup_for(robot, locked_base=locked_base, model=check_model(model))
+    setup = setup_for(robot, locked_base=tuple(locked_base), model=check_model(model))
     correct_kernel(setup, lanes_for(robot), runs)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))

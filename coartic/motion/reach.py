@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -207,7 +206,7 @@ def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
         reach_lot(first, min(room, count - first), arms, setup[0], reached, batch)
 
 
-SHARE = 14 * LANES
+SHARE = 10 * LANES
 """Arms for a thread, at least: to begin one takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Arrays for the kernel to work on that nobody uses, by :attr:`Robot.most_links`."""
@@ -272,7 +271,7 @@ def reach_unchecked(
     targets: Array | None = None,
     *,
     looks: bool = True,
-    locked_base: Collection[str] = (),
+    locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
     """Let N arms reach for a goal each, side by side, from where they are.

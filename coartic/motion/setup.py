@@ -6,8 +6,7 @@ of one record is one argument, whatever the record holds.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,16 +36,20 @@ def setup_type(links: int) -> np.dtype[np.void]:
     return record_type(fields)
 
 
+@lru_cache(maxsize=1024)
 def setup_for(
     robot: Robot,
     radius: float = 0.0,
     *,
-    locked_base: Collection[str] = (),
+    locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
     looks: bool = True,
     corrects: bool = True,
 ) -> NDArray[np.void]:
-    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``."""
+    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``.
+
+    It is kept for the next call: who changes it takes a copy.
+    """
     setup = np.zeros(1, setup_type(links_for(robot)))
     for hand, arm in zip(HANDS, setup["arms"][0], strict=True):
         first, links, *shoulder = robot.arm(hand)
