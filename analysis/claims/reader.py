@@ -155,7 +155,8 @@ class Reader:
     def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once.
 
-        Of the placebo, that of the widths and hands that show most of it.
+        Of the placebo, that of the widths and hands that show most of it on the task, or in the
+        family.
         """
         sign, words = SIGNS[name], SIGNS[name].words
         for each in (label, *(self.placebos(task) if label == PLACEBO else ())):

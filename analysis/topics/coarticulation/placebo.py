@@ -2,7 +2,7 @@
 
 A method that selects its solution from trials by their rewards shows signs that selection alone
 shows, and has to exceed the placebo's. A folder may have placebos of several widths, and one that
-draws hands. On each task, and for each sign, the one that shows most counts.
+draws hands. On each task, or in each family, the one that shows most of a sign counts.
 """
 
 from __future__ import annotations

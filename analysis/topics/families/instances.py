@@ -3,6 +3,8 @@ many coarticulation is there."""
 
 from __future__ import annotations
 
+from statistics import fmean
+
 import pandas as pd
 
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
@@ -11,7 +13,7 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.subtasks import ROUNDING
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.coarticulation.placebo import of_placebo
+from coartic.analysis.topics.coarticulation.placebo import placebos
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum
@@ -85,23 +87,35 @@ tenth of the goals, or of the way; more than a tick, which rounding can make."""
 
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signs (n,) on every instance, of the learner by condition and of the placebo that
-    shows most of a sign.
+    """Values of signs (n,) on every instance, of the learner by condition and of the placebo.
 
     By the instance's name and the method's label, then by the sign's name in :data:`THERE`; a
-    value for each run that has one. A sign without any is left out.
+    value for each run that has one. A sign without any is left out. Label ``PLACEBO`` has each sign
+    of the placebo that shows most of it over the instances of the family.
     """
-    by_cell = {}
+    by_cell: dict[tuple[str, str], dict[str, Array]] = {}
     for name in best_of_instances(study):
-        for label in (*LEARNERS, PLACEBO):
+        for label in (*LEARNERS, *placebos(study, name)):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
-                measured = {
-                    sign: of_placebo(study, name, sign) if label == PLACEBO
-                    else SIGNS[sign].of(study.executed(name, label))
-                    for sign in THERE
-                }  # fmt: skip
+                runs = study.executed(name, label)
+                measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
+    means: dict[tuple[str, str, str], list[float]] = {}
+    for (name, label), of_cell in by_cell.items():
+        for sign, each in of_cell.items() if label not in LEARNERS else ():
+            place = str(study.tasks[name].family), sign, label
+            means.setdefault(place, []).append(float(each.mean()))
+    most: dict[tuple[str, str], str] = {}
+    for family, sign, label in sorted(means, key=lambda place: fmean(means[place])):
+        most[family, sign] = label
+    for name in [name for name, label in by_cell if label == PLACEBO]:
+        chosen = {sign: most.get((str(study.tasks[name].family), sign), "") for sign in THERE}
+        by_cell[name, PLACEBO] = {
+            sign: by_cell[name, label][sign]
+            for sign, label in chosen.items()
+            if sign in by_cell.get((name, label), {})
+        }
     return by_cell
 
 
