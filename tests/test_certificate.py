@@ -168,21 +168,6 @@ def test_the_least_of_a_term_is_exact():
         assert gone.any()
 
 
-def test_a_box_around_one_path_bounds_it_tightly():
-    task = load_task("ascending")
-    q = feasible(task, ("right",) * 3, np.random.default_rng(1), 0.2)
-    root = Relaxation(task, ("right",) * 3, (), True)
-    angles = angles_of(task, ("right",) * 3, q)
-    box = np.stack([angles - 1e-4, angles + 1e-4], axis=1)
-    relaxed = root.solve(box)
-    # What is left free: the base, and the hand within its disc.
-    hand = task.robot.forward_kinematics(relaxed.q, "right")
-    assert np.hypot(*(hand - task.goal_array).T).max() <= task.radius + 1e-3
-    steps = np.diff(np.vstack([task.q0, relaxed.q]), axis=0)
-    length = np.linalg.norm(steps, axis=1).sum()
-    assert length == pytest.approx(bound(root, box, relaxed.pulls, relaxed.forces, 5.0), abs=1e-3)
-
-
 SMALL = Robot(left_links=(1.0,), right_links=(1.2,))
 
 
@@ -312,11 +297,3 @@ def test_nothing_takes_fewer_ticks_than_the_distances_say(seed):
         ratios.append(ticks_for_distance(task, PAPER.step, [hands]) / best)
         assert ratios[-1] <= 1.0
     assert max(ratios) > 0.8  # one hand goes as fast as it can; a chord is shorter than its arc
-
-
-def test_a_goal_out_of_reach_leaves_no_path():
-    task = changed("ascending", goals=[[6, 90]], locked_base=["y"], initial_hands="R")
-    root = Relaxation(task, ("right",), (), True)
-    box = root.first_box(5.0)
-    relaxed = root.solve(box)
-    assert bound(root, box, relaxed.pulls, relaxed.forces, 5.0) > 5.0

@@ -54,31 +54,6 @@ def test_run_resumes(coartic, tmp_path):
     assert len(load(out).runs) == 21
 
 
-@pytest.mark.usefixtures("in_this_process")
-def test_a_folder_of_the_users_is_refused(coartic, tmp_path):
-    for name in (RUNS_FILE, "notes.txt"):
-        folder = tmp_path / name.replace(".", "-")
-        folder.mkdir()
-        (folder / name).write_text("mine")
-        code, _, error = coartic(*SMALL, "--out", folder)
-        assert code == 2
-        assert str(folder) in error
-        assert [path.name for path in folder.iterdir()] == [name]
-        assert (folder / name).read_text() == "mine"
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_run_a_task_of_ones_own(coartic, tmp_path, monkeypatch):
-    """By short names of conditions, into the suite's own folder."""
-    monkeypatch.chdir(tmp_path)
-    Path("mine.toml").write_text(GOOD, encoding="utf-8")
-    options = ("--tasks", "mine.toml", "--methods", "EC1,EC4")
-    assert coartic("run", "paper", *options, "--runs", 2, "--trials", 30)[0] == 0
-    runs = load("results/paper").runs
-    assert list(runs.method) == [f"dual-process/EC{k}" for k in (1, 1, 4, 4)]
-    assert set(runs.task) == {"mine"}
-
-
 def test_seed_jobs_and_budget_reach_the_runs(coartic, monkeypatch, tmp_path):
     jobs = []
 

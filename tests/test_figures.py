@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coartic import CoarticError, drawing, load_task
-from coartic.analysis.figures.plot import save
+from coartic import drawing, load_task
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
@@ -120,12 +119,6 @@ def test_variants_of_a_task_are_told_apart():
     titles = [axes.get_title(loc="left").strip() for axes in draw_tasks([task, moved]).axes]
     assert titles == ["ascending", "ascending.goal2_0_1"]
     assert draw_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
-
-
-def test_a_folder_that_cannot_be_written_into_gets_a_sentence(figures, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(CoarticError, match="cannot write to"):
-        save(figures["tasks"], tmp_path / "file")
 
 
 def test_names_and_looks_tell_methods_apart():

@@ -79,14 +79,6 @@ def test_a_trial_is_the_execution_of_its_targets(name, moves, links):
         assert info == {"task": task.name, "is_success": True}
 
 
-@pytest.mark.parametrize(("name", "hands"), [("two-armed-1", "LRLR"), ("ascending", "RRR")])
-def test_zeros_do_what_the_corrective_process_does(name, hands):
-    env = TaskEnv(name)
-    env.reset()
-    steps = [env.step(np.zeros(env.action_space.shape)) for _ in hands]
-    assert sum(step[1] for step in steps) == corrective_trial(name, hands).reward
-
-
 @pytest.mark.parametrize("ahead", [0, 1, 5])
 def test_what_is_seen(ahead):
     env, task = TaskEnv("two-armed-1", ahead=ahead), load_task("two-armed-1")

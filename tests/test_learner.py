@@ -240,27 +240,6 @@ def test_learned_rewards_of_the_paper(name, condition, low, high, hands):
         assert run.counters.failed_trials == 0
 
 
-@pytest.mark.parametrize(("task", "condition"), PAPER_CELLS)
-def test_laws_of_a_run(task, condition):
-    task = load_task(task)
-    run = learn(task, condition, seed=3, trials=400)
-    # The learned reward is the best trial's, and max Q of the first state.
-    assert run.reward == run.rewards.max() == run.values[0, 2].max()
-    assert run.rewards[run.best_trial] == run.reward
-    assert (run.rewards[: run.best_trial] < run.reward).all()
-    assert np.isneginf(run.values[0, :2]).all()
-    # Every movement of the solution is paid for.
-    assert sum(movement.ticks for movement in run.solution) == -run.reward
-    assert run.counters.movement_ticks == -run.rewards.sum()
-    # Along the greedy hands, every stored configuration has its hand in the goal.
-    for goal, before, chosen in zip(*np.nonzero(np.isfinite(run.values)), strict=True):
-        hand = ("left", "right")[chosen]
-        miss = task.robot.forward_kinematics(run.targets[goal, before, chosen], hand)
-        assert np.hypot(*(miss - task.goals[goal])) <= task.radius + 1e-12
-    if "y" in task.locked_base:
-        assert not run.targets[np.isfinite(run.values)][:, 1].any()
-
-
 @pytest.mark.parametrize(
     ("shift", "visited"),
     [(0.0, [True, True]), (1e-12, [True, True]), (1e-6, [False, True]), (-1e-6, [True, True])],
@@ -425,29 +404,6 @@ def test_a_subtask_is_credited_with_its_return(discount):
     assert sum(rewards) == run.rewards[0] == -319
     overall = learn(task, "EC1", seed=0, trials=1)
     assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
-
-
-@pytest.mark.parametrize(("task", "condition"), [("descending", "EC1"), ("two-armed-1", "EC4")])
-def test_the_ends_of_the_dose_are_learners_that_there_are(task, condition):
-    """γ = 0 is the reward of each subtask, γ = 1 that of the whole; 0.5 counts all, as printed."""
-    names = ("rewards", "values", "targets", "replay_reward", "corrections", "counters")
-    subtask = VARIANTS[f"{condition}-subtask"]
-    runs = {
-        end: learn(task, replace(subtask, counted="all", discount=end), seed=3, trials=300)
-        for end in (0.0, 0.5, 1.0)
-    }
-    for end, other in ((0.0, subtask), (1.0, CONDITIONS[condition])):
-        theirs = learn(task, other, seed=3, trials=300)
-        for name in names:
-            np.testing.assert_equal(getattr(runs[end], name), getattr(theirs, name))
-        assert [m.ticks for m in runs[end].replay] == [m.ticks for m in theirs.replay]
-    assert runs[0.0].replay_reward != runs[0.5].replay_reward != runs[1.0].replay_reward
-    first = learn(task, runs[0.5].condition, seed=0, trials=1)
-    rewards = [-sum(m.ticks for m in first.initial if m.goal == g + 1) for g in range(3)]
-    if condition == "EC1":
-        weights = 0.5 ** np.abs(np.subtract.outer(range(3), range(3)))
-        credited = [first.values[0, 2, 1], *first.values[1:, 1, 1]]
-        assert credited == (weights @ rewards).tolist()
 
 
 def test_without_corrective_process_a_missed_goal_ends_the_trial():

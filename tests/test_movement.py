@@ -1,13 +1,11 @@
 """Movement: the kernel against the engine that visits every step, and against geometry."""
 
-import math
-
 import numpy as np
 import pytest
 
 from coartic import PAPER, MotionModel, Robot, move
 from coartic.motion.compiled import entry
-from coartic.motion.movement import clear_steps, follow
+from coartic.motion.movement import clear_steps
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import UNEVEN
@@ -172,17 +170,3 @@ def test_inputs_are_left_alone_and_checked():
         move(ROBOT, q, target, "right", (1.0, 1.0), np.nan)
     with pytest.raises(ValueError, match="model.step is 0.0"):
         move(ROBOT, q, target, "right", (1.0, 1.0), 0.1, model=MotionModel(step=0.0))
-
-
-def test_a_path_costs_its_length_however_finely_it_is_cut():
-    q, target = np.zeros(10), np.zeros(10)
-    target[0], target[3] = 1.0, 0.7
-    far = (90.0, 0.0)
-    ticks = {
-        follow(ROBOT, q, np.linspace(q, target, pieces + 1)[1:], "right", far, 0.1).ticks
-        for pieces in (1, 2, 10, 50)
-    }
-    assert ticks == {math.ceil(math.hypot(1.0, 0.7) / 0.01) + 1}
-    there_and_back = follow(ROBOT, q, np.stack([target, q, target]), "right", far, 0.1)
-    assert there_and_back.ticks == math.ceil(3 * math.hypot(1.0, 0.7) / 0.01) + 1
-    np.testing.assert_array_equal(there_and_back.q, target)

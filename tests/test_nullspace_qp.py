@@ -159,29 +159,6 @@ def miss(q, task, hand, goal):
     return np.hypot(*(ROBOT.forward_kinematics(q, hand) - task.goal_array[goal]))
 
 
-def test_the_posture_hits_its_goal_and_lies_near():
-    """Against a general solver started from the same configuration, with the disc itself."""
-    task = load_task("two-armed-2")
-    rng = np.random.default_rng(3)
-    for goal in (0, 1, 2, 3) * 2:
-        q = rng.uniform(-1, 1, ROBOT.dof)
-        posture = controller(task).find_postures(q, (Aim("right", goal),), {})[0]
-        assert miss(posture, task, "right", goal) <= task.radius
-        nearest = minimize(
-            lambda p, q=q: ((p - q) ** 2).sum(),
-            posture,
-            jac=lambda p, q=q: 2 * (p - q),
-            method="SLSQP",
-            constraints={
-                "type": "ineq",
-                "fun": lambda p, goal=goal: task.radius - miss(p, task, "right", goal),
-            },
-        ).x
-        gap = np.linalg.norm(posture - q) - np.linalg.norm(nearest - q)
-        assert -1e-6 < gap < 2e-3  # the polygon lies within the disc
-        assert np.linalg.norm(posture - nearest) < 0.05
-
-
 @pytest.mark.parametrize("name", ["ascending", "two-armed/v1/d003"])
 def test_postures_make_the_way_through_all_discs_shortest(name):
     """A local minimum of the reward's own metric: a general solver finds nothing shorter near."""

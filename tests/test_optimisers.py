@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import coartic
-from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
+from coartic import MotionModel, corrective_trial, execute, load_task
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session
@@ -65,14 +65,6 @@ def test_a_goal_has_all_its_entries_or_none():
         cost.many(points)
     with pytest.raises(ValueError, match="infinite"):
         cost(np.where(goals == 1, np.inf, cost.x0))
-
-
-def test_the_default_hands_are_those_that_do_best_alone():
-    task = load_task("two-armed-1")
-    alone = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
-    assert coartic.objective(task).hands == max(alone, key=alone.get) == "LRLR"
-    with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
-        coartic.objective(tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13))
 
 
 def test_a_trial_that_fails_costs_more_than_any_that_succeeds():

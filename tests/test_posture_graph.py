@@ -1,7 +1,6 @@
 """The posture graph: its dynamic programme against every chain, one by one."""
 
 import itertools
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from coartic.baselines.posture_graph import (
     PostureGraph,
     cheapest_chains,
     move_other_arm,
-    sample_postures,
 )
 from coartic.method import Information, Session
 from tests.support.strategies import changed
@@ -59,27 +57,6 @@ def test_chains_are_the_cheapest(name):
             assert np.all(steps[goal][task.robot.joints(other)] == 0.0)
             miss = task.robot.forward_kinematics(configurations[goal], hand)
             assert np.hypot(*(miss - task.goals[goal])) <= task.radius
-
-
-@pytest.mark.parametrize("name", TASKS)
-@pytest.mark.parametrize("hand", ["left", "right"])
-def test_samples_hit_the_goal_and_move_only_what_can(name, hand):
-    task = TASKS[name]
-    if hand not in task.hands:
-        return
-    spent = Counter()
-    starts = np.tile(task.q0, (80, 1))
-    samples = sample_postures(task, 1, hand, starts, np.random.default_rng(5), spent)
-    assert len(samples) > 60
-    assert spent["forward_kinematics"] > spent["jacobians"] > 0
-    miss = task.robot.forward_kinematics(samples, hand) - task.goals[1]
-    assert np.hypot(*miss.T).max() <= task.radius
-    (other,) = {"left", "right"} - {hand}
-    fixed = task.robot.joints(other)
-    assert np.all(samples[:, fixed] == task.q0[fixed])
-    for axis in task.locked_base:
-        column = "xy".index(axis)
-        assert np.all(samples[:, column] == task.q0[column])
 
 
 def test_a_free_arm_is_spread_over_its_way():

@@ -7,7 +7,6 @@ from coartic.analysis.claims.judgements import CLAIMS
 from coartic.analysis.topics.paper.published import (
     ENTRIES,
     RUNS,
-    published_alone,
     published_cell,
 )
 from coartic.learner import learning
@@ -115,15 +114,6 @@ def test_what_is_learned_never_selects():
         assert set(entry.get("claims", ())) <= set(CLAIMS), entry
         goals = None if task == "general" else len(load_task(task).goals)
         assert all(len(e["hands"]) == goals for e in (entry, than) if "hands" in e), entry
-
-
-def test_derived_numbers():
-    initial = published_alone("ascending", "initial hands")
-    assert (initial.mean, initial.in_words) == (-319, "−319 (derived)")
-    assert published_alone("descending", "initial hands").mean == -333
-    assert published_alone("two-armed-1", "best of all sequences").in_words == "−532"
-    assert published_alone("ascending", "best of all sequences") is None
-    assert ENTRIES["two-armed-1.EC2-RRLR-runs"]["value"] == 11
 
 
 def test_a_cell_puts_its_groups_together():

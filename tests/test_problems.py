@@ -1,7 +1,5 @@
 """Problems for optimisers: hands, budgets, histories, and libraries that take them."""
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -97,42 +95,3 @@ def test_a_method_is_not_told_its_task():
     with pytest.raises(UndeclaredError):
         told.fresh()
     assert "best known" not in repr(told)
-
-
-def by_scipy(problem):
-    optimize = pytest.importorskip("scipy.optimize")
-    options = {"vectorized": True, "updating": "deferred", "polish": False, "maxiter": 1, "rng": 0}
-    optimize.differential_evolution(problem, problem.bounds, x0=problem.x0, popsize=2, **options)
-
-
-def by_cma(problem):
-    cma = pytest.importorskip("cma")
-    cma.fmin2(problem, problem.x0, 0.02, {"seed": 1, "verbose": -9, "maxfevals": 60})
-
-
-def by_nevergrad(problem):
-    nevergrad = pytest.importorskip("nevergrad")
-    box = nevergrad.p.Array(init=problem.x0).set_bounds(*problem.bounds.T)
-    nevergrad.optimizers.OnePlusOne(box, budget=60).minimize(problem)
-
-
-def by_optuna(problem):
-    optuna = pytest.importorskip("optuna")
-    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
-
-    def cost(trial):
-        return problem([trial.suggest_float(f"x{n}", *box) for n, box in enumerate(problem.bounds)])
-
-    study.optimize(cost, n_trials=60)
-
-
-@pytest.mark.parametrize(
-    "minimise", [by_scipy, by_cma, by_nevergrad, by_optuna], ids=lambda f: f.__name__
-)
-def test_libraries_take_a_problem_as_it_is(minimise):
-    problem = coartic.objective(FOUR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        minimise(problem)
-    assert problem.evaluations >= 50
-    assert execute(FOUR, problem.solution).reward == -problem.best_cost

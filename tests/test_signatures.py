@@ -168,11 +168,6 @@ def test_permutations_by_brute_force():
 # What the hand feels
 
 
-def test_movable_joints():
-    assert list(movable(load_task("two-armed-1"), "left")) == [0, 2, 3, 4, 5]  # y is locked
-    assert list(movable(load_task("ascending"), "right")) == [0, 1, 6, 7, 8, 9]
-
-
 JACOBIAN = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]])
 
 

@@ -502,10 +502,3 @@ def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed, t
         whole.plan(), sick.plan()
     assert str(caught.value).startswith(f"{tmp_path / 'sick' / RUNS_FILE} holds what")
     assert "ove it away" not in str(caught.value)
-
-
-def test_a_run_of_other_constants_is_refused(undisturbed, tmp_path):
-    (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    sql("UPDATE settings SET model = json_set(model, '$.step', 1e-6)")(tmp_path / RUNS_FILE)
-    with pytest.raises(CoarticError, match="version 1.1.0"), open_store(tmp_path) as store:
-        store.run(undisturbed.runs.run_id[0])

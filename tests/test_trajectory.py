@@ -14,7 +14,7 @@ from coartic.baselines.posture_graph import PostureGraph
 from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
 from coartic.baselines.trajectory_problem import Instance, segment_cost, spline, trajectory_problem
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.method import Information, MethodError, Session
+from coartic.method import Information, Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve
@@ -62,16 +62,6 @@ def test_segment_costs_are_the_integrals(cost, seed):
         [(casadi.DM(a), casadi.DM(b)) for a, b in zip(start[1:], end[1:], strict=True)],
     )
     assert float(segment_cost(cost, step, time, rates)) == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_goal_in_line_with_a_straight_arm_is_reached_by_the_base_alone():
-    task = changed("ascending", goals=[[6.5, 0.1]], initial_hands="R")
-    problem = trajectory_problem(task.robot, task.hands, 1, "path-length")
-    instance = Instance.of(task, ("right",), still=False, radius=task.radius)
-    plan = problem.solve(instance, np.array([task.q0]) + 0.1)
-    assert plan.converged
-    assert plan.cost == pytest.approx(1.9, abs=1e-6)
-    assert plan.configurations[0] - task.q0 == pytest.approx([1.9] + 9 * [0.0], abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -273,30 +263,6 @@ def test_joints_and_rates_that_are_held():
     assert not problem.rate_bound(free, True).any()
     alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
     assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
-
-
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-@pytest.mark.parametrize("name", ["ascending", "two-armed-2"])
-def test_plans_need_no_correction(method, name):
-    task = load_task(name)
-    if name == "two-armed-2":
-        task = changed(name, goals=task.goals[:3], initial_hands="RRR")
-    few = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 2}
-    result, execution, session = solve(method, task, **few)
-    costs = result.details["costs"]
-    assert execution.hands == min(costs, key=costs.get)
-    assert execution.corrections == 0
-    assert session.meter.solver_iterations > 0
-    assert session.meter.trials == 0
-
-
-def test_goals_out_of_reach_are_infeasible():
-    method = METHODS[0]
-    goals = [[6, 0.1], [6, 90]]
-    task = changed("ascending", goals=goals, locked_base=["y"], initial_hands="RR")
-    with pytest.raises(MethodError, match="goal 2: no posture was found") as failure:
-        solve(method, task)
-    assert failure.value.outcome == "infeasible"
 
 
 def test_the_rest_of_a_piece_lies_ahead():

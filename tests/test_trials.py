@@ -73,17 +73,6 @@ def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
         Session(task, 0, TOLD - BLIND).trials(hands, targets)
 
 
-def test_one_hand_sequence_stands_for_all():
-    task = load_task("two-armed-1")
-    targets = np.random.default_rng(0).normal(0, 0.3, (3, len(task.goals), task.robot.dof))
-    targets[..., :2] = np.nan
-    one, each = (make_trials(task, hands, targets) for hands in ("RLRL", ["RLRL"] * 3))
-    for same, other in zip(one, each, strict=True):
-        np.testing.assert_array_equal(same, other)
-    with pytest.raises(ValueError, match="2 hand sequences for 3 trials"):
-        make_trials(task, ["RLRL", "RRRR"], targets)
-
-
 def test_a_locked_base_stays_where_it_starts():
     start = {"base": [0.0, 0.5], "left": [0.0] * 4, "right": [0.0] * 4}
     task = tiny_task(locked_base=["y"], start=start)
