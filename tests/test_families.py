@@ -207,18 +207,6 @@ def test_each_rule_rejects_what_it_says():
     assert {rule for *_, rule in JUDGED} == {*RULES, None}
 
 
-@pytest.mark.parametrize("side", [-1, 1])
-def test_both_hands_reach_every_goal(side):
-    """With a locked base, a goal at 4.2 is 3.7 from one shoulder and 4.7 from the other."""
-    goals = ((side * 1.0, 2.0), (side * 4.2, 0.1))
-    change = {"goals": goals, "initial_hands": "best-single-hand"}
-    task = with_base(GOOD.model_copy(update=change), "locked")
-    assert broken_rule(FAMILY, task) == "reach"
-    one = ({1: "right", -1: "left"}[side],)
-    alone = task.model_copy(update={"hands": one})
-    assert broken_rule(of_family(hands=one), alone) is None
-
-
 def test_splits_share_no_instance():
     ranges = ("d000..d024", "i000..i024", "2027-000..2027-024", "2028-000..2028-024")
     tasks = [[instance(name) for name in instances_in(f"two-armed/v1/{each}")] for each in ranges]

@@ -405,11 +405,6 @@ def test_a_suite_can_move_one_goal(tmp_path):
     assert [cell.task.name.rpartition("_")[2] for cell in moved] == [
         *("0.1", "0.1000000001", "0.12345678"),
     ]
-    with pytest.raises(CoarticError, match="has no goal 4 to move"):
-        suite_of(
-            tmp_path,
-            'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nmove = {goal=4, by=[[0,1]]}',
-        )
     with pytest.raises(CoarticError, match="out of reach|too far"):
         suite_of(
             tmp_path,

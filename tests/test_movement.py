@@ -84,22 +84,6 @@ def test_grazing_a_goal():
     assert outcomes == {True, False}
 
 
-def test_ticks_of_a_plain_translation():
-    """The base alone carries the hand 1.0 along x in 100 steps of 0.01."""
-    q = np.zeros(10)
-    target = np.zeros(10)
-    target[0] = 1.0
-    far = (100.0, 0.0)
-    # Arrives once within θ^a = 0.01 of the end: after 99 steps, seen on tick 100.
-    assert move(ROBOT, q, target, "right", far, 0.1).ticks == 100
-    # A corrective movement goes all the way: 100 steps and the tick that ends it.
-    assert move(ROBOT, q, target, "right", far, 0.1, stop_on_arrival=False).ticks == 101
-    # Goal ahead: the hand starts at (4.5, 0.1), the rim is at 4.895: 40 steps.
-    ahead = move(ROBOT, q, target, "right", (4.995, 0.1), 0.1)
-    assert (ahead.ticks, ahead.hit) == (41, True)
-    assert ahead.q[0] == pytest.approx(0.40)
-
-
 @entry
 def _cleared(square, rim, closing, slowness, bend):
     return clear_steps(square, rim, closing, slowness, bend)

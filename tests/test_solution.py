@@ -30,41 +30,6 @@ def posture(x, y=0.0):
     return [x, y, *[0.0] * 8]
 
 
-def test_aiming_at_the_rim_stops_short_of_it():
-    """Within θ^a of a rim target the movement ends without a hit; 0.09 inside it hits."""
-    task = tiny_task(goals=[[5.5, 0.1]], initial_hands="R")
-    on_rim = execute(task, planned(posture(0.9 - 1e-9)))
-    assert on_rim.corrections == 1
-    safe = task.radius - PAPER.arrival_tolerance
-    assert execute(task, planned(posture(1.0 - safe + 1e-9))).corrections == 0
-
-
-def test_paths():
-    """A path pays its steps and one tick; it may hit on the way; a miss is corrected."""
-    task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
-    waypoints = np.linspace(posture(0.0), posture(1.0), 11)[1:]
-    path = Movement(1, "right", "path", waypoints=waypoints)
-    onward = Movement(2, "right", "path", waypoints=np.array([posture(2.0)]))
-    execution = execute(task, [path, onward])
-    assert execution.ticks_by_goal() == (91, 101)
-    assert execution.corrections == 0
-    np.testing.assert_array_equal(execution.movements[0].target, posture(1.0))
-    again = execute(task, execution.movements)
-    assert again.reward == execution.reward
-    short = Movement(1, "right", "path", waypoints=waypoints[:5])
-    assert execute(task, [short, onward]).corrections == 1
-
-
-def test_a_planned_movement_is_always_made():
-    task = tiny_task(goals=[[4.5, 0.1]], initial_hands="R")
-    assert execute(task, planned(posture(0.0))).reward == -1
-    corrective = execute(task, [Movement(1, "right", "corrective")])
-    assert corrective.reward == 0
-    assert corrective.hands == "R"
-    stay = Movement(1, "right", "path", waypoints=np.array([posture(0.0)]))
-    assert execute(task, [stay]).reward == -1
-
-
 WAY = np.zeros((1, 10))
 
 

@@ -16,7 +16,7 @@ from coartic.analysis.tables import TABLES
 from coartic.analysis.topics import costs, ranking, scores
 from coartic.analysis.topics.ranking import leaders, paired_difference
 from coartic.analysis.topics.scores import BY_TRIAL
-from tests.support.made_up import MadeUp, fake_study, made_up_optima, row, study_of
+from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 
 def study(rewards):
@@ -32,23 +32,12 @@ def study(rewards):
     return MadeUp(made_up, optima=made_up_optima(*names))
 
 
-def test_gaps_of_a_results_folder():
-    """From the initial solution of two-armed-1 to its optimum."""
-    runs = {
-        "run": [0, 1], "seed": [7, 8], "status": ["ok", "infeasible"], "reason": ["", "planted"],
-        "reward": [-520, None], "hands": ["RRLR", None], "initial_reward": [-675, None],
-    }  # fmt: skip
-    results = fake_study(runs)
-    optima = made_up_optima("two-armed-1")
-    seen = MadeUp(results, optima=optima)
-    optimum = optima["two-armed-1"].reward
-    assert scores.initial_and_optimum(seen) == {"two-armed-1": (-675.0, optimum)}
-    first, second = frames.gaps(scores.scores(seen))
-    assert first == pytest.approx((optimum + 520) / -optimum)
-    assert math.isnan(second)
-    missed = {"two-armed-1": replace(optima["two-armed-1"], reward=-680)}
-    below = MadeUp(results, optima=missed)  # below the initial solution
-    assert not scores.initial_and_optimum(below)
+def test_gaps_are_from_the_initial_solution_to_the_optimum():
+    seen = study({("two-armed-1", "dual-process/EC2"): [-520]})
+    assert scores.initial_and_optimum(seen) == {"two-armed-1": (-675.0, -465)}
+    assert frames.gaps(scores.scores(seen)).tolist() == pytest.approx([(520 - 465) / 465])
+    missed = replace(seen.optima["two-armed-1"], reward=-680)  # below the initial solution
+    assert not scores.initial_and_optimum(MadeUp(seen, optima={"two-armed-1": missed}))
 
 
 LEARNER = {("ascending", "dual-process/EC1"): [-300, -301, -302, -303],

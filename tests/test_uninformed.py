@@ -31,16 +31,6 @@ def solve(method, task, seed=0, budget=None, model=None, **parameters):
     return session, result
 
 
-def test_joints_explored_for_a_hand_sequence():
-    session = Session(load_task("two-armed-1"), 0, TOLD)
-    attempts = Attempts(session, UninformedParameters())
-    mask = attempts.explored("LRLR")
-    assert mask[:, 0].all()
-    assert not mask[:, 1].any()  # the base is locked in y
-    np.testing.assert_array_equal(mask[:, 2:6].T, [[1, 1, 1, 0]] * 4)
-    np.testing.assert_array_equal(mask[:, 6:].T, [[1, 1, 1, 1]] * 4)
-
-
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 @pytest.mark.parametrize("name", ["ascending", "two-armed-1"])
 def test_trials_counted_kept_and_made_again(method, name):
@@ -214,17 +204,6 @@ def test_guesses_fill_the_box():
     with pytest.raises(BudgetError):
         Guesses().optimise(cost, np.random.default_rng(0))
     np.testing.assert_allclose([asked[0].min(axis=0), asked[0].max(axis=0)], box.T, atol=0.05)
-
-
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
-def test_failed_trials_are_counted_and_survived(method):
-    """Noise so large that some corrections take more iterations than there are."""
-    task, model = load_task("ascending"), MotionModel(max_iterations=100)
-    assert corrective_trial(task, "RRR", model=model).completed
-    session, result = solve(method, task, trials=400, sigma=1.0, model=model)
-    assert 0 < session.meter.failed_trials < 399
-    completed = [reward for reward in session.rewards if reward is not None]
-    assert execute(task, result.solution).reward == max(completed)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

@@ -4,9 +4,6 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
-import pandas as pd
-
-from coartic import load_task
 from coartic.analysis.study import Study
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan
@@ -88,25 +85,3 @@ def study_of(runs, tasks, *, folder="made-up", trials=10_000, **more):
     """A study of rows of runs on tasks."""
     plan = plan_for(tasks, runs, trials=trials, **more)
     return Study(Path(folder), plan, MADE_WITH, runs)
-
-
-def fake_study(runs, *, task="two-armed-1", method="dual-process/EC2"):
-    """A study of one cell, of rows that say no more than what is asked about."""
-    frame = pd.DataFrame(runs).assign(
-        task=task,
-        method=method,
-        variant="",
-        label=method,
-        commit="abc",
-        packages="p",
-        replay_reward=None,
-    )
-    frame = frame.assign(run_id=[f"run-{k}" for k in range(len(frame))])
-    frame = frame.assign(trials=10_000, failed_trials=[7] + [0] * (len(frame) - 1))
-    frame = frame.assign(
-        told="corrective process, reward by trial", parameters="{}", other_arm_travel=1.0,
-        movement_ticks=1, forward_kinematics=1, jacobians=1, solver_iterations=0, build_s=0.0,
-        solve_s=0.1, wall_s=0.2, warm=True, together=1, solution_corrections=0, proven_bound=None,
-    )  # fmt: skip
-    frame = frame.astype({"reward": "Int64", "initial_reward": "Int64"})
-    return study_of(frame, [load_task(task)])
