@@ -51,19 +51,6 @@ def software(made_with: Mapping[str, Any] | None = None) -> str:
     )
 
 
-def results_of_version(released: Mapping[str, str]) -> str:
-    """The results that this version ships in BibTeX, each suite with the SHA-256 of its file."""
-    files = ", ".join(f"{suite}.sqlite.xz {digits}" for suite, digits in released.items())
-    return misc(
-        "coartic-results",
-        author="{The coartic developers}",
-        title=latex(f"Results of coartic {__version__}: suites {' and '.join(released)}"),
-        year="2026",
-        howpublished="Data shipped with the software",
-        note=latex(f"SHA-256: {files}"),
-    )
-
-
 def bibliography(
     methods: Mapping[str, MethodCard],
     *,
@@ -82,7 +69,15 @@ def bibliography(
     works = {**references(), "coartic": software(environment)}
     reasons: dict[str, list[str]] = {"coartic": ["the software"]}
     if released:
-        works["coartic-results"] = results_of_version(released)
+        files = ", ".join(f"{suite}.sqlite.xz {digits}" for suite, digits in released.items())
+        works["coartic-results"] = misc(
+            "coartic-results",
+            author="{The coartic developers}",
+            title=latex(f"Results of coartic {__version__}: suites {' and '.join(released)}"),
+            year="2026",
+            howpublished="Data shipped with the software",
+            note=latex(f"SHA-256: {files}"),
+        )
         reasons["coartic-results"] = ["the results that this version ships"]
     reasons[THE_PAPER] = ["the paper"]
     others = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import Any, NamedTuple
 
@@ -50,7 +50,19 @@ def table(
         @cached
         @wraps(rows)
         def frame(study: Study) -> pd.DataFrame:
-            made = frame_of(rows(study), f"{columns}, run_ids")
+            named = list(rows(study))
+            made = pd.DataFrame([row for _, row in named], [name for name, _ in named])
+            names: list[str] = []
+            for column in (*columns.split(", "), "run_ids"):
+                if column.endswith("*"):
+                    names += [name for name in made.columns if name.startswith(column[:-1])]
+                elif column.endswith("[]"):
+                    names += [column[:-2] + ending for ending in ("", "_low", "_high")]
+                elif column.endswith("±"):
+                    names += [column[:-1], f"{column[:-1]}_sd"]
+                else:
+                    names.append(column)
+            made = made.reindex(columns=names).rename_axis("row")
             made.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
             made.attrs["methods"] = names_of_settings(study)
             return made
@@ -58,23 +70,6 @@ def table(
         return frame
 
     return as_table
-
-
-def frame_of(rows: Iterable[tuple[str, Row]], columns: str) -> pd.DataFrame:
-    """Named rows as a table with these columns (:func:`table`)."""
-    named = list(rows)
-    frame = pd.DataFrame([row for _, row in named], [name for name, _ in named])
-    names: list[str] = []
-    for column in columns.split(", "):
-        if column.endswith("*"):
-            names += [name for name in frame.columns if name.startswith(column[:-1])]
-        elif column.endswith("[]"):
-            names += [column[:-2] + ending for ending in ("", "_low", "_high")]
-        elif column.endswith("±"):
-            names += [column[:-1], f"{column[:-1]}_sd"]
-        else:
-            names.append(column)
-    return frame.reindex(columns=names).rename_axis("row")
 
 
 def runs_of(*cells: CellRuns) -> Row:

@@ -45,7 +45,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-MODEL = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
+MODEL: dict[str, Any] = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
     "arrival_tick": 1, "corrective_arrival": False, "first_step": False, "whole_last_step": False,
 }  # fmt: skip
 LEARNER = {
@@ -300,15 +300,11 @@ def schema(db: sqlite3.Connection) -> list[list[str]]:
     ]
 
 
-def fixed(method: str) -> dict[str, Any]:
-    """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
-    return LEARNER if method.startswith("dual-process/") else {}
-
-
 def other_reading(db: sqlite3.Connection) -> str:
     """Another reading of the paper than this version's, as ``ties=right``, or nothing."""
     for method, *texts in db.execute("SELECT method, model, parameters FROM settings"):
-        for text, now in zip(texts, (MODEL, fixed(method)), strict=True):
+        learner: dict[str, Any] = LEARNER if method.startswith("dual-process/") else {}
+        for text, now in zip(texts, (MODEL, learner), strict=True):
             for name, value in json.loads(text).items():
                 if now.get(name, value) != value:
                     return f"{name}={value}"
@@ -319,10 +315,11 @@ def check_identity(row: Any) -> None:
     """Raises ValueError where a run is not that of its setting: its id is a hash of task, method,
     parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
     task, model = json.loads(row["definition"]), json.loads(row["model"])
+    learner = LEARNER if row["method"].startswith("dual-process/") else {}
     asked = {
         "task": task,
         "method": row["method"],
-        "parameters": {**fixed(row["method"]), **json.loads(row["parameters"])},
+        "parameters": {**learner, **json.loads(row["parameters"])},
         "model": {**MODEL, **model},
         "trial_budget": row["trial_budget"],
     }

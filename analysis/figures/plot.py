@@ -84,22 +84,13 @@ def figure(
         @styled
         def plot(study: Study) -> Plot:
             drawing, data, alt, tasks = draw(study)
-            return Plot(name, title, caption + dagger(tasks), alt, drawing, data)
+            dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
+            return Plot(name, title, caption + dagger, alt, drawing, data)
 
         plot.__doc__ = draw.__doc__
         return plot
 
     return as_figure
-
-
-def dagger(tasks: Iterable[Task]) -> str:
-    """Meaning of the dagger, for a caption; empty where no task is reconstructed."""
-    return f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
-
-
-def missing(study: Study, what: str) -> CoarticError:
-    """The error of a figure that the folder's runs do not allow."""
-    return CoarticError(f"{study.folder}: {what}")
 
 
 def looks_in(study: Study, labels: Collection[str]) -> dict[str, Look]:

@@ -95,9 +95,10 @@ def notes_on_tables(study: Study) -> str:
 
 @cached
 def provenance(study: Study) -> dict[str, Any]:
-    """Suite, folder, seed, version, commit and date of the runs, and their number."""
+    """Title of the report; suite, folder, number, seed, version, commit and date of the runs."""
     made_with = study.made_with
     return {
+        "title": f"Coarticulation of a simulated robot: suite {study.suite}",
         "suite": study.suite,
         "folder": quote(str(study.folder)),
         "runs": len(study.runs),

@@ -155,7 +155,6 @@ def page(study: Study) -> str:
     except PackageNotFoundError:
         links = []
     return template("page.html.jinja").render(
-        title=title(study),
         description=" ".join(text for _, text in about.answers(study)),
         styles=(here / "page.css").read_text("utf-8") + text_of("play.css"),
         player=player(study),
@@ -174,7 +173,6 @@ def page(study: Study) -> str:
 def summary(study: Study) -> str:
     """The first screen as Markdown, with pictures, for where code hosts show it."""
     return template("summary.md.jinja").render(
-        title=title(study),
         answers=about.answers(study),
         provenance=about.provenance(study),
         figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
@@ -184,11 +182,6 @@ def summary(study: Study) -> str:
 def inert(text: str) -> str:
     """Text for Markdown in which names from elsewhere make no tags, links and pictures."""
     return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", text).replace("](", "]\\(")
-
-
-def title(study: Study) -> str:
-    """Title of the page and of the summary."""
-    return f"Coarticulation of a simulated robot: suite {study.suite}"
 
 
 def claims_for_page(study: Study) -> list[dict[str, str]]:

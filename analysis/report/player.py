@@ -17,7 +17,7 @@ from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
 from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS
 
 CONTROL = "play-link"
 """Hidden control of the figure that holds its state for the address of the page."""
@@ -69,55 +69,49 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     shown = {*LEARNERS, *main_methods(labels), *ranked}
     runs = []
     for label in in_order([label for label in labels if label in shown]):
-        cells = [(name, label) for name in tasks]
-        if all(cell in study.cells and moves_straight(study, cell) for cell in cells):
-            films = [typical_of(study, cell) for cell in cells]
+        films = [film_of(study, (name, label)) for name in tasks]
+        if all(films):
             if len(tasks) > 1:
-                for film, cell in zip(films, cells, strict=True):
-                    film["reached"] = study.postures(*cell)[:, 0].round(3).tolist()
+                for film, name in zip(films, tasks, strict=True):
+                    film["reached"] = study.postures(name, label)[:, 0].round(3).tolist()
             runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
 
 
-def moves_straight(study: Study, cell: CellKey) -> bool:
-    """Whether a cell has solutions, and no movement of them follows a path."""
-    kinds = {each.kind for run in study.executed(*cell).runs for each in run.movements}
-    return bool(kinds) and "path" not in kinds
-
-
-def typical_of(study: Study, cell: CellKey) -> dict[str, Any]:
-    """The run of a cell nearest the median reward."""
-    solutions = study.executed(*cell)
-    good = study.cells[cell].good[: len(solutions.runs)]
-    k = typical_run(replace(study.cells[cell], runs=good))
-    movements = shortened(solutions.task, solutions.runs[k])
-    return {
-        "run": solutions.run_ids[k],
-        "ticks": solutions.runs[k].ticks,
-        "movements": [for_script(movement) for movement in movements],
-    }
+def film_of(study: Study, key: CellKey) -> dict[str, Any]:
+    """The run of a cell nearest the median reward, as ``model.js`` executes it; empty where a cell
+    has no solution, or one that follows a path."""
+    solutions = study.executed(*key) if key in study.cells else None
+    if not solutions or not solutions.runs:
+        return {}
+    if any(movement.kind == "path" for run in solutions.runs for movement in run.movements):
+        return {}
+    good = study.cells[key].good[: len(solutions.runs)]
+    k = typical_run(replace(study.cells[key], runs=good))
+    movements = [
+        {
+            "goal": movement.goal - 1,
+            "hand": HANDS.index(movement.hand),
+            "kind": movement.kind,
+            "target": None if movement.target is None else movement.target.tolist(),
+        }
+        for movement in shortened(solutions.task, solutions.runs[k])
+    ]
+    return {"run": solutions.run_ids[k], "ticks": solutions.runs[k].ticks, "movements": movements}
 
 
 def shortened(task: Task, made: Execution) -> tuple[Movement, ...]:
-    """The movements of a run with as few digits as give each goal the same ticks."""
+    """The movements of a run with as few digits as give each goal the same ticks.
+
+    Joints that keep their start value stay exact.
+    """
     for digits in range(2, 7):
-        shorter = tuple(rounded(movement, task.q0, digits) for movement in made.movements)
+        shorter = []
+        for movement in made.movements:
+            q = movement.target
+            rounded = None if q is None else np.where(q == task.q0, q, np.round(q, digits))
+            shorter.append(replace(movement, target=rounded))
         again = execute(task, shorter)
         if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
-            return shorter
+            return tuple(shorter)
     return made.movements
-
-
-def rounded(movement: Movement, q0: Array, digits: int) -> Movement:
-    """Round the target to so many decimals; joints that keep their start value stay exact."""
-    target = movement.target
-    if target is None:
-        return movement
-    return replace(movement, target=np.where(target == q0, target, np.round(target, digits)))
-
-
-def for_script(movement: Movement) -> dict[str, Any]:
-    """A movement as ``model.js`` executes it."""
-    target = None if movement.target is None else movement.target.tolist()
-    hand = HANDS.index(movement.hand)
-    return {"goal": movement.goal - 1, "hand": hand, "kind": movement.kind, "target": target}

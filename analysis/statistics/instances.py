@@ -90,7 +90,17 @@ def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate
     deviations = np.zeros(resamples)
     for place, (family, instances) in enumerate(scores.items()):
         rng = np.random.default_rng([estimates.SEED, place])
-        deviations += resampled_deviations(instances, values[family], rng, resamples)
+        count = len(instances)
+        which = rng.integers(count, size=(resamples, count))
+        drawn = values[family][which]
+        for number, samples in enumerate(instances):
+            chosen = which == number
+            for sign, runs in zip((1, -1), samples, strict=False):
+                if np.ptp(runs):
+                    places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
+                    drawn[chosen] += sign * (runs[places].mean(axis=1) - runs.mean())
+        wider = math.sqrt(count / (count - 1))
+        deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
     if np.abs(deviations).max() <= estimates.NEGLIGIBLE * abs(mean):
         return Estimate(mean, mean, mean, n=n)
     low, high = mean + np.quantile(deviations / len(values), estimates.TAILS)
@@ -104,19 +114,3 @@ def greatest_value(runs: Runs, sign: int) -> float:
     """Greatest value that an instance's runs can make, or (``sign`` -1) that less it can."""
     signs = (sign, -sign)
     return math.fsum(float((s * of_runs).max()) for s, of_runs in zip(signs, runs, strict=False))
-
-
-def resampled_deviations(
-    instances: Sequence[Runs], values: Array, rng: np.random.Generator, resamples: int
-) -> Array:
-    """Deviations of resampled means of one family from its mean, shape ``(resamples,)``."""
-    count = len(instances)
-    which = rng.integers(count, size=(resamples, count))
-    drawn = values[which]
-    for number, samples in enumerate(instances):
-        chosen = which == number
-        for sign, runs in zip((1, -1), samples, strict=False):
-            if np.ptp(runs):
-                places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
-                drawn[chosen] += sign * (runs[places].mean(axis=1) - runs.mean())
-    return np.asarray((drawn.mean(axis=1) - values.mean()) * math.sqrt(count / (count - 1)))

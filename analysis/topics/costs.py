@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from coartic import CoarticError
 from coartic.analysis import methods
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.settings import name_in, shown_methods
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.running_times import RunningTimes
@@ -146,7 +147,7 @@ def draw_costs(study: Study) -> Parts:
     data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
-        raise missing(study, "no method that reaches a target on a task with a known optimum")
+        raise CoarticError("no method that reaches a target on a task with a known optimum")
     looks = looks_in(study, data.method.unique())
     size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
     drawing, panels = style.panels((1, len(spends)), size)

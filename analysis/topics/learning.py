@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic import Task
+from coartic import CoarticError, Task
 from coartic.analysis import methods
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.study import Study, one_by_one
@@ -81,7 +81,7 @@ def draw_learning(study: Study) -> Parts:
     """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
     data = learning_curves(study)
     if not len(data):
-        raise missing(study, "no run that learns by trial")
+        raise CoarticError("no run that learns by trial")
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
@@ -113,36 +113,30 @@ def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
     ``best_high``, ``trials`` (mean over runs and the last ``window`` trials).
     """
-    shown = [*cells_with_curve(study)]
+    shown: list[tuple[str, str]] = []
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        labels = [
+            label
+            for label in methods.in_order([label for name, label in study.cells if name == task])
+            if len(study.cells[task, label].good)
+            and (label in CURVES or not methods.is_built_in(label) or compares_settings(study))
+        ]
+        two_armed = {*methods.LEARNERS} & {*labels} - {methods.EC1}
+        shown += [(task, label) for label in labels if not (two_armed and label == methods.EC1)]
     wanted = {run for key in shown for run in study.cells[key].good.run_id}
     trials_of = {run: rewards for run, rewards in study.rewards() if run in wanted}
     curves = [pd.DataFrame()]
     for task, label in shown:
-        ids = map(str, study.cells[task, label].good.run_id)
-        runs = [trials_of[run_id] for run_id in ids if run_id in trials_of]
+        good = study.cells[task, label].good
+        runs = [trials_of[run_id] for run_id in map(str, good.run_id) if run_id in trials_of]
         if runs:
             named = {"task": task, "method": label, "runs": len(runs)}
             curve = learning_curve(runs, window)
-            failed = study.cells[task, label].good.failed_trials.sum()
-            if sum(int(np.isnan(run).sum()) for run in runs) > failed:  # more were left out
+            if sum(int(np.isnan(run).sum()) for run in runs) > good.failed_trials.sum():
+                # More trials were left out than failed.
                 curve["trials"] = np.full(len(curve["trial"]), math.nan)
             curves.append(pd.DataFrame(named | curve))
     return pd.concat(curves[1:] or curves, ignore_index=True)
-
-
-def cells_with_curve(study: Study) -> Iterator[tuple[str, str]]:
-    """Cells with a learning curve: EC1 stands for the learner where it is the only condition."""
-    for task in (name for name in study.tasks if name in one_by_one(study)):
-        solved = [
-            label for (name, label), cell in study.cells.items() if name == task and len(cell.good)
-        ]
-        labels = [
-            label
-            for label in methods.in_order(solved)
-            if label in CURVES or not methods.is_built_in(label) or compares_settings(study)
-        ]
-        two_armed = {*methods.LEARNERS} & {*labels} - {methods.EC1}
-        yield from ((task, label) for label in labels if not (two_armed and label == methods.EC1))
 
 
 def learning_curve(runs: Sequence[Array], window: int) -> dict[str, Array]:

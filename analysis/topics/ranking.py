@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from coartic import CoarticError
 from coartic.analysis import frames, methods
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import LEVEL, Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test, sign_flip_test
@@ -89,7 +90,16 @@ def ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each, grouped by the use of the reward."""
     over, tested = main_gaps(study).set_index("method"), against_learner(study)
     single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
-    for method in [*over.index, *solved_some(study, over.index)]:
+    # Methods without a mean gap that solved every run on some task, by their gaps on the first.
+    others = [
+        (place, scores.cell_gap(study, cell), method)
+        for method, cells in scores.compared(study).items()
+        if method not in over.index and not method.startswith(methods.TOGETHER)
+        for place, task in enumerate(study.tasks)
+        if (cell := cells.get(task)) is not None and len(cell.good) == len(cell.runs)
+    ]
+    others.sort(key=lambda other: other[:2])
+    for method in dict.fromkeys([*over.index, *(method for *_, method in others)]):
         cells = scores.compared(study)[method]
         row: Row = {"method": method, "knows": scores.groups(study)[method], "gap": math.nan}
         row |= {f"on {task}": math.nan for task in single}
@@ -106,18 +116,6 @@ def ranking(study: Study) -> Rows:
             row |= {"worse": sum(sure.reward < sure.learner)}
         row |= {"runs": sum(len(cell.runs) for cell in cells.values()), **runs_of(*cells.values())}
         yield method, row
-
-
-def solved_some(study: Study, ranked: pd.Index) -> list[str]:
-    """Methods without a mean gap that solved every run on some task, by their gaps on the first."""
-    gaps = [
-        (place, scores.cell_gap(study, cell), method)
-        for method, cells in scores.compared(study).items()
-        if method not in ranked and not method.startswith(methods.TOGETHER)
-        for place, task in enumerate(study.tasks)
-        if (cell := cells.get(task)) is not None and len(cell.good) == len(cell.runs)
-    ]
-    return list(dict.fromkeys(method for *_, method in sorted(gaps, key=lambda row: row[:2])))
 
 
 def leaders(study: Study, group: str) -> pd.DataFrame:
@@ -166,7 +164,7 @@ def draw_ranking(study: Study) -> Parts:
     """Draw the gap to the optimum of every method, a mean over tasks."""
     rows = main_gaps(study)
     if not len(rows):
-        raise missing(study, "no method with a solution to every run and a known optimum")
+        raise CoarticError("no method with a solution to every run and a known optimum")
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
     groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]

@@ -9,9 +9,9 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from coartic import Task
+from coartic import CoarticError, Task
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER
 from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.study import Study, one_by_one
@@ -60,7 +60,7 @@ def draw_start_and_goals(study: Study) -> Parts:
     """Draw start configuration and goals, a panel for each task."""
     shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
     if not shown:
-        raise missing(study, "only random tasks, too many to show each")
+        raise CoarticError("only random tasks, too many to show each")
     rows: list[dict[str, object]] = []
     for task in shown:
         start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
+from coartic import CoarticError
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import is_variant, name_of
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
@@ -37,7 +38,7 @@ def draw_two_postures(study: Study) -> Parts:
     """Draw postures at one goal before two others: thin every run, thick their means."""
     shared = shared_goal(study)
     if shared is None:
-        raise missing(study, "no method has solved runs on two tasks that share their first goals")
+        raise CoarticError("no method has solved runs on two tasks that share their first goals")
     drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
     draw_postures(axes, shared)
     parts = []

@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
+from coartic import CoarticError
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, looks_in, missing, spoken
+from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.methods import (
     EC1,
     EC2,
@@ -216,7 +216,7 @@ def draw_gaps_by_family(study: Study) -> Parts:
     """Gap to the best known reward of each instance, by method and family."""
     data = instance_gaps(study)
     if not len(data):
-        raise missing(study, "no solved runs on instances of a family of tasks")
+        raise CoarticError("no solved runs on instances of a family of tasks")
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = looks_in(study, order)
     families = list(dict.fromkeys(data.family))
@@ -225,8 +225,17 @@ def draw_gaps_by_family(study: Study) -> Parts:
     for axes, family in zip(panels, families, strict=True):
         for place, label in enumerate(order):
             rows = data[(data.method == label) & (data.family == family)]
-            rows = rows.assign(gap=rows.gap.clip(upper=_FARTHEST))
-            draw_instances(axes, -place, rows, "gap", looks[label]["color"])
+            if not len(rows):
+                continue
+            heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
+            dot: Any = {"color": looks[label]["color"], "markersize": 2.5, "markeredgewidth": 0}
+            gaps = rows.gap.clip(upper=_FARTHEST)
+            axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
+            mean = rows.iloc[0]
+            ends = [mean.mean_low, mean.mean_high]
+            axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)
+            diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
+            axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
         axes.set_xlim(-0.004, _FARTHEST * 1.15)
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
@@ -237,19 +246,6 @@ def draw_gaps_by_family(study: Study) -> Parts:
     style.letters(panels)
     means = spoken(data.drop_duplicates(["method", "family"]), "{method}, {family}: {mean:.1%}")
     return drawing, data, f"Gaps of instances by method and family. {means}.", ()
-
-
-def draw_instances(axes: Axes, y: float, rows: pd.DataFrame, name: str, color: str) -> None:
-    """A dot for each instance about a height, and on it their mean with its interval."""
-    if not len(rows):
-        return
-    heights = y + 0.11 * (np.arange(len(rows)) % 3 - 1)
-    dot: Any = {"color": color, "markersize": 2.5, "alpha": 0.5, "markeredgewidth": 0}
-    axes.plot(rows[name], heights, "o", linestyle="", **dot)
-    first = rows.iloc[0]
-    axes.plot([first.mean_low, first.mean_high], [y, y], color=style.INK, linewidth=1)
-    diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
-    axes.plot(first["mean"], y, "D", color=style.INK, **diamond)
 
 
 def on_random_tasks(study: Study) -> str:
@@ -264,9 +260,9 @@ def on_random_tasks(study: Study) -> str:
         for row in gaps.to_dict("records")
     ]
     return (
-        f"On {len(best)} random tasks methods end behind the best known reward by this much (mean "
-        f"over families with two arms): {', '.join(ends)}. On {sum(each.proven for each in best)} "
-        "tasks this reward is proven to be the optimum."
+        f"Gaps to the best known reward on {len(best)} random tasks (means over families with two "
+        f"arms): {', '.join(ends)}. On {sum(each.proven for each in best)} tasks this reward is "
+        "the proven optimum."
     )
 
 

@@ -8,9 +8,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from coartic import Task
+from coartic import CoarticError, Task
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Rows, table
@@ -71,7 +71,7 @@ def draw_recruitment(study: Study) -> Parts:
     data = hand_shares(study)
     data = data[data.task.isin(one_by_one(study)) & data.method.isin(main_methods(data.method))]
     if not len(data):
-        raise missing(study, "no solved run on a task with two hands")
+        raise CoarticError("no solved run on a task with two hands")
     # Methods stand in one order on all tasks.
     order_of = {label: place for place, label in enumerate(main_methods(data.method))}
     data = data.sort_values(

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from coartic import CoarticError
 from coartic.analysis.figures import style
-from coartic.analysis.figures.plot import Parts, figure, missing
+from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import standard_deviation
@@ -142,8 +143,8 @@ def draw_published(study: Study) -> Parts:
     """Difference of every mean reward to the printed one, with interval and margin."""
     data = published_differences(study)
     if not len(data):
-        raise missing(
-            study, f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
+        raise CoarticError(
+            f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
         )
     drawing, (axes,) = style.panels((1, 1), (style.ONE, 0.85 + 0.185 * len(data)))
     tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
