@@ -1,29 +1,20 @@
-"""The page: its sections in their order, and every table and figure of the report by name."""
+"""The page: its sections in their order, and every table and figure of the report by its id."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import pandas as pd
 
 from coartic.analysis.figures.plot import Plot
 from coartic.analysis.study import Study
-from coartic.analysis.topics import costs, learning, ranking, settings, tasks
+from coartic.analysis.topics import costs, learning, ranking, scores, settings, tasks
 from coartic.analysis.topics.coarticulation import postures
+from coartic.analysis.topics.coarticulation import tables as coarticulation
 from coartic.analysis.topics.families import random_tasks
 from coartic.analysis.topics.paper import hands, rewards, verdicts
-
-FIGURES: Mapping[str, Callable[[Study], Plot]] = {
-    "postures": postures.draw_two_postures,
-    "published": rewards.draw_published,
-    "ranking": ranking.draw_ranking,
-    "runtimes": costs.draw_costs,
-    "recruitment": hands.draw_recruitment,
-    "learning-curves": learning.draw_learning,
-    "gaps-by-family": random_tasks.draw_gaps_by_family,
-    "tasks": tasks.draw_start_and_goals,
-}
-"""Every figure by its id: a function of a study. It raises CoarticError where the folder's runs do
-not allow its figure."""
+from coartic.analysis.words import id_of
 
 
 @dataclass(frozen=True)
@@ -34,12 +25,11 @@ class Section:
     short: str
     """Name among the contents."""
     title: str
-    table: str
-    """Id of the table."""
+    table: Callable[[Study], pd.DataFrame]
     caption: str
     """Caption of the table."""
-    figure: str = ""
-    """Id of the picture."""
+    figure: Callable[[Study], Plot] | None = None
+    """It raises CoarticError where the folder's runs do not allow it."""
     sentence: Callable[[Study], str] | None = None
     """Returns the finding in words, for enough runs and for too few, with the number that failed;
     empty where the runs say nothing."""
@@ -57,7 +47,7 @@ SECTIONS = (
         "settings",
         "Settings",
         "Which setting is best?",
-        table="settings",
+        table=settings.settings,
         caption="Mean reward of each setting (ticks), the best of each task first",
         sentence=settings.best_settings,
         answer="Best",
@@ -69,9 +59,9 @@ SECTIONS = (
         "coarticulation",
         "Coarticulation",
         "Does the next goal change the movement?",
-        table="contexts",
+        table=coarticulation.contexts,
         caption="Postures at a goal that two tasks share",
-        figure="postures",
+        figure=postures.draw_postures,
         sentence=postures.next_goal,
         answer="Coarticulation",
         note="Postures are compared in length units and rad. Random guesses are a placebo: they "
@@ -81,9 +71,9 @@ SECTIONS = (
         "paper",
         "Paper",
         "Are the paper's rewards reproduced?",
-        table="published",
+        table=rewards.published,
         caption="Learned rewards, published and ours (ticks)",
-        figure="published",
+        figure=rewards.draw_published,
         sentence=rewards.rewards_reproduced,
         note="EC1 to EC4 are the paper's exploration conditions. EC1 explores the right arm only, "
         "EC2 both arms with the closest hand, EC3 the choice of hand as well but not the waiting "
@@ -95,7 +85,7 @@ SECTIONS = (
         "claims",
         "Claims",
         "Do the paper's claims hold?",
-        table="claims",
+        table=verdicts.claims,
         caption="Claims; open one to see its evidence",
         sentence=verdicts.claims_hold,
         answer="Paper",
@@ -110,9 +100,9 @@ SECTIONS = (
         "nearest",
         "Ranking",
         "Who comes nearest to the optimum?",
-        table="ranking",
+        table=ranking.ranking,
         caption="Gap to the optimum, or to the best known reward where no optimum is proven",
-        figure="ranking",
+        figure=ranking.draw_ranking,
         sentence=ranking.nearest,
         answer="Nearest",
         note="Methods are grouped by their use of the reward: its value after each trial, its "
@@ -126,9 +116,9 @@ SECTIONS = (
         "runtimes",
         "Cost",
         "What does it cost?",
-        table="runtimes",
+        table=costs.runtimes,
         caption="Cost of reaching a quarter and half of the targets",
-        figure="runtimes",
+        figure=costs.draw_runtimes,
         sentence=costs.what_it_costs,
         answer="Cost",
         note="Kinematics: number of forward-kinematics evaluations, a cost that is the same on "
@@ -138,18 +128,18 @@ SECTIONS = (
         "hands",
         "Hands",
         "Which hands are chosen?",
-        table="hands",
+        table=hands.hands,
         caption="Learned rewards by hand sequence, published and ours (ticks)",
-        figure="recruitment",
+        figure=hands.draw_recruitment,
         sentence=hands.changed_hands,
     ),
     Section(
         "learning",
         "Learning",
         "How fast is it learned?",
-        table="learning",
+        table=learning.learning,
         caption="Best reward so far, mean over runs (ticks)",
-        figure="learning-curves",
+        figure=learning.draw_learning_curves,
         sentence=learning.how_fast,
         note="Gain: improvement over the initial solution. ∞: never improved.",
     ),
@@ -157,7 +147,7 @@ SECTIONS = (
         "signatures",
         "Signatures",
         "Which signatures of coarticulation does each method show?",
-        table="signatures",
+        table=coarticulation.signatures,
         caption="Signatures of coarticulation, means over goals and runs",
         sentence=postures.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
@@ -169,9 +159,9 @@ SECTIONS = (
         "families",
         "Random tasks",
         "What holds on random tasks?",
-        table="family-gaps",
+        table=random_tasks.family_gaps,
         caption="Gap to the best known reward, in per cent of it: mean over instances",
-        figure="gaps-by-family",
+        figure=random_tasks.draw_gaps_by_family,
         sentence=random_tasks.on_random_tasks,
         answer="Random tasks",
         single=False,
@@ -180,7 +170,7 @@ SECTIONS = (
         "exploration",
         "Exploration",
         "Does more exploration pay on random tasks?",
-        table="exploration",
+        table=random_tasks.exploration,
         caption="More exploration against less, in per cent of the best known reward",
         sentence=random_tasks.exploration_pays,
         note="By hands: the part of the gain that comes from the hand sequences, if each run had "
@@ -191,7 +181,7 @@ SECTIONS = (
         "signs",
         "Signs",
         "Does coarticulation show on random tasks?",
-        table="family-signs",
+        table=random_tasks.family_signs,
         caption="Signs of coarticulation over instances",
         single=False,
     ),
@@ -199,9 +189,9 @@ SECTIONS = (
         "tasks",
         "Tasks",
         "What are the tasks?",
-        table="tasks",
+        table=tasks.tasks,
         caption="Tasks with their initial, learned and best possible rewards (ticks)",
-        figure="tasks",
+        figure=tasks.draw_tasks,
         note="Initial: the corrective process alone, with the task's initial hands. Learned: the "
         "learner's best condition. Best known: the optimum where the proven bound equals it. "
         "Proven bound: a reward that no solution can exceed.",
@@ -210,9 +200,14 @@ SECTIONS = (
         "methods",
         "All methods",
         "What did every method do on every task?",
-        table="methods",
+        table=scores.methods,
         caption="Reward, gap to the optimum, hands and costs of a run (medians)",
         note="Every method works on the same robot. Its movements are scored by a function hidden "
         "from the method. Times are seconds of solving.",
     ),
 )
+TABLES = {id_of(each.table): each.table for each in SECTIONS}
+TABLES["against-learner"] = ranking.against_learner
+"""Every table by its id, functions of a study; the last is a CSV file that no section shows."""
+FIGURES = {id_of(each.figure): each.figure for each in SECTIONS if each.figure}
+"""Every figure by its id."""

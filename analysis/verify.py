@@ -45,7 +45,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
 }
-MODEL: dict[str, Any] = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
+MODEL = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
     "arrival_tick": 1, "corrective_arrival": False, "first_step": False, "whole_last_step": False,
 }  # fmt: skip
 LEARNER = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,12 @@ def read_beside(module: str, name: str = "") -> dict[str, Any]:
     path = Path(module)
     file = path.with_name(f"{name}.toml") if name else path.with_suffix(".toml")
     return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def id_of(function: Callable[..., Any]) -> str:
+    """Id of a table or figure by its function: ``family-gaps`` of ``family_gaps``, ``ranking`` of
+    ``draw_ranking``."""
+    return function.__name__.removeprefix("draw_").replace("_", "-")
 
 
 def number(value: float, digits: int | None = None) -> str:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from coartic import CoarticError, load_task
+from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
-from coartic.analysis.tables import TABLES
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks import released, template
 from coartic.benchmarks.beside import put_beside

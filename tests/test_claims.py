@@ -16,11 +16,11 @@ from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader
+from coartic.analysis.sections import TABLES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
-from coartic.analysis.tables import TABLES
 from coartic.analysis.topics.families.claims import in_every_family
 from coartic.analysis.topics.paper import verdicts
 from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of

@@ -15,7 +15,7 @@ from coartic.analysis.study import typical_run
 from coartic.analysis.topics.learning import learning_curves
 from coartic.analysis.topics.paper.hands import hand_shares
 from coartic.analysis.topics.paper.rewards import published_differences
-from coartic.analysis.topics.tasks import draw_tasks
+from coartic.analysis.topics.tasks import picture_of_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
 
@@ -116,9 +116,9 @@ def test_published_differences(tmp_path):
 def test_variants_of_a_task_are_told_apart():
     task = load_task("ascending")
     moved = task.model_copy(update={"name": "ascending.goal2_0_1"})
-    titles = [axes.get_title(loc="left").strip() for axes in draw_tasks([task, moved]).axes]
+    titles = [axes.get_title(loc="left").strip() for axes in picture_of_tasks([task, moved]).axes]
     assert titles == ["ascending", "ascending.goal2_0_1"]
-    assert draw_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
+    assert picture_of_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
 
 
 def test_names_and_looks_tell_methods_apart():

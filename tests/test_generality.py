@@ -10,8 +10,8 @@ from coartic import load_task
 from coartic.analysis.claims import reader
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
+from coartic.analysis.sections import TABLES
 from coartic.analysis.study import one_by_one
-from coartic.analysis.tables import TABLES
 from coartic.analysis.topics.families import instances
 from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
 from coartic.analysis.topics.families.instances import best_of_instances, signs, solved

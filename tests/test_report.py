@@ -20,10 +20,9 @@ from coartic.analysis.report import render
 from coartic.analysis.report.about import answers, limits
 from coartic.analysis.report.build import inert, report_files, write_report
 from coartic.analysis.report.trace import rows_of, tables_of
-from coartic.analysis.sections import FIGURES
+from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
-from coartic.analysis.tables import TABLES
 from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.cli.draw import median_run

@@ -10,9 +10,9 @@ from scipy import stats
 
 from coartic import load_task
 from coartic.analysis import frames
+from coartic.analysis.sections import TABLES
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
-from coartic.analysis.tables import TABLES
 from coartic.analysis.topics import costs, ranking, scores
 from coartic.analysis.topics.ranking import leaders, paired_difference
 from coartic.analysis.topics.scores import BY_TRIAL

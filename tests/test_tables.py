@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.tables import TABLES
+from coartic.analysis.sections import TABLES
 from coartic.analysis.topics import costs, ranking
 from coartic.analysis.topics.coarticulation import placebo
 from coartic.analysis.topics.coarticulation import tables as coarticulation

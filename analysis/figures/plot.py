@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,7 +32,7 @@ from coartic.analysis.figures.style import (
 )
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
-from coartic.analysis.words import RECONSTRUCTED
+from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.files import write_atomically
 from coartic.text import one_line
 
@@ -72,22 +73,22 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 
 
 def figure(
-    name: str, title: str, caption: str
+    title: str, caption: str
 ) -> Callable[[Callable[[Study], Parts]], Callable[[Study], Plot]]:
-    """A decorator: what draws a study becomes a figure with this id, title and caption.
+    """A decorator: what draws a study becomes a figure with this title and caption.
 
-    It is drawn in the style of all figures. The caption says what a dagger means where one of the
-    tasks is reconstructed.
+    It is drawn in the style of all figures, and has its id of the function's name. The caption says
+    what a dagger means where one of the tasks is reconstructed.
     """
 
     def as_figure(draw: Callable[[Study], Parts]) -> Callable[[Study], Plot]:
+        @wraps(draw)
         @styled
         def plot(study: Study) -> Plot:
             drawing, data, alt, tasks = draw(study)
             dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
-            return Plot(name, title, caption + dagger, alt, drawing, data)
+            return Plot(id_of(draw), title, caption + dagger, alt, drawing, data)
 
-        plot.__doc__ = draw.__doc__
         return plot
 
     return as_figure

@@ -21,10 +21,9 @@ from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, html_table, latex_table
-from coartic.analysis.sections import FIGURES, SECTIONS
+from coartic.analysis.sections import FIGURES, SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
-from coartic.analysis.tables import TABLES
-from coartic.analysis.words import NONE, listed, number
+from coartic.analysis.words import NONE, id_of, listed, number
 from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
@@ -42,7 +41,7 @@ def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
     ``for_paper``: also LaTeX tables, figures as PDF, and figures that the page does not show.
     """
     files = {"report.html": page(study).encode(), "summary.md": summary(study).encode()}
-    captions = {section.table: section.caption for section in SECTIONS}
+    captions = {id_of(section.table): section.caption for section in SECTIONS}
     for name, table in TABLES.items():
         frame = table(study)
         if len(frame):
@@ -94,7 +93,7 @@ def draw_figure(study: Study, name: str) -> Plot | None:
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    ids = [section.figure for section in about.visible_sections(study) if section.figure]
+    ids = [id_of(each.figure) for each in about.visible_sections(study) if each.figure]
     return {name: plot for name in ids if (plot := draw_figure(study, name)) is not None}
 
 
@@ -105,11 +104,12 @@ def sections(study: Study) -> list[dict[str, Any]]:
     """
     allowed = []
     for section in about.visible_sections(study):
-        plot, frame = plots(study).get(section.figure), TABLES[section.table](study)
+        name, frame = id_of(section.table), section.table(study)
+        plot = plots(study).get(id_of(section.figure)) if section.figure else None
         if plot is None and not len(frame):
             continue
         rows = {
-            "html": html_table(frame, section.table, section.caption),
+            "html": html_table(frame, name, section.caption),
             "searched": len(frame) > SEARCHED,
             "long": len(frame) > LONG,
             "example": f"'{frame.index[0]}'",
@@ -122,6 +122,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
             "width": f"{MAGNIFIED * inches * 72 / 12:.0f}",
         }
         words = {
+            "table": name,
             "finding": about.sentences(study).get(section.id, ""),
             "rows": rows,
             "figure": figure,

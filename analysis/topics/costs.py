@@ -135,14 +135,13 @@ def runtimes(study: Study) -> Rows:
 
 
 @figure(
-    "runtimes",
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
     "tasks where there are several). Targets are evenly spaced from the initial solution to the "
     "optimum; a run counts for each target that it has reached. a: trials; planners make none and "
     "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
-def draw_costs(study: Study) -> Parts:
+def draw_runtimes(study: Study) -> Parts:
     """Share of targets reached, against trials and kinematics."""
     data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]

@@ -70,14 +70,13 @@ def learning(study: Study) -> Rows:
 
 
 @figure(
-    "learning-curves",
     "Learning curves",
     "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
     f"the trials themselves (mean over runs and the last {WINDOW} trials; failed trials "
     "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
     "far below the initial solution are cut off.",
 )
-def draw_learning(study: Study) -> Parts:
+def draw_learning_curves(study: Study) -> Parts:
     """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
     data = learning_curves(study)
     if not len(data):

@@ -154,7 +154,6 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
 
 
 @figure(
-    "ranking",
     "Gap to the optimum",
     "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
     f"there are several), with its {style.COVERAGE} bootstrap interval over runs. Methods that "

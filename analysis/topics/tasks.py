@@ -50,13 +50,12 @@ def tasks(study: Study) -> Rows:
 
 
 @figure(
-    "tasks",
     "Tasks",
     "Start configuration and goals of each task. Open squares mark the left arm, closed circles "
     "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
     "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
-def draw_start_and_goals(study: Study) -> Parts:
+def draw_tasks(study: Study) -> Parts:
     """Draw start configuration and goals, a panel for each task."""
     shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
     if not shown:
@@ -71,11 +70,11 @@ def draw_start_and_goals(study: Study) -> Parts:
         ]
     names = ", ".join(task.name for task in shown)
     alt = f"The robot in its start configuration with the goals of the tasks {names}."
-    return draw_tasks(shown), pd.DataFrame(rows), alt, ()
+    return picture_of_tasks(shown), pd.DataFrame(rows), alt, ()
 
 
 @style.styled
-def draw_tasks(tasks: Sequence[Task]) -> Figure:
+def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     """Draw start configuration and goals of some tasks, a panel for each."""
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))

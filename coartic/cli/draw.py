@@ -40,9 +40,9 @@ def draw(
     names = [name for text in meant for name in named_by(text)]
     chosen = [load_task(name) for name in dict.fromkeys(names)]
     from coartic.analysis.figures.plot import FORMATS, picture  # slow, after quick errors
-    from coartic.analysis.topics.tasks import draw_tasks
+    from coartic.analysis.topics.tasks import picture_of_tasks
 
-    drawing = draw_tasks(chosen[:_PICTURED])
+    drawing = picture_of_tasks(chosen[:_PICTURED])
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")

@@ -29,18 +29,17 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
 
 
 @figure(
-    "postures",
     "One goal, two postures",
     "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
-def draw_two_postures(study: Study) -> Parts:
+def draw_postures(study: Study) -> Parts:
     """Draw postures at one goal before two others: thin every run, thick their means."""
     shared = shared_goal(study)
     if shared is None:
         raise CoarticError("no method has solved runs on two tasks that share their first goals")
     drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
-    draw_postures(axes, shared)
+    draw_both(axes, shared)
     parts = []
     for task, runs in zip(shared.tasks, shared.postures, strict=True):
         joints = dict(zip(task.robot.joint_names, runs.T, strict=True))
@@ -55,7 +54,7 @@ def draw_two_postures(study: Study) -> Parts:
     return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
 
 
-def draw_postures(axes: Axes, shared: TwoContexts) -> None:
+def draw_both(axes: Axes, shared: TwoContexts) -> None:
     """Both tasks' postures with the shared goal and the next ones."""
     axes.set_axis_off()
     axes.set_aspect("equal")

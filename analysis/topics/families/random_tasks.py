@@ -205,7 +205,6 @@ def instance_gaps(study: Study) -> pd.DataFrame:
 
 
 @figure(
-    "gaps-by-family",
     "Gap to the best known reward, by family",
     "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond; "
     "gaps above 100 % stand at the right end. Diamonds: mean over instances with its "

@@ -61,7 +61,6 @@ def hand_shares(study: Study) -> pd.DataFrame:
 
 
 @figure(
-    "recruitment",
     "Hand sequences",
     "Share of runs by hand sequence (L left, R right, goal by goal); numbers are runs. Hatched: "
     "published. Rare sequences are grey.",

@@ -130,7 +130,6 @@ def published_differences(study: Study) -> pd.DataFrame:
 
 
 @figure(
-    "published",
     "Published and ours",
     f"Our mean learned reward minus the published one, with its {style.COVERAGE} interval. Grey: "
     f"margin of equivalence, ±{100 * MARGIN:.0f} % of the published reward. Filled circles: the "
