@@ -241,9 +241,8 @@ def slots_for(movements: list[Movement]) -> list[Movement | None]:
 
     None comes first where no movement is made at once: the hand may be in the goal already.
     """
-    given = takewhile(lambda movement: movement.target is not None, movements)
-    made_at_once = bool(movements) and movements[0].kind != "corrective"
-    return [*given] if made_at_once else [None, *given]
+    with_target = takewhile(lambda movement: movement.target is not None, movements)
+    return [None, *with_target] if movements[0].kind == "corrective" else [*with_target]
 
 
 def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
@@ -266,27 +265,36 @@ def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
                     targets[n, g, m] = movement.target
                     stops[n, g, m] = movement.kind != "corrective"
     reached = reach_all(bench, hands, targets, stops)
-    hit, ticks, moved, corrections = reached.hit, reached.ticks, reached.moved, reached.corrections
-    hit, ticks, moved, corrections = map(np.ndarray.tolist, (hit, ticks, moved, corrections))
-    iterations, evaluations = reached.iterations.tolist(), reached.evaluations.tolist()
-    looks, outcomes = bool(bench.setup["looks"][0]), []
+    hit, ticks, moved, corrections, iterations, evaluations = (
+        each.tolist()
+        for each in (
+            reached.hit,
+            reached.ticks,
+            reached.moved,
+            reached.corrections,
+            reached.iterations,
+            reached.evaluations,
+        )
+    )
+    looks = bool(bench.setup["looks"][0])
+    outcomes = []
     for n, plan in enumerate(plans):
         subtasks = []
-        for g, movements in enumerate(plan):
-            goal, hand, of_goal = movements[0].goal, movements[0].hand, slots[n][g]
-            made = [
-                Movement(goal, hand, movement.kind, target, spent)
-                for movement, target, spent in zip(
-                    of_goal, targets[n, g], moved[n][g], strict=False
-                )
-                if movement is not None and spent
+        for g, of_goal in enumerate(slots[n]):
+            goal, hand, ticks_each = plan[g][0].goal, plan[g][0].hand, moved[n][g]
+            movements = [
+                Movement(goal, hand, movement.kind, targets[n, g, m], ticks_each[m])
+                for m, movement in enumerate(of_goal)
+                if movement is not None and ticks_each[m]
             ]
             if corrections[n][g]:
-                spent = ticks[n][g] - sum(moved[n][g])
-                made.append(Movement(goal, hand, "corrective", reached.corrected[n, g], spent))
+                target, spent = reached.corrected[n, g], ticks[n][g] - sum(ticks_each)
+                movements.append(Movement(goal, hand, "corrective", target, spent))
             looked = looks and of_goal[0] is None
             evaluated = evaluations[n][g] - looked
-            subtasks.append(Subtask(made, reached.q[n, g], hit[n][g], iterations[n][g], evaluated))
+            subtasks.append(
+                Subtask(movements, reached.q[n, g], hit[n][g], iterations[n][g], evaluated)
+            )
             if not hit[n][g]:
                 break
         outcomes.append(subtasks)
@@ -305,8 +313,8 @@ def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
             if movement.waypoints is not None:
                 where = movement.waypoints, hand, task.goals[g], task.radius
                 moved = follow(task.robot, done.q, *where, model=bench.model)
-                made = [replace(movement, ticks=moved.ticks)]
-                part = Subtask(made, moved.q, moved.hit, 0, moved.evaluations)
+                followed = [replace(movement, ticks=moved.ticks)]
+                part = Subtask(followed, moved.q, moved.hit, 0, moved.evaluations)
             else:
                 setup = bench.setup.copy()
                 setup["looks"], setup["corrects"] = m == 0, movement.target is None
@@ -330,31 +338,34 @@ def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
 
 
 def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
-    """An execution of the goals that were attempted."""
-    made: list[Movement] = []
+    """The execution of a plan, of whose goals these were attempted."""
+    movements: list[Movement] = []
     hits: list[Array] = []
-    iterations = evaluations = 0
-    for movements, subtask in zip(plan, subtasks, strict=False):
-        goal, hand = movements[0].goal, movements[0].hand
-        made += subtask.movements
-        if subtask.hit:
-            hits.append(subtask.q)
-            if not subtask.movements:  # hit on the way: show the hand
-                made.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
+    ticks = corrections = iterations = evaluations = 0
+    for of_goal, subtask in zip(plan, subtasks, strict=False):
+        goal, hand = of_goal[0].goal, of_goal[0].hand
+        movements += subtask.movements
+        for movement in subtask.movements:
+            ticks += movement.ticks or 0
+            corrections += movement.kind == "corrective"
         iterations += subtask.iterations
         # And a look before the first movement, and one at where that leads.
         evaluations += subtask.evaluations + 2
+        if subtask.hit:
+            hits.append(subtask.q)
+            if not subtask.movements:  # hit on the way: show the hand
+                movements.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
     reason = ""
-    if len(hits) < len(subtasks):
+    if not subtask.hit:
         reason = (
             f"goal {goal}: the corrective process did not converge with the {hand} hand in "
-            f"{subtasks[-1].iterations} iterations"
+            f"{subtask.iterations} iterations"
         )
     return Execution(
-        movements=tuple(made),
-        configurations=np.array(hits).reshape(-1, len(subtasks[0].q)),
-        ticks=sum(movement.ticks or 0 for movement in made),
-        corrections=sum(movement.kind == "corrective" and movement.ticks != 0 for movement in made),
+        movements=tuple(movements),
+        configurations=np.array(hits).reshape(-1, len(subtask.q)),
+        ticks=ticks,
+        corrections=corrections,
         iterations=iterations,
         evaluations=evaluations,
         reason=reason,
