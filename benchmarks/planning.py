@@ -118,6 +118,8 @@ def plan_suite(
         name = cell.task.name
         if name not in tasks:
             tasks[name] = check_task(cell.task)
+        elif tasks[name] != cell.task:  # results are told apart by names
+            raise CoarticError(f"two different tasks are called {name!r}: give one another name")
         wanted = complete_cell(replace(cell, task=tasks[name]), trials, chosen.runs)
         # A cell that is written in two ways is performed once.
         first = planned.setdefault(hash_of([name, cell.method.name, wanted.complete]), wanted)

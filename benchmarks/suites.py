@@ -171,14 +171,13 @@ def select_cells(
     family that ``tasks`` names, alone or in a range, and the suite does not. ``families`` are the
     user's own, beside the shipped ones. Raises CoarticError
     for unknown names, for a task file whose name is taken, for parameters that a method does not
-    take, for more than :data:`MOST_CELLS` cells, for different cells that would go by one name,
-    and where nothing is left to run.
+    take, for more than :data:`MOST_CELLS` cells, and where nothing is left to run.
     """
     methods = [method for name in methods for method in methods_named(name, registered)]
     user_tasks, wanted = resolve_tasks(suite, tasks, families)
     cells = cells_of_suite(suite, registered, user_tasks, families)
     extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
-    cells = drop_repeats([*cells, *extra])
+    cells += extra
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
     if wrong := [unknown("task", name, task_names) for name in wanted if name not in task_names]:
         raise CoarticError("\n".join(wrong))
@@ -275,25 +274,6 @@ def extra_cells(
         elif (task.name, name) not in there:
             extra.append(Cell(task, registered[name], runs=suite.runs))
     return extra, refusals
-
-
-def drop_repeats(cells: Iterable[Cell]) -> list[Cell]:
-    """Every cell once. Results are told apart by names, so one name is one thing only.
-
-    A cell that is there with another number of runs stays:
-    :func:`coartic.benchmarks.planning.plan_suite` knows which of them hold. Raises CoarticError
-    where different tasks have the same name.
-    """
-    tasks: dict[str, Task] = {}
-    by_name: dict[tuple[str, str, int], Cell] = {}
-    for cell in cells:
-        task = tasks.setdefault(cell.task.name, cell.task)
-        if task is not cell.task and task != cell.task:
-            raise CoarticError(
-                f"two different tasks are called {task.name!r}; give one of them another name"
-            )
-        by_name.setdefault((task.name, cell.label, cell.runs), cell)
-    return list(by_name.values())
 
 
 def cells_of_suite(

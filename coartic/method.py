@@ -68,11 +68,11 @@ METERED = frozenset(
         Information.KINEMATIC_MODEL,
     }
 )
-"""What a session hands out and so can see being used; the rest is stated."""
+"""Information whose use a session sees. For the rest there is only the declaration."""
 
 
 class UndeclaredError(CoarticError):
-    """A method used what its declaration does not cover."""
+    """A method used information that it does not declare."""
 
 
 class BudgetError(CoarticError):
@@ -80,7 +80,7 @@ class BudgetError(CoarticError):
 
 
 class MethodError(CoarticError):
-    """A method's own word that it found no solution: ``infeasible`` or ``solver-failed``."""
+    """Raised by a method that finds no solution: ``infeasible`` or ``solver-failed``."""
 
     def __init__(
         self,
@@ -103,7 +103,7 @@ class Parameters(BaseModel):
 
 @dataclass
 class Meter:
-    """What a method spent."""
+    """Counts of the trials, evaluations and seconds that a method spent."""
 
     trials: int = 0
     """Physical trials, those that failed included."""
@@ -138,8 +138,8 @@ class Meter:
         "hessians",
         "solver_iterations",
     )
-    """Counters that a method states itself: what its solver evaluates, or a corrective process that
-    it runs itself, with one Jacobian per iteration."""
+    """Counters to which a method adds: the evaluations of its solver, or of a corrective process
+    that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
         """Add to counters."""
@@ -149,7 +149,7 @@ class Meter:
 
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
 MOST_COUNT = 2**63 - 1
-"""What a counter can hold where runs are stored."""
+"""Largest count that can be stored."""
 _NO_REWARD = -MOST_COUNT
 """Reward of a trial that failed, where rewards are kept."""
 
@@ -161,21 +161,21 @@ def pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 
 @dataclass(frozen=True)
 class Result:
-    """What a method returns."""
+    """A solution, with what else a method hands over."""
 
     solution: tuple[Movement, ...]
     details: dict[str, Any] = field(default_factory=dict)
-    """Whatever the method wants kept beside it, as plain data. Never its score."""
+    """Plain data to be kept beside the solution. Never its score."""
     initial: tuple[Movement, ...] = ()
-    """A learner's first trial, if that hit every goal. Its movements follow no paths."""
+    """Movements of a learner's first trial, if it hit every goal. None follows a path."""
     replay: tuple[Movement, ...] = ()
-    """A learner's greedy trial, without noise, with what it has learned. No paths either."""
+    """Movements of a learner's noiseless greedy trial after learning. None follows a path."""
     bound: int | None = None
-    """Reward that no solution exceeds, where proven; for searches of this project."""
+    """Proven upper bound of the reward; for searches of this project."""
 
 
 class Outline(NamedTuple):
-    """What a method is told of a task to say whether it applies."""
+    """The properties of a task by which a method says whether it applies."""
 
     name: str
     """Name of the task, for the sentence."""
@@ -203,13 +203,12 @@ def outline_of(task: Task) -> Outline:
 
 
 class Session:
-    """One task, one seed, one meter: all that a method gets to work with.
+    """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced and the calls are counted between honest parties: Python
-    has no walls, and who reaches for underscored names finds a way around both.
+    The declaration is enforced, and calls are counted. This is no sandbox.
     ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state what those spent. Trials that a process makes elsewhere than in
-    the sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
+    kernels and state the counts themselves. Trials that a process makes outside the
+    sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
     """
 
     def __init__(
@@ -235,7 +234,7 @@ class Session:
         self._meter = Meter()
         self._rewards = array("q")
 
-    # Open to every method: what the robot is, not what the task wants of it.
+    # Open to every method: the robot, not the goals.
 
     @property
     def task_name(self) -> str:
@@ -276,7 +275,7 @@ class Session:
         """The part of ``q`` that holds one arm's joints."""
         return self._task.robot.joints(hand)
 
-    # What has to be declared.
+    # These need a declaration.
 
     @property
     def goals(self) -> Array:
@@ -299,17 +298,12 @@ class Session:
         return self._task.robot.symbolic_hand(q, hand)
 
     @property
-    def told(self) -> frozenset[Information]:
-        """What was declared."""
-        return self._told
-
-    @property
     def used(self) -> frozenset[Information]:
-        """What has been used of what was declared."""
+        """The declared information that the method has used so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Corrective movements without a target are a use of the corrective process."""
+        """Count corrective movements without a target as a use of the corrective process."""
         for m in solution:
             if getattr(m, "kind", "") == "corrective" and m.target is None:
                 self._use(Information.CORRECTIVE_PROCESS)
@@ -507,11 +501,11 @@ class Session:
         """Trials left in the budget; None where there is none."""
         return None if self._trial_budget is None else self._trial_budget - self._meter.trials
 
-    # What has been spent so far: copies, to read.
+    # Copies of the counts so far.
 
     @property
     def meter(self) -> Meter:
-        """What has been spent."""
+        """A copy of the counts so far."""
         return replace(self._meter)
 
     @property
@@ -519,7 +513,7 @@ class Session:
         """Reward of each trial made, in order; None where it failed."""
         return [None if reward == _NO_REWARD else reward for reward in self._rewards]
 
-    # What the method has to state itself.
+    # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
         """Add to counters that the session cannot see: evaluations of a solver, and iterations of a
@@ -560,7 +554,7 @@ class Session:
     def hand_over(self, *information: Information) -> Task:
         """The task itself, for compiled methods of this project that count by themselves.
 
-        Marks ``information`` as used; such a method must :meth:`spend` what it spends.
+        Marks ``information`` as used. The method adds its counts with :meth:`spend`.
         Raises UndeclaredError for any other method.
         """
         self._needs_trust("hand_over")
@@ -570,8 +564,8 @@ class Session:
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Rewards of the trials of a compiled method of this project, and its time for them: of
-        the runs of a batch, each has its share."""
+        """Keep the rewards of the trials of a compiled method of this project, and its time for
+        them; in a batch, an equal share of the batch's time."""
         self._needs_trust("record")
         self._rewards.extend(pack_rewards(rewards))
         self._meter.solve_s += solve_s
@@ -595,7 +589,7 @@ class Method(ABC):
     """Whether the seed matters; the others are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     files: ClassVar[tuple[str, ...]] = ()
-    """Data files that it reads, beside the file that defines it: they count as its code."""
+    """Data files beside the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check in seconds, where the defaults take longer than that."""
 
@@ -618,9 +612,9 @@ class Method(ABC):
         return 1
 
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
-        """What :meth:`solve` gives for each of several sessions that differ in their seeds alone.
+        """Solve in several sessions that differ in their seeds alone.
 
-        An error in place of a result is what it would raise.
+        Returns for each the result of :meth:`solve`, or the error that it raises.
         """
         return [self._result(session) for session in sessions]
 

@@ -204,7 +204,7 @@ def test_grid_and_fixed_parameters(tmp_path):
 def test_cells_are_told_apart_by_their_parameters(tmp_path):
     """Different parameters are different cells, compared with the paper only as it had them."""
     ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    cells = suite_of(
+    asked = suite_of(
         tmp_path,
         ec1,
         ec1 + "parameters = { noise_sd = 0.5 }",
@@ -212,6 +212,7 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
         ec1 + "parameters = { trials = 20 }",
         'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
     )
+    cells = planned(asked, runs=3, trials=30).cells
     labels = [(cell.task.name, cell.variant) for cell in cells]
     assert labels[:3] == [
         ("ascending", ""),
