@@ -391,7 +391,10 @@ class Store:
 
     def _write_run(self, run: Run) -> None:
         """Put a run into the tables, in place of an earlier one of its id."""
-        self._forget(run.key.id)
+        if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.key.id):
+            for table in ("movements", "waypoints", "learning"):
+                self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
+            self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         numbers = {
             "setting": self._setting(run.setting),
             "environment": self._environment(run.environment),
@@ -421,7 +424,7 @@ class Store:
                 self._db.execute(statement)
                 return
             except sqlite3.OperationalError as error:
-                if not is_locked(error):
+                if "locked" not in str(error):
                     raise
             if tries == 1:
                 warnings.warn(
@@ -463,13 +466,6 @@ class Store:
             "packages": hash_of([content.get("python"), content.get("packages")])[:8],
         }
         return self._id_of("environments", row, "content")
-
-    def _forget(self, run_id: str) -> None:
-        row = self._one("SELECT id FROM results WHERE run_id = ?", run_id)
-        if row is not None:
-            for table in ("movements", "waypoints", "learning"):
-                self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (row["id"],))
-            self._db.execute("DELETE FROM results WHERE id = ?", (row["id"],))
 
     def _table(self, query: str, *values: object) -> pd.DataFrame:
         """The rows of a query, with nullable types."""
@@ -536,11 +532,18 @@ def open_store(folder: Path) -> Store:
 
 def check_known(connection: sqlite3.Connection, folder: Path) -> None:
     """Raises CoarticError for results of what version 1 had and this version does not have."""
-    for reading in other_readings(connection):
-        version = "1.0.0" if reading.startswith("arrival_tick") else "1.1.0"
+    readings = [
+        reading
+        for (texts,) in connection.execute("SELECT readings FROM suite")
+        for reading in json.loads(texts)
+    ]
+    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
+        readings += filter(None, [other_reading(method, *map(json.loads, texts))])
+    if readings:
+        version = "1.0.0" if readings[0].startswith("arrival_tick") else "1.1.0"
         raise CoarticError(
-            f"{folder} has results of another reading of the paper, {plain(reading, 80)}: version "
-            f"{version} of coartic reads them"
+            f"{folder} has results of another reading of the paper, {plain(readings[0], 80)}: "
+            f"version {version} of coartic reads them"
         )
     asked = connection.execute(
         "SELECT name, content FROM suite JOIN environments ON id = environment"
@@ -564,15 +567,6 @@ def open_content(content: bytes, name: str) -> Store:
     return Store(Path(name), connection)
 
 
-def other_readings(connection: sqlite3.Connection) -> Iterator[str]:
-    """In what runs of a folder read the paper otherwise than this version, as ``ties=right``."""
-    for (texts,) in connection.execute("SELECT readings FROM suite"):
-        yield from json.loads(texts)
-    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
-        if reading := other_reading(method, *map(json.loads, texts)):
-            yield reading
-
-
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
     """The runs of a results folder, made where there is none, while this process alone has them.
@@ -580,7 +574,13 @@ def writing(folder: Path) -> Iterator[Store]:
     Raises CoarticError where the folder holds something else, cannot be written, or another
     process is at work in it.
     """
-    check_place(folder)
+    if folder.exists() and not folder.is_dir():
+        raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
+    visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
+    if not (folder / RUNS_FILE).exists() and any(visible):
+        raise CoarticError(
+            f"{folder} is not empty and holds no results of coartic. Choose another folder."
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -633,17 +633,6 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
         yield is_ours
     finally:
         os.close(opened)
-
-
-def check_place(folder: Path) -> None:
-    """Raises CoarticError for a place where no results folder can be."""
-    if folder.exists() and not folder.is_dir():
-        raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
-    visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
-    if not (folder / RUNS_FILE).exists() and any(visible):
-        raise CoarticError(
-            f"{folder} is not empty and holds no results of coartic. Choose another folder."
-        )
 
 
 @contextmanager
@@ -736,7 +725,7 @@ def explain_errors(folder: Path) -> Iterator[None]:
         said = one_line(str(error))
         raise CoarticError(said if str(folder) in said else f"{path}: {said}") from None
     except sqlite3.OperationalError as error:
-        if is_locked(error):
+        if "locked" in str(error):
             raise CoarticError(
                 f"another program has {folder / RUNS_FILE} open; close it there, or wait for it"
             ) from None
@@ -760,11 +749,6 @@ def damage(path: Path, error: Exception) -> str:
             "restore a copy."
         )
     return f"{path} holds what coartic does not write ({wrong})"
-
-
-def is_locked(error: sqlite3.OperationalError) -> bool:
-    """Whether another program has the file for itself."""
-    return "locked" in str(error)
 
 
 def to_json(content: Any, *, sort_keys: bool = False) -> str:
