@@ -70,7 +70,7 @@ class Log(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What is kept of the trials of each run."""
+    """Results of each run."""
 
     rewards: Any  # (N, T)
     completed: Any  # (N, T)
@@ -100,8 +100,8 @@ TENTHS = 10
 
 
 class Work(NamedTuple):
-    """What the trials of the runs work on, each now at the same goal of the same trial: a
-    :class:`coartic.motion.reach.Batch`, and what the learner needs besides."""
+    """Work space of runs, each now at the same goal of the same trial: that of
+    :class:`coartic.motion.reach.Batch` and the learner's own."""
 
     runs: Any  # (N,) records: see runs_for
     lanes: Lanes
@@ -294,7 +294,7 @@ def record_movement(log: Any, n: int, number: int, kind: int, run: Any, trial: A
 
 @inlined
 def note_goal(n: int, number: int, log: Any, work: Any) -> None:
-    """Log and count what **A** has done for a goal; a trial fails where it was missed."""
+    """Log and count corrections of a goal; a trial fails where it was missed."""
     run, trial = work.runs[n], work.trials[n]
     trial.counts[COUNT.iterations] += run.iterations
     trial.counts[COUNT.corrections] += run.converged
@@ -380,7 +380,7 @@ def find_returns(n: int, rules: Any, log: Any) -> None:
 
 @inlined
 def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
-    """Credit what was visited with the reward of the trial, or each goal with its return."""
+    """Credit visited states and hands with the reward of the trial, or each with its return."""
     if rules.by_subtask:
         find_returns(n, rules, log)
     for number in range(log.hits.shape[1]):

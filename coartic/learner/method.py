@@ -52,7 +52,7 @@ class DualProcessParameters(Parameters):
     @model_validator(mode="before")
     @classmethod
     def drop_old_parameters(cls, given: Any) -> Any:
-        """Drop what version 1.0 stored and is now fixed; another value is an unknown parameter."""
+        """Drop parameters of version 1.0 at the values that are now fixed; others are unknown."""
         if not isinstance(given, dict):
             return given
         return {name: v for name, v in given.items() if cls.of_version_1.get(name) != v}
@@ -134,7 +134,7 @@ def _result(session: Session, run: LearningRun) -> Result | MethodError:
 
 
 def _told(condition: ExplorationCondition) -> frozenset[Information]:
-    """**A** and the total reward; what else a condition or variant makes use of."""
+    """Information that a condition uses: always **A** and the total reward."""
     told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.hand_exploration == "closest":  # to know where things are
         told |= {Information.GOALS, Information.FORWARD_KINEMATICS}

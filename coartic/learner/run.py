@@ -1,4 +1,4 @@
-"""What one run of the learner found."""
+"""Results of one run of the learner."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LearningRun:
     task: Task
     """The task."""
     condition: ExplorationCondition
-    """What the learner explored."""
+    """The exploration condition."""
     model: MotionModel
     """The constants of movement and of the corrective process."""
     seed: int
@@ -58,7 +58,7 @@ class LearningRun:
     corrections: NDArray[np.int64]
     """Corrective movements made in trial 0 and in each tenth of the others, shape ``(11,)``."""
     counters: Meter
-    """What it spent; the replay is not part of it."""
+    """Counts of the run, without its replay."""
     wall_s: float
     """Its share of the time that it and the runs beside it took, seconds."""
 
@@ -85,8 +85,8 @@ class LearningRun:
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of what was learned: the best trial, or the replay where the condition
-        says so; none where there is no such trial."""
+        """Movements of the learned solution: those of the best trial, or of the replay where the
+        condition says so; none where there is no such trial."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay if self.replay_completed else ()
@@ -120,7 +120,7 @@ class LearningRun:
 
     @property
     def hands(self) -> str | None:
-        """Hand sequence of what was learned."""
+        """Hand sequence of the learned solution."""
         return hands_in(self.learned) if self.learned else None
 
     @property
@@ -139,7 +139,7 @@ class LearningRun:
         return hands_in(self.replay) if self.replay_completed else None
 
     def execute(self) -> Execution:
-        """Execute what was learned again, apart from the learner.
+        """Execute the learned solution again, apart from the learner.
 
         Returns
         -------

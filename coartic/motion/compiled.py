@@ -29,13 +29,13 @@ class Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What Numba makes of the function."""
+        """The compiled function, as Numba calls it."""
         from coartic.motion.compiler import compile_kernel
 
         return compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
-        """What the compiled function returns."""
+        """Call the compiled function, and return its result."""
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
@@ -62,7 +62,7 @@ def inlined(function: F) -> F:
 
 
 def lanewise(function: F) -> F:
-    """As :func:`inner`, for a loop over lanes: a division by 0 gives what IEEE says."""
+    """As :func:`inner`, for a loop over lanes: a division by 0 gives infinity or NaN."""
     return cast(F, Kernel(function, "lanewise"))
 
 
@@ -77,7 +77,7 @@ def intrinsic(function: Callable[..., Any]) -> Any:
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Type of a record as kernels read it: what it holds lies together, at places they know."""
+    """Type of a record for kernels, with these fields; they lie together in memory."""
     return np.dtype(list(fields.items()), align=True)
 
 
@@ -96,7 +96,7 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """The generator whose draws are made by what is at these addresses."""
+    """The generator that draws by the functions at these addresses."""
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")

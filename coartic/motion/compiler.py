@@ -181,7 +181,7 @@ class MachineCode(FunctionCache):
             return None
 
     def save_overload(self, *compiled: Any) -> None:
-        """Keep what was compiled, where that can be."""
+        """Keep compiled code on disk where possible."""
         with contextlib.suppress(Exception):
             super().save_overload(*compiled)
         self.unlock()
@@ -222,7 +222,7 @@ def keep_on_disk(dispatcher: Any, function: Callable[..., Any]) -> Any:
 
 
 def mangling_args(record: types.Record) -> tuple[str, tuple[int, ...]]:
-    """A name of a record by what is in it."""
+    """A name of a record type by its fields."""
     return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
 

@@ -36,7 +36,7 @@ _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # fates of a lane
 
 
 class Correction(NamedTuple):
-    """What the corrective process found (:func:`correct`)."""
+    """Result of the corrective process (:func:`correct`)."""
 
     q: Array
     """Configuration found, shape ``(dof,)``, length unit (base) and rad (joints); the last

@@ -203,7 +203,7 @@ def initial_hands(
 def search_initial_hands(
     task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> tuple[str, Mapping[str, int]]:
-    """:func:`initial_hands`, and what finding them has spent, by the names of a session's meter:
+    """The sequence of :func:`initial_hands`, and what its search spent, by the names of a meter:
     nothing for a named sequence."""
     if not task.initial_is_policy:
         return task.initial_hands, {}

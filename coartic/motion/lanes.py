@@ -1,4 +1,4 @@
-"""Many arms side by side: what the compiled kernels work on.
+"""Many arms side by side: the arrays on which the compiled kernels work.
 
 A lane holds one arm that moves or is corrected. Each quantity is a row over lanes, and the
 innermost loop of a kernel runs over lanes, so that the compiler makes vector instructions of
@@ -125,7 +125,7 @@ def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
 
 @inlined
 def seat(at: Any, lane: int, run: int, arm: Any, goal: Any) -> None:
-    """Say whose arm is in a lane, what it is like and where its goal is."""
+    """Copy links, shoulder and goal of a run's arm into a lane."""
     at.run[lane], at.first[lane], at.links[lane] = run, arm.first, len(arm.links)
     at.shoulder[0, lane] = arm.shoulder_x
     at.shoulder[1, lane] = arm.shoulder_y

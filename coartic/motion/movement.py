@@ -54,7 +54,7 @@ LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or r
 
 
 class MoveResult(NamedTuple):
-    """What came of one movement (:func:`move`)."""
+    """Result of one movement (:func:`move`)."""
 
     q: Array
     """Configuration in which the movement stopped, shape ``(dof,)``, length unit (base) and rad

@@ -17,7 +17,7 @@ def note_trials(count: int) -> None:
 
 @contextmanager
 def inside(of_run: bool) -> Iterator[None]:
-    """What is made in this block is the session's, if that is the one of a run."""
+    """Trials made in this block are not counted if they belong to the session of a run."""
     global _inside
     _inside += of_run
     try:

@@ -32,7 +32,7 @@ and ends on arrival, too; it repeats a corrective movement, which ends on a hit 
 
 
 class Reached(NamedTuple):
-    """What came of N arms, or of N arms and G goals: then each shape is ``(N, G, ...)``."""
+    """Results of N arms, or of N arms and G goals: then each shape is ``(N, G, ...)``."""
 
     q: Array
     """Where each ended, shape ``(N, dof)``; NaN for a goal that was not attempted."""
@@ -54,7 +54,7 @@ class Reached(NamedTuple):
 
 
 class Requests(NamedTuple):
-    """What the kernel reads: N arms, each to G goals in turn by M movements each."""
+    """Requests to the kernel: N arms, each to G goals in turn by M movements each."""
 
     starts: Any  # (N, dof), or (1, dof) for one start of all
     hands: Any  # (N, G)
@@ -64,7 +64,7 @@ class Requests(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """What a lot of arms works on, each now at its next goal."""
+    """Work space of a lot of arms, each now at its next goal."""
 
     runs: Any  # records: see runs_for
     lanes: Any
@@ -99,7 +99,7 @@ def attempt(count: int, setup: Any, batch: Any) -> None:
 
 @inlined
 def correct_missed(count: int, setup: Any, batch: Any) -> None:
-    """Have **A** finish what was missed; then ``target`` and ``ticks`` are those of that."""
+    """Have **A** finish missed goals; ``target`` and ``ticks`` become those of its movements."""
     at, lane = batch.lanes.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -139,7 +139,7 @@ def set_target(run: Any, target: Any, stops: bool, is_first: bool, looks: bool) 
 
 @inlined
 def clear(n: int, reached: Any) -> None:
-    """Note that an arm has not done anything yet."""
+    """Set the results of an arm to those of one that has not moved."""
     for g in range(reached.hit.shape[1]):
         reached.hit[n, g] = False
         reached.ticks[n, g] = reached.corrections[n, g] = 0
@@ -152,7 +152,7 @@ def clear(n: int, reached: Any) -> None:
 
 @inlined
 def note(n: int, g: int, run: Any, reached: Any) -> None:
-    """Note what came of the goal of an arm, which goes on where it was hit."""
+    """Copy the result of an arm's goal; the arm goes on where it was hit."""
     fill_row(reached.q[n, g], run.q)
     reached.hit[n, g] = run.going = run.hit
     reached.iterations[n, g] = run.iterations
@@ -215,7 +215,7 @@ ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
 
 
 def blank(arms: Requests) -> Reached:
-    """Arrays for what comes of arms, to be filled."""
+    """Empty arrays for the results of arms."""
     count, goals, moves, dof = arms.targets.shape
     shape = count, goals
     return Reached(
@@ -326,7 +326,7 @@ def reach_all(
     targets: Array,
     stops: NDArray[np.bool_] = ALL_STOP,
 ) -> Reached:
-    """What comes of the goals of N trials from the start, of shape ``(N, G, ...)``.
+    """Results of N trials from the start, of shape ``(N, G, ...)``.
 
     Nothing is checked. ``hands`` has shape ``(N, G)``, indices into HANDS. ``targets`` has shape
     ``(N, G, M, dof)``, in which joints without one are filled in; the first movement for a goal is

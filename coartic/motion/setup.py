@@ -1,4 +1,4 @@
-"""What kernels read of a robot, its goals and the model: one record, which costs nothing to pass.
+"""Robot, constants and options for kernels, in one record.
 
 Numba looks at every field of a tuple and of a NumPy scalar each time a kernel is called. An array
 of one record is one argument, whatever the record holds.

@@ -65,7 +65,7 @@ class Movement:
 
 @dataclass(frozen=True)
 class Execution:
-    """What happened when a solution was executed (:func:`execute`)."""
+    """An executed solution (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
     """The movements as made, with targets and ticks, in order."""
@@ -113,7 +113,7 @@ class Execution:
 
 
 Refused = SolutionError | ValueError | TypeError | OverflowError
-"""What is wrong with a solution that cannot be executed."""
+"""Errors of a solution that cannot be executed."""
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
@@ -220,7 +220,7 @@ Plan = list[list[Movement]]
 
 
 class Subtask(NamedTuple):
-    """What came of a goal."""
+    """Result of a goal that was attempted."""
 
     movements: list[Movement]
     """The movements made."""
@@ -248,7 +248,7 @@ def slots_for(movements: list[Movement]) -> list[Movement | None]:
 def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
     """Make the movements of plans without paths side by side.
 
-    Returns what came of each goal that was attempted, a list for each plan.
+    Returns the results of the goals that were attempted, a list for each plan.
     """
     if not plans:
         return []
@@ -304,7 +304,7 @@ def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
 def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
     """Make the movements of a plan, of which some follow paths, one after the other.
 
-    Returns what came of each goal that was attempted.
+    Returns the results of the goals that were attempted.
     """
     task, subtasks, q = bench.task, list[Subtask](), bench.starts[0]
     for g, movements in enumerate(plan):
@@ -428,8 +428,8 @@ def check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def check_point(task: Task, point: Any) -> None:
-    """Raises ValueError for what is no configuration of the robot, and SolutionError where it moves
-    a locked base coordinate."""
+    """Raises ValueError for a point that is no configuration of the robot, and SolutionError where
+    it moves a locked base coordinate."""
     usual = isinstance(point, np.ndarray) and point.dtype == np.float64
     # A sum of squares is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not point @ point <= LARGEST_ENTRY:

@@ -28,7 +28,7 @@ of indices into HANDS (0 left, 1 right)."""
 
 
 class Trials(NamedTuple):
-    """What came of N trials."""
+    """Results of N trials."""
 
     ticks: NDArray[np.int64]
     """Control ticks of each, shape ``(N,)``."""
