@@ -321,25 +321,26 @@ def steps(task, seed):
 def main(split="i", folder=HERE):
     """Run the protocols on test instances, or on some development instances.
 
-    A round takes the next instance of both families, so that the rounds that are done are a fair
-    part of all.
+    Tasks that the folder has are not run again. The next instance of both families follows in
+    turn, so that what is done is a fair part of all.
     """
-    clock, rows = time.process_time(), {"changes": [], "starts": [], "steps": []}
-    rounds = [[load_task("ascending"), load_task("descending")]]
+    clock, chosen = time.process_time(), ["ascending", "descending"]
     for n in range(30 if split == "i" else 2):
-        rounds.append([load_task(f"{family}-armed/v1/{split}{n:03d}") for family in ("one", "two")])
-    for number, tasks in enumerate(rounds):
-        for seed, task in enumerate(tasks, 2 * number):
-            rows["changes"] += change_goals(task, seed)
-            rows["starts"] += start_elsewhere(task, seed) if 1 <= number <= 10 else []
-            rows["steps"] += steps(task, seed) if len(task.hands) == 1 and number <= 8 else []
-            print(f"{task.name}: {time.process_time() - clock:.0f} s", flush=True)
-        for name, some in rows.items():
-            table = pd.DataFrame(some)
-            if name == "changes":
-                keys = ["task", "distance", "model"]
-                table = table.groupby(keys, sort=False).sum(min_count=1).reset_index()
-            table.to_csv(Path(folder) / f"{name}.csv", float_format="%.5g")
+        chosen += [f"one-armed/v1/{split}{n:03d}", f"two-armed/v1/{split}{n:03d}"]
+    paths = {name: Path(folder) / f"{name}.csv" for name in ("changes", "starts", "steps")}
+    rows = {name: pd.read_csv(path).to_dict("records") if path.exists() else []
+            for name, path in paths.items()}  # fmt: skip
+    for seed, name in enumerate(chosen):
+        if any(row["task"] == name for row in rows["changes"]):
+            continue
+        task, keys = load_task(name), ["task", "distance", "model"]
+        changes = pd.DataFrame(change_goals(task, seed)).groupby(keys, sort=False)
+        rows["changes"] += changes.sum(min_count=1).reset_index().to_dict("records")
+        rows["starts"] += start_elsewhere(task, seed) if 2 <= seed < 22 else []
+        rows["steps"] += steps(task, seed) if len(task.hands) == 1 and seed < 18 else []
+        for kind, path in paths.items():
+            pd.DataFrame(rows[kind]).to_csv(path, float_format="%.5g", index=False)
+        print(f"{name}: {time.process_time() - clock:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

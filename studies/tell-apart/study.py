@@ -28,13 +28,11 @@ def share_by_task(changes):
     shares = changes.groupby(["distance", "model", "task"], sort=False)
     shares = shares.sum(numeric_only=True, min_count=1).reset_index()
     numbers = {f"share_{n}": shares[f"dot_{n}"] / shares.square for n in AFTER}
-    curve = np.array(list(numbers.values())).T
-    passed = (curve >= HALF).argmax(axis=1)
-    half = np.full(len(curve), np.nan)
-    for row, k in enumerate(passed):
-        if k:
-            ends, logs = curve[row, k - 1 : k + 1], np.log10(AFTER[k - 1 : k + 1])
-            half[row] = np.interp(HALF, ends, logs)
+    half = np.full(len(shares), np.nan)
+    for row, curve in enumerate(np.array(list(numbers.values())).T):
+        if curve[-1] >= HALF:  # else there is no shift
+            k = max(int((curve >= HALF).argmax()), 1)
+            half[row] = np.interp(HALF, curve[k - 1 : k + 1], np.log10(AFTER[k - 1 : k + 1]))
     return shares.assign(
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
@@ -195,23 +193,24 @@ def find_power(changes, starts, steps):
 def draw(table):
     """Share of the shift by trials after the change."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
-    rows = table[table.distance == 0.5].set_index("model")
     blue, _, _, red, _, sky = figures.PALETTE
-    for model, words, color in (
-        ("planner, all goals", "planner", blue), ("learner, told", "learner, told", sky),
-        ("learner", "learner by trial and error", red), ("CMA-ES", "CMA-ES", figures.GREY),
-    ):  # fmt: skip
-        shares = rows.loc[model]
-        y = np.array([shares[f"share_{n}"] for n in AFTER])
-        axes.plot(AFTER, y, color=color, marker="o", label=words)
-        ends = ([shares[f"share_{n}_{end}"] for n in AFTER] for end in ("low", "high"))
-        axes.fill_between(AFTER, *ends, color=color, alpha=0.2, linewidth=0)
+    for model, words, color, up in (
+        ("planner, all goals", "planner: all of it at once", blue, 0.05),
+        ("learner, told", "learner whose corrective process is told the next goal", sky, 0.14),
+        ("learner", "learner by trial and error: none of it at once", red, -0.09),
+    ):
+        row = table.loc[f"change 0.5 {model}"]
+        y, low, high = ([row[f"share_{n}{end}"] for n in AFTER] for end in ("", "_low", "_high"))
+        axes.fill_between(AFTER, low, high, color=color, alpha=0.15, linewidth=0)
+        axes.plot(AFTER, y, color=color, marker="o", markersize=4, markevery=slice(1, None))
+        axes.plot(1, y[0], color=color, marker="o", markersize=11, clip_on=False)
+        axes.text(1.25, y[0] + up, words, color=color, weight="bold")
     axes.set_xscale("log")
     axes.set_xticks([1, 10, 100, 1000, 10_000], ["first", "10", "100", "1000", "10 000"])
     axes.set_xlabel("trial after a goal was moved")
-    axes.set_ylabel("shift of the posture at the goal before it")
-    axes.set_yticks([0, 0.5, 1], ["none", "half", "all"])
-    axes.legend(loc="center right")
+    axes.set_ylabel("share of the shift of the posture")
+    axes.set_yticks([0, 0.5, 1], ["0", "½", "1"])
+    axes.set_ylim(-0.17, 1.17)
     return figure
 
 
@@ -224,7 +223,7 @@ def measure(changes, starts, steps):
 def main():
     """Measure what protocols.py wrote, and write the page."""
     names = "changes", "starts", "steps"
-    raw = [pd.read_csv(HERE / f"{name}.csv", index_col=0) for name in names]
+    raw = [pd.read_csv(HERE / f"{name}.csv") for name in names]
     tables = measure(*raw)
     for name, table in tables.items():
         table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
