@@ -37,10 +37,10 @@ def test_tables_and_figure_of_some_of_the_tasks(study):
     shares = tables["results"].share_1
     assert shares["change 0.5 planner, all goals"] == 1
     assert shares["change 0.5 learner"] == 0
-    assert 0 < shares["change 0.5 learner, told"] < 1
+    assert abs(shares["change 0.5 learner, told"]) < 0.9
     assert len(tables["claims"]) == 9
     needed = tables["power"].people_learners  # where the models differ by nothing, nobody tells
-    assert needed["step same"] > 200 or pd.isna(needed["step same"])
+    assert not needed["step same"] < 100
     assert needed["change 0.5, 4 goals"] <= needed["change 0.5, 1 goals"] < 50
     assert figures.picture(study.draw(tables["results"]), ".svg").count(b"<path") > 20
 
