@@ -6,10 +6,10 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coartic.benchmarks.planning import Selection, plan_suite
+    from coartic.benchmarks.planning import plan_suite
     from coartic.benchmarks.run import RunReport, perform, run_suite
 
-__all__ = ["RunReport", "Selection", "perform", "plan_suite", "run_suite"]
+__all__ = ["RunReport", "perform", "plan_suite", "run_suite"]
 
 
 def __getattr__(name: str) -> Any:

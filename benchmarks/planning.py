@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, brief_value
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, check_limits
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
 from coartic.tasks.families import own_families
 from coartic.tasks.task import check_task
@@ -25,47 +24,6 @@ LIMITS = {
 """Least and greatest value of options that are numbers; whole ones where the least value is."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How a suite is run; None stands for the suite's own number.
-
-    Raises CoarticError for a number out of its limits, and for what is no list.
-    """
-
-    runs: int | None = None
-    """Runs of each cell."""
-    trials: int | None = None
-    """Trials of each run, for methods that have this parameter."""
-    seed: int = 0
-    """Seed of the suite."""
-    time_limit_s: float | None = None
-    """CPU time of a run."""
-    trial_budget: int | None = None
-    """Physical trials of a run, of any method; None for no budget."""
-
-    def __post_init__(self) -> None:
-        for name, (least, most) in LIMITS.items():
-            if getattr(self, name) is not None or name == "seed":  # the suite has none
-                check_number(name, getattr(self, name), least, most)
-
-
-@dataclass(frozen=True)
-class Selection:
-    """Which part of a suite is run, and what of one's own beside it.
-
-    As in :func:`coartic.benchmarks.suites.select_cells`: without names, all of it.
-    """
-
-    tasks: Sequence[str | Path] = ()
-    methods: Sequence[str] = ()
-    method_files: Sequence[str | Path] = ()
-    family_files: Sequence[str | Path] = ()
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            check_list(name, value)
-
-
 def check_list(name: str, value: object) -> None:
     """Raises CoarticError for what is no list of names, one text above all."""
     if isinstance(value, str | Path):
@@ -74,53 +32,84 @@ def check_list(name: str, value: object) -> None:
         raise CoarticError(f"{name} is {value!r}; it must be a list of names or paths")
 
 
-def check_number(name: str, number: object, least: float, most: int) -> None:
-    """Raises CoarticError for a number out of its limits, or one that has to be whole and is
-    not."""
-    kind = int if isinstance(least, int) else int | float
-    is_number = isinstance(number, kind) and not isinstance(number, bool)
-    if not (is_number and least <= number <= most):  # type: ignore[operator]
-        raise CoarticError(f"{name} is {number!r}; it must be from {least} to {most:_}")
-
-
-WHOLE_SUITE = Selection()
-
-
 def plan_suite(
     suite: str | Path | Suite,
     *,
-    select: Selection = WHOLE_SUITE,
+    tasks: Sequence[str | Path] = (),
+    methods: Sequence[str] = (),
+    method_files: Sequence[str | Path] = (),
+    family_files: Sequence[str | Path] = (),
     cells: Iterable[Cell] | None = None,
-    **options: Any,
+    runs: int | None = None,
+    trials: int | None = None,
+    seed: int = 0,
+    time_limit_s: float | None = None,
+    trial_budget: int | None = None,
 ) -> Plan:
-    """Every run of a suite: a shipped one by name, a file by path (``.toml``), or a Suite.
+    """Plan every run of a suite.
 
-    ``options`` are fields of :class:`Options`. ``cells`` made by hand stand in place of the
-    suite's. Raises CoarticError for anything unknown, out of bounds, or that does not go together.
+    Parameters
+    ----------
+    suite : str, Path or Suite
+        A shipped suite by name, or a suite file (``.toml``).
+    tasks, methods : sequence of str
+        The part of the suite that is run, as :func:`coartic.benchmarks.suites.select_cells` takes
+        them; without names, all of it.
+    method_files, family_files : sequence of str or Path
+        Files with methods and families of your own.
+    cells : iterable of Cell, optional
+        Cells in place of the suite's.
+    runs, trials : int, optional
+        Runs of each cell, and trials of each run for methods that have this parameter; by default
+        the suite's numbers.
+    seed : int
+        Seed of the suite.
+    time_limit_s : float, optional
+        CPU time of a run, s; by default the suite's.
+    trial_budget : int, optional
+        Most physical trials of a run, of any method.
+
+    Returns
+    -------
+    Plan
+        Cells with all parameters, and the seeds of their runs.
+
+    Raises
+    ------
+    CoarticError
+        For anything unknown, out of bounds, or that does not go together.
     """
-    chosen = Options(**options)
-    if not isinstance(select, Selection):
-        raise CoarticError(f"select is {brief_value(select)}; it must be a Selection")
+    lists = {"method_files": method_files, "family_files": family_files}
+    for name, names in ({"tasks": tasks, "methods": methods} | lists).items():
+        check_list(name, names)
+    numbers = {"runs": runs, "trials": trials, "trial_budget": trial_budget}
+    try:
+        check_limits("seed", seed, *LIMITS["seed"])
+        for name, number in (numbers | {"time_limit_s": time_limit_s}).items():
+            if number is not None:
+                check_limits(name, number, *LIMITS[name])
+    except ValueError as error:
+        raise CoarticError(str(error)) from None
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
     if cells is None:
         cells = select_cells(
             suite,
-            registry(map(Path, select.method_files)),
-            tasks=[str(name) for name in select.tasks],
-            methods=select.methods,
-            families=own_families(map(Path, select.family_files)),
+            registry(map(Path, method_files)),
+            tasks=[str(name) for name in tasks],
+            methods=methods,
+            families=own_families(map(Path, family_files)),
         )
-    trials = suite.trials if chosen.trials is None else chosen.trials
-    tasks: dict[str, Task] = {}
+    trials = suite.trials if trials is None else trials
+    by_name: dict[str, Task] = {}
     planned: dict[str, Cell] = {}
     for cell in cells:
         name = cell.task.name
-        if name not in tasks:
-            tasks[name] = check_task(cell.task)
-        elif tasks[name] != cell.task:  # results are told apart by names
+        if name not in by_name:
+            by_name[name] = check_task(cell.task)
+        elif by_name[name] != cell.task:  # results are told apart by names
             raise CoarticError(f"two different tasks are called {name!r}: give one another name")
-        wanted = complete_cell(replace(cell, task=tasks[name]), trials, chosen.runs)
+        wanted = complete_cell(replace(cell, task=by_name[name]), trials, runs)
         # A cell that is written in two ways is performed once.
         first = planned.setdefault(hash_of([name, cell.method.name, wanted.complete]), wanted)
         if first.runs != wanted.runs:
@@ -128,14 +117,13 @@ def plan_suite(
                 f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
                 f"then for {wanted.runs}; give one number"
             )
-    limit_s = chosen.time_limit_s
     return Plan(
         suite=suite.name,
-        seed=chosen.seed,
-        runs=chosen.runs or suite.runs,
+        seed=seed,
+        runs=runs or suite.runs,
         trials=max((trials_in(cell.complete) for cell in planned.values()), default=0),
-        time_limit_s=suite.time_limit_s if limit_s is None else limit_s,
-        trial_budget=chosen.trial_budget,
+        time_limit_s=suite.time_limit_s if time_limit_s is None else time_limit_s,
+        trial_budget=trial_budget,
         cells=tuple(planned.values()),
     )
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from coartic.benchmarks.planning import WHOLE_SUITE, Selection, plan_suite
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Executor, Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
@@ -91,17 +91,16 @@ def run_suite(
     suite: str | Path | Suite,
     folder: str | Path,
     *,
-    select: Selection = WHOLE_SUITE,
     executor: Executor | None = None,
     watch: Watcher = lambda progress, what: None,
     **options: Any,
 ) -> RunReport:
     """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
 
-    ``options`` are fields of :class:`coartic.benchmarks.planning.Options`, such as ``runs`` per
-    cell and ``trials`` per run.
+    ``options`` are those of :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell
+    and ``trials`` per run.
     """
-    plan = plan_suite(suite, select=select, **options)
+    plan = plan_suite(suite, **options)
     return perform(plan, folder, executor=executor, watch=watch)
 
 

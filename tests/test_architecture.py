@@ -214,12 +214,11 @@ def without_posix(out):
     everything()
 
     from coartic.analysis.study import load
-    from coartic.benchmarks.run import Selection, perform, plan_suite
+    from coartic.benchmarks.run import perform, plan_suite
     from tests.support.suites import InProcess
 
     methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
-    select = Selection(tasks=["ascending"], methods=methods)
-    plan = plan_suite("quick", runs=2, trials=5, select=select)
+    plan = plan_suite("quick", runs=2, trials=5, tasks=["ascending"], methods=methods)
     assert perform(plan, out, executor=InProcess()).progress.failed == 0
     runs = load(out).runs
     assert len(runs) == plan.size

@@ -8,7 +8,7 @@ import pytest
 
 from coartic import CoarticError, builtin_tasks, load_task
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import Selection, run_suite
+from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.tasks.families import read_family
 from coartic.text import did_you_mean
@@ -150,9 +150,9 @@ def test_a_file_that_is_not_there(read, tmp_path):
         ({"tasks": ["absent.toml"]}, "absent.toml"),
         ({"tasks": Path("a.toml")}, "tasks is a list: write tasks=['a.toml']"),
         ({"tasks": [3]}, "tasks is [3]; it must be a list of names or paths"),
-        ({"runs": "3"}, "runs is '3'; it must be from 1 to "),
-        ({"runs": True}, "runs is True; it must be from 1 to "),
-        ({"seed": -1}, "seed is -1; it must be from 0 to "),
+        ({"runs": "3"}, "runs is '3'; it must be a whole number from 1 to "),
+        ({"runs": True}, "runs is True; it must be a whole number from 1 to "),
+        ({"seed": -1}, "seed is -1; it must be a whole number from 0 to "),
         ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
         ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
     ],
@@ -164,10 +164,8 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
         if name == "left":
             text = 'hands = ["left"]' + text.replace("RR", "LL")
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
-    selection = {name: wrong[name] for name in ("tasks", "methods") if name in wrong}
-    rest = {name: value for name, value in wrong.items() if name not in selection}
     with pytest.raises(CoarticError) as caught:
-        run_suite(**{"suite": "paper", "folder": "out", "select": Selection(**selection)} | rest)
+        run_suite(**{"suite": "paper", "folder": "out"} | wrong)
     assert words in str(caught.value)
     assert not Path("out").exists()
 
@@ -196,7 +194,7 @@ def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
 @pytest.mark.parametrize("name", ["a" * 5000, "x\0y", 3, None])
 def test_a_folder_that_cannot_be(name):
     with pytest.raises(CoarticError, match=r"'?.* cannot be used: ") as caught:
-        run_suite("paper", name, select=Selection(tasks=["ascending"], methods=["EC1"]), runs=1)
+        run_suite("paper", name, tasks=["ascending"], methods=["EC1"], runs=1)
     assert len(str(caught.value)) < 300
 
 

@@ -16,7 +16,7 @@ from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks import released, template
 from coartic.benchmarks.beside import put_beside
-from coartic.benchmarks.planning import Selection, plan_suite
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.runs.store import RUNS_FILE, open_store, writing
@@ -163,8 +163,8 @@ def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
 def test_a_stranger_beside_others(parts, tmp_path):
     """Only the stranger's runs are made, and none when it is repeated. Fewer runs of others are
     said."""
-    select = Selection(methods=["NAME"], method_files=[OWN])
-    plan = plan_suite("paper", select=select, runs=2, trials=20)
+    select = {"methods": ["NAME"], "method_files": [OWN]}
+    plan = plan_suite("paper", **select, runs=2, trials=20)
     assert {cell.method.name for cell in plan.cells} == {"NAME"}
     out = tmp_path / "out"
     for present, done in ((4, plan.size), (4 + plan.size, 0)):
@@ -175,7 +175,7 @@ def test_a_stranger_beside_others(parts, tmp_path):
     theirs = study.runs[study.runs.method != "NAME"]
     assert set(theirs.result) == set(load(parts[1]).runs.result)
     assert {"NAME", EC1} <= set(TABLES["methods"](study).method)
-    more = plan_suite("paper", select=select, runs=3, trials=20)
+    more = plan_suite("paper", **select, runs=3, trials=20)
     with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
         put_beside(more, parts[1:], tmp_path / "more")
 

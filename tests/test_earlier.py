@@ -3,7 +3,6 @@
 import shutil
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
@@ -13,7 +12,7 @@ from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks import template
 from coartic.benchmarks.beside import put_beside
-from coartic.benchmarks.planning import Selection, plan_suite
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_again
 from coartic.learner.method import DualProcessParameters
@@ -61,10 +60,8 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     run_id = load(now).runs.run_id[0]
     with open_store(then) as store:
         assert store.run(run_id).key.id == run_id
-    select = Selection(
-        tasks=["ascending"], methods=["NAME"], method_files=[Path(template.__file__)]
-    )
-    plan = plan_suite("paper", select=select, runs=2, trials=20)
+    select = {"tasks": ["ascending"], "methods": ["NAME"], "method_files": [template.__file__]}
+    plan = plan_suite("paper", runs=2, trials=20, **select)
     put_beside(plan, [then], tmp_path / "out")
     with open_store(tmp_path / "out") as store:
         assert {*store.ids("")} == {*load(now).runs.run_id}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.run import Selection, plan_suite, run_suite
+from coartic.benchmarks.run import plan_suite, run_suite
 from coartic.inputs import MOST_CELLS
 from coartic.tasks.families import (
     FAMILY_FOLDER,
@@ -269,13 +269,13 @@ def test_a_family_that_cannot_be_met_ends():
 
 
 def test_an_instance_beside_a_suites_tasks():
-    select = Selection(tasks=["two-armed/v1/i003..i004", "two-armed-1"], methods=["EC4"])
-    plan = plan_suite("paper", runs=1, select=select)
+    names = ["two-armed/v1/i003..i004", "two-armed-1"]
+    plan = plan_suite("paper", runs=1, tasks=names, methods=["EC4"])
     assert [cell.task.name for cell in plan.cells] == [
         "two-armed-1", "two-armed/v1/i003", "two-armed/v1/i004",
     ]  # fmt: skip
     # The paper's EC1 is for one arm, and comes to the right hand by itself.
-    alone = plan_suite("paper", runs=1, select=Selection(tasks=["one-armed/v1/i000"]))
+    alone = plan_suite("paper", runs=1, tasks=["one-armed/v1/i000"])
     assert [cell.method.name for cell in alone.cells] == ["dual-process/EC1"]
 
 
@@ -294,12 +294,11 @@ def test_a_family_of_ones_own_is_run_by_its_file(tmp_path):
     shipped = FAMILY_FOLDER / "one-armed.v1.toml"
     path = tmp_path / "mine.v1.toml"
     path.write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")
-    select = Selection(tasks=["mine/v1/i000"], methods=["corrective-alone/given"],
-                       family_files=[path])  # fmt: skip
-    report = run_suite("quick", tmp_path / "results", select=select)
+    select = {"tasks": ["mine/v1/i000"], "methods": ["corrective-alone/given"]}
+    report = run_suite("quick", tmp_path / "results", family_files=[path], **select)
     (task,) = load(report.folder).tasks.values()
     family = read_family(path)
     assert task == instance_of(family, address_of("mine/v1/i000"))
     assert task.goals != load_task("one-armed/v1/i000").goals  # numbers come from its name
     with pytest.raises(TaskError, match="rename the file"):
-        run_suite("quick", tmp_path, select=Selection(family_files=[shipped]))
+        run_suite("quick", tmp_path, family_files=[shipped])

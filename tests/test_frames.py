@@ -14,7 +14,7 @@ from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics import instances
 from coartic.analysis.words import p_value
-from coartic.benchmarks import Selection, run_suite
+from coartic.benchmarks import run_suite
 
 
 @pytest.mark.parametrize("module", [context_tests, frames, instances, judging, pages])
@@ -111,8 +111,8 @@ def test_one_task_refutes_no_claim():
 
 def test_runs_are_tidy(tmp_path):
     """Columns of a folder's runs against its tasks; signs and postures against executions."""
-    chosen = Selection(tasks=["two-armed-1"], methods=["EC3", "corrective-alone/given"])
-    run_suite("paper", tmp_path / "runs", runs=3, trials=50, select=chosen)
+    chosen = {"tasks": ["two-armed-1"], "methods": ["EC3", "corrective-alone/given"]}
+    run_suite("paper", tmp_path / "runs", runs=3, trials=50, **chosen)
     study = load(tmp_path / "runs")
     runs = study.runs
     assert runs.family.isna().all()

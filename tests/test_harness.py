@@ -20,7 +20,7 @@ from coartic.analysis.study import load
 from coartic.analysis.topics.paper.rewards import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.run import Selection, perform, plan_suite
+from coartic.benchmarks.run import perform, plan_suite
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
 from coartic.benchmarks.worker import Job, Outcome, fail
@@ -236,10 +236,10 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     assert [cell.runs for cell in planned(cells, runs=2).cells] == [2]
     once = paper_cells(methods=["corrective-alone/every"], tasks=["two-armed-1"])
     assert planned(once, runs=20).size == 1
-    task, select = tmp_path / "mine.toml", Selection(tasks=[tmp_path / "mine.toml"])
+    task = tmp_path / "mine.toml"
     task.write_text(GOOD, encoding="utf-8")
     suite_of(tmp_path, 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\nruns = 7')
-    own = plan_suite(tmp_path / "own.toml", select=select)
+    own = plan_suite(tmp_path / "own.toml", tasks=[task])
     assert {cell.runs for cell in own.cells if cell.task.name == "mine"} == {7}
 
 

@@ -249,11 +249,11 @@ def test_workers_that_cannot_begin_get_a_sentence():
 
 
 SCRIPT = """
-from coartic.benchmarks.run import Selection, run_suite
+from coartic.benchmarks.run import run_suite
 print("begun", flush=True)
 for method, tasks in (("test/does", ["ascending"]), ("test/again", ["ascending", "descending"])):
-    select = Selection(tasks=tasks, methods=[method], method_files=["mine.py"])
-    print(run_suite("paper", method, select=select), flush=True)
+    select = {"tasks": tasks, "methods": [method], "method_files": ["mine.py"]}
+    print(run_suite("paper", method, **select), flush=True)
 """
 
 

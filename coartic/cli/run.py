@@ -45,7 +45,7 @@ def run(
     """
     from coartic.benchmarks.beside import put_beside
     from coartic.benchmarks.cluster import Dask
-    from coartic.benchmarks.planning import Selection, plan_suite
+    from coartic.benchmarks.planning import plan_suite
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.run import perform
@@ -59,14 +59,15 @@ def run(
     names = given.methods_meant(split_names(methods, "--methods"), registered)
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
-    wanted = given.tasks_meant(split_names(tasks, "--tasks"))
-    select = Selection(wanted, names, method_file or (), family_file or ())
     plan = plan_suite(
         chosen,
         runs=runs,
         trials=trials,
         seed=seed,
-        select=select,
+        tasks=given.tasks_meant(split_names(tasks, "--tasks")),
+        methods=names,
+        method_files=method_file or (),
+        family_files=family_file or (),
         time_limit_s=time_limit,
         trial_budget=trial_budget,
     )
