@@ -1,10 +1,9 @@
-"""Running times of any methods, by task or by family, to targets of one's own."""
+"""Running times of any methods to targets of one's own."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -13,21 +12,16 @@ from coartic.analysis import methods as known
 from coartic.analysis.statistics.running_times import share_by_budget
 from coartic.analysis.study import Study, load
 from coartic.analysis.topics import scores
-from coartic.analysis.topics.costs import SPENDS, TARGETS, times_of
+from coartic.analysis.topics.costs import SPENDS, TARGETS, cells_compared, times_of
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.robot import Array
 from coartic.text import id_named, unknown
 
-By = Literal["task", "family"]
-EVERYTHING = "all"
-"""The group of all tasks."""
-
 
 def runtimes(
     results: str | Path | Study,
     *,
-    by: By | None = None,
     methods: str | Sequence[str] = (),
     targets: Sequence[float] | Array = TARGETS,
 ) -> pd.DataFrame:
@@ -37,13 +31,10 @@ def runtimes(
     ----------
     results : str, Path or Study
         A results folder, or a study of one.
-    by : {"task", "family"}, optional
-        One ECDF for each; over all tasks by default. Tasks of a group count alike.
     methods : str or sequence of str, optional
-        Methods with their variants, such as ``"cma-es/bandit trials=200"`` or ``"CMA-ES"``; by
-        default all that
-        are compared in the report and have runs on all tasks of a group. Where methods are named,
-        a group has the tasks on which all of them have runs.
+        Methods with their variants, such as ``"cma-es/bandit trials=200"`` or ``"CMA-ES"``, on the
+        tasks on which all of them have runs; by default all that are compared in the report and
+        have runs on all tasks. Tasks count alike.
     targets : sequence of float, shape (n,), optional
         As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
         default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
@@ -51,7 +42,7 @@ def runtimes(
     Returns
     -------
     pandas.DataFrame
-        A row at each budget at which the share rises: ``group``, ``method``, ``spend`` (``trials``;
+        A row at each budget at which the share rises: ``method``, ``spend`` (``trials``;
         ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
         trials of a run), ``budget``, and ``share`` of the pairs of run and target that are reached
         within it. A method that reaches no target has one row, of share 0 and an infinite budget.
@@ -68,43 +59,29 @@ def runtimes(
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
         )
-    if by is not None and by not in get_args(By):
-        raise CoarticError(f"by is {by!r}; it must be 'task' or 'family'")
-    cells = {
-        method: {task: study.cells[task, label] for task, label in labels.items()}
-        for method, labels in scores.labels_by_task(study).items()
-    }
-    called = {name: known.name_of(name) for name in cells}
-    wanted = [methods] if isinstance(methods, str) else map(str, methods)
-    methods = [id_named(name, called) for name in wanted]
-    for name in methods:
-        if name not in cells:
-            raise CoarticError(unknown("method", name, cells, called))
-    groups: dict[str, list[str]] = {}
-    for task in scores.initial_and_optimum(study):
-        if all(task in cells[name] for name in methods):
-            family = study.tasks[task].family or task
-            groups.setdefault({None: EVERYTHING, "task": task, "family": family}[by], []).append(
-                task
-            )
-    if not scores.initial_and_optimum(study):
+    tasks = list(scores.initial_and_optimum(study))
+    if not tasks:
         raise CoarticError("no task has a known optimum that is better than its initial solution")
-    if not groups:
-        raise CoarticError(f"no task has runs of all of {', '.join(methods)}")
-    compared = {name: cells[name] for name in methods} or scores.compared(study)
+    chosen = cells_compared(study)
+    if methods:
+        labels = scores.labels_by_task(study)
+        called = {name: known.name_of(name) for name in labels}
+        wanted = [methods] if isinstance(methods, str) else map(str, methods)
+        names = [id_named(name, called) for name in wanted]
+        for name in names:
+            if name not in labels:
+                raise CoarticError(unknown("method", name, labels, called))
+        tasks = [task for task in tasks if all(task in labels[name] for name in names)]
+        if not tasks:
+            raise CoarticError(f"no task has runs of all of {', '.join(names)}")
+        chosen = {name: [study.cells[task, labels[name][task]] for task in tasks]
+                  for name in known.in_order(names)}  # fmt: skip
     rows = []
-    for group, tasks in groups.items():
-        for name in known.in_order(compared):
-            if not compared[name].keys() >= {*tasks}:
-                continue
-            of_group = [compared[name][task] for task in tasks]
-            single = len({cell.label for cell in of_group}) == 1
-            if not methods and single and name.startswith(known.TOGETHER):
-                continue  # the learner's conditions together are one of them here
-            for spend in SPENDS:
-                times = [times_of(study, cell, spend, shares) for cell in of_group]
-                if all(map(len, times)):
-                    budgets, reached = map(np.ndarray.tolist, share_by_budget(times))
-                    steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
-                    rows += [(group, name, spend, *step) for step in steps]
-    return pd.DataFrame(rows, columns=["group", "method", "spend", "budget", "share"])
+    for name, cells in chosen.items():
+        for spend in SPENDS:
+            times = [times_of(study, cell, spend, shares) for cell in cells]
+            if all(map(len, times)):
+                budgets, reached = map(np.ndarray.tolist, share_by_budget(times))
+                steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
+                rows += [(name, spend, *step) for step in steps]
+    return pd.DataFrame(rows, columns=["method", "spend", "budget", "share"])

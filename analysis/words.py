@@ -92,10 +92,10 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def estimate(value: Estimate, digits: int | None = None, unit: str = "") -> str:
+def estimate(value: Estimate, digits: int | None = None) -> str:
     """``2.1 % [1.3, 2.9]`` with its unit; without the brackets where there is no interval."""
     interval = in_brackets(value.low, value.high, digits)
-    return f"{number(value.value, digits)}{unit} {interval}".strip()
+    return f"{number(value.value, digits)} {interval}".strip()
 
 
 def interval(

@@ -14,7 +14,6 @@ from coartic.analysis.sections import FIGURES
 from coartic.analysis.study import typical_run
 from coartic.analysis.topics.learning import learning_curves
 from coartic.analysis.topics.paper.hands import hand_shares
-from coartic.analysis.topics.paper.rewards import published_differences
 from coartic.analysis.topics.tasks import picture_of_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
@@ -68,7 +67,7 @@ def test_the_typical_run_is_nearest_the_median(study):
 
 
 def test_learning_curves_against_a_loop(study):
-    data = learning_curves(study, 100)
+    data = learning_curves(study)
     rewards = dict(study.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
@@ -104,7 +103,7 @@ def test_published_differences(tmp_path):
     planted.runs["trials"] = 10_000  # planted: the table asks for the paper's length
     planted.runs["hands"] = ["RRRR", "RRRR", "LRLR"]
     planted.runs["reward"] = [-610, -606, -500]
-    data = published_differences(planted).set_index("hands")
+    data = FIGURES["published"](planted).data.set_index("hands")
     assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
     assert data.verdict[""] == "undecided"  # also of a mean over sequences
     assert data.difference["RRRR"] == pytest.approx(1.0)

@@ -53,29 +53,18 @@ def share_by_hand(tasks, method, targets, trials):
     return sum(shares) / len(shares)
 
 
-GROUPS = {
-    None: {"all": [ONE, TWO]},
-    "task": {ONE: [ONE], TWO: [TWO]},
-    "family": {ONE: [ONE], TWO: [TWO]},  # a task of none is one for itself
-}
-
-
-@pytest.mark.parametrize("by", GROUPS)
 @pytest.mark.parametrize("targets", [(0.5,), (0.25, 0.5, 1.0), [n / 20 for n in range(1, 21)]])
-def test_shares_are_those_of_all_pairs(study, by, targets):
-    curves = runtimes(study, by=by, targets=targets)
-    assert set(curves.group) == {*GROUPS[by]}
-    for (group, method), steps in curves[curves.spend == "trials"].groupby(["group", "method"]):
-        for trials in range(6):
-            within = steps.share[steps.budget <= trials].max() if trials or method == PLAN else 0.0
-            by_hand = share_by_hand(GROUPS[by][group], method, targets, trials)
-            assert (0 if math.isnan(within) else within) == pytest.approx(by_hand)
-        assert (steps.share.diff().dropna() > 0).all()
-    ran = {(group, m) for group, tasks in GROUPS[by].items() for m in ("own", LEARNER)
-           if all((task, m) in TRIALS for task in tasks)}  # fmt: skip
-    named = set(zip(curves.group, curves.method, strict=True))
-    assert named == ran | {(group, PLAN) for group in GROUPS[by]}
-    if not by and len(targets) == 20:
+@pytest.mark.parametrize("method", ["own", PLAN])
+def test_shares_are_those_of_all_pairs(study, method, targets):
+    curves = runtimes(study, targets=targets)
+    assert {*curves.method} == {"own", PLAN}  # the learner ran on one of the two tasks
+    steps = curves[(curves.spend == "trials") & (curves.method == method)]
+    for trials in range(6):
+        within = steps.share[steps.budget <= trials].max() if trials or method == PLAN else 0.0
+        by_hand = share_by_hand([ONE, TWO], method, targets, trials)
+        assert (0 if math.isnan(within) else within) == pytest.approx(by_hand)
+    assert (steps.share.diff().dropna() > 0).all()
+    if len(targets) == 20:
         assert runtimes(study).equals(curves)
 
 
@@ -96,7 +85,6 @@ def test_methods_that_are_named_share_their_tasks(study):
     for method, steps in curves[curves.spend == "trials"].groupby("method"):
         assert steps.share.max() == share_by_hand([TWO], method, [0.5, 1.0], 5)
     assert {*curves.method} == {"own", LEARNER}
-    assert {*runtimes(study, by="task", methods=LEARNER).group} == {TWO}
     assert {*runtimes(study, methods="null-space control, current goal").method} == {PLAN}
 
 
@@ -104,8 +92,6 @@ def test_what_cannot_be_shown(study, tmp_path):
     for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]], None):
         with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
             runtimes(study, targets=targets)
-    with pytest.raises(CoarticError, match="'genus'; it must be 'task' or 'family'"):
-        runtimes(study, by="genus")
     with pytest.raises(CoarticError, match="unknown method 'owm'; did you mean 'own'"):
         runtimes(study, methods=["owm"])
     with pytest.raises(CoarticError, match="unknown method '5'"):

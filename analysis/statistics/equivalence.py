@@ -8,13 +8,12 @@ the paper's runs only mean, SD and number are printed.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import Estimate, centred, student, vector
+from coartic.analysis.statistics.estimates import TAILS, Estimate, centred, vector
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -54,4 +53,7 @@ def difference_to_printed(
     if total == 0.0:
         return Estimate(value, value, value, n=sizes)
     freedom = total**2 / sum(part**2 / free for part, free in parts)
-    return replace(student(value, math.sqrt(total), freedom), n=sizes)
+    from scipy import special  # as in estimates
+
+    half = float(special.stdtrit(freedom, TAILS[1])) * math.sqrt(total)
+    return Estimate(value, value - half, value + half, n=sizes)

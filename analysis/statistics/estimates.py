@@ -90,9 +90,9 @@ def slices(count: int, most: int) -> Iterator[slice]:
         yield slice(start, min(start + most, count))
 
 
-def varies(values: Array, axis: int = 0) -> Array:
-    """Whether values differ along an axis by more than rounding (:data:`NEGLIGIBLE`)."""
-    return np.asarray(np.ptp(values, axis) > NEGLIGIBLE * np.abs(values).max(axis))
+def varies(values: Array) -> Array:
+    """Whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`)."""
+    return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
 def centred(values: Array) -> Array:
@@ -165,14 +165,6 @@ def bootstrap_estimate(
     if large or not (math.isfinite(low) and math.isfinite(high)):
         low, high = map(float, np.quantile(result.bootstrap_distribution, TAILS))
     return Estimate(value, low, high, n=n)
-
-
-def student(value: float, error: float, freedom: float, p: float = math.nan) -> Estimate:
-    """A value with Student's interval, by its standard error and degrees of freedom."""
-    from scipy import special
-
-    half = float(special.stdtrit(freedom, TAILS[1])) * error
-    return Estimate(value, value - half, value + half, p)
 
 
 def standard_deviation(values: Array) -> float:

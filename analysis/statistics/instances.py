@@ -45,7 +45,7 @@ def value(runs: Runs) -> float:
     return float(runs[0].mean()) - math.fsum(float(other.mean()) for other in runs[1:])
 
 
-def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate:
+def other_tasks(scores: Scores) -> Estimate:
     """Mean over families of the mean over instances of the mean over runs, for other tasks.
 
     Parameters
@@ -53,8 +53,6 @@ def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate
     scores : mapping of str to sequence of tuples of arrays
         By family, for each instance the scores of its runs in a tuple of one array ``(runs,)``; of
         two arrays where the difference of two methods counts, first less second.
-    resamples : int
-        Of the bootstrap.
 
     Returns
     -------
@@ -87,11 +85,11 @@ def other_tasks(scores: Scores, *, resamples: int = FEWER_RESAMPLES) -> Estimate
     n = tuple(map(len, values.values()))
     if min(n) < estimates.FEWEST:
         return Estimate(mean, n=n)
-    deviations = np.zeros(resamples)
+    deviations = np.zeros(FEWER_RESAMPLES)
     for place, (family, instances) in enumerate(scores.items()):
         rng = np.random.default_rng([estimates.SEED, place])
         count = len(instances)
-        which = rng.integers(count, size=(resamples, count))
+        which = rng.integers(count, size=(FEWER_RESAMPLES, count))
         drawn = values[family][which]
         for number, samples in enumerate(instances):
             chosen = which == number

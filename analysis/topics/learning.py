@@ -105,12 +105,12 @@ def draw_learning_curves(study: Study) -> Parts:
     return drawing, data, alt, tasks
 
 
-def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
+def learning_curves(study: Study) -> pd.DataFrame:
     """Best reward so far and that of the trials themselves, by task and method.
 
     Of runs with a solution; EC1 on tasks without the two-armed conditions. Columns ``task``,
     ``method``, ``runs``, ``trial``, ``best`` (mean over runs) and its quartiles ``best_low`` and
-    ``best_high``, ``trials`` (mean over runs and the last ``window`` trials).
+    ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
     """
     shown: list[tuple[str, str]] = []
     for task in (name for name in study.tasks if name in one_by_one(study)):
@@ -130,7 +130,7 @@ def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
         runs = [trials_of[run_id] for run_id in map(str, good.run_id) if run_id in trials_of]
         if runs:
             named = {"task": task, "method": label, "runs": len(runs)}
-            curve = learning_curve(runs, window)
+            curve = learning_curve(runs)
             if sum(int(np.isnan(run).sum()) for run in runs) > good.failed_trials.sum():
                 # More trials were left out than failed.
                 curve["trials"] = np.full(len(curve["trial"]), math.nan)
@@ -138,7 +138,7 @@ def learning_curves(study: Study, window: int = WINDOW) -> pd.DataFrame:
     return pd.concat(curves[1:] or curves, ignore_index=True)
 
 
-def learning_curve(runs: Sequence[Array], window: int) -> dict[str, Array]:
+def learning_curve(runs: Sequence[Array]) -> dict[str, Array]:
     """Both curves at chosen trials, from the reward of every trial of runs, NaN where it failed."""
     length = min(map(len, runs))
     rewards = np.array([run[:length] for run in runs])
@@ -147,7 +147,7 @@ def learning_curve(runs: Sequence[Array], window: int) -> dict[str, Array]:
     best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
     low, high = np.quantile(best, [0.25, 0.75], axis=0)
     sums, counts = (
-        pd.Series(values).rolling(window, min_periods=1).sum()
+        pd.Series(values).rolling(WINDOW, min_periods=1).sum()
         for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
     )
     trials = (sums / counts).to_numpy()[at - 1]

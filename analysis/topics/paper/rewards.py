@@ -110,25 +110,6 @@ def named(study: Study, cell: CellRuns) -> Row:
     return {"task": marked(task), "condition": cell.label.removeprefix(LEARNER)}
 
 
-@cached
-def published_differences(study: Study) -> pd.DataFrame:
-    """Our mean reward less the published one: of cells, then of their hand sequences.
-
-    Of the paper's conditions with the paper's number of trials: rows of
-    :func:`beside_paper` with ``task`` and ``method``.
-    """
-    shown: list[Row] = []
-    for row in beside_paper(study):
-        cell, paper = row["cell"], published_of(row["cell"])
-        comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
-        several = paper is not None and len(paper.sequences) > 1
-        if comparable and row["published"] is not None and (several or not row["hands"]):
-            shown.append(row | {"task": cell.task, "method": cell.label})
-    order = list(study.tasks)
-    shown.sort(key=lambda row: (order.index(row["task"]), LEARNERS.index(row["method"])))
-    return pd.DataFrame(shown)
-
-
 @figure(
     "Published and ours",
     f"Our mean learned reward minus the published one, with its {style.COVERAGE} interval. Grey: "
@@ -140,7 +121,16 @@ def published_differences(study: Study) -> pd.DataFrame:
 )
 def draw_published(study: Study) -> Parts:
     """Difference of every mean reward to the printed one, with interval and margin."""
-    data = published_differences(study)
+    shown: list[Row] = []
+    for found in beside_paper(study):
+        cell, paper = found["cell"], published_of(found["cell"])
+        comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
+        several = paper is not None and len(paper.sequences) > 1
+        if comparable and found["published"] is not None and (several or not found["hands"]):
+            shown.append(found | {"task": cell.task, "method": cell.label})
+    order = list(study.tasks)
+    shown.sort(key=lambda row: (order.index(row["task"]), LEARNERS.index(row["method"])))
+    data = pd.DataFrame(shown)
     if not len(data):
         raise CoarticError(
             f"no solved runs of the learner with {TRIALS} trials on a task of the paper"
