@@ -300,11 +300,17 @@ def schema(db: sqlite3.Connection) -> list[list[str]]:
     ]
 
 
+def fixed(method: str) -> dict[str, Any]:
+    """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
+    if method.startswith("nullspace-qp/"):
+        return {"modelling": "none"}
+    return LEARNER if method.startswith("dual-process/") else {}
+
+
 def other_reading(db: sqlite3.Connection) -> str:
     """Another reading of the paper than this version's, as ``ties=right``, or nothing."""
     for method, *texts in db.execute("SELECT method, model, parameters FROM settings"):
-        learner: dict[str, Any] = LEARNER if method.startswith("dual-process/") else {}
-        for text, now in zip(texts, (MODEL, learner), strict=True):
+        for text, now in zip(texts, (MODEL, fixed(method)), strict=True):
             for name, value in json.loads(text).items():
                 if now.get(name, value) != value:
                     return f"{name}={value}"
@@ -315,11 +321,10 @@ def check_identity(row: Any) -> None:
     """Raises ValueError where a run is not that of its setting: its id is a hash of task, method,
     parameters, constants, budget, seed of the suite and number, and ends with that of the code."""
     task, model = json.loads(row["definition"]), json.loads(row["model"])
-    learner = LEARNER if row["method"].startswith("dual-process/") else {}
     asked = {
         "task": task,
         "method": row["method"],
-        "parameters": {**learner, **json.loads(row["parameters"])},
+        "parameters": {**fixed(row["method"]), **json.loads(row["parameters"])},
         "model": {**MODEL, **model},
         "trial_budget": row["trial_budget"],
     }

@@ -23,7 +23,7 @@ from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.commands import call
 from tests.support.suites import KNOWN, InProcess, planned, run_and_write, same_results
 
-EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "trajectory-optimisation/jerk"
+EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "nullspace-qp/none"
 OWN = Path(template.__file__)
 
 

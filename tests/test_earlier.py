@@ -1,5 +1,6 @@
 """Folders of version 1.1, in which the paper could be read in several ways."""
 
+import json
 import shutil
 import sqlite3
 from contextlib import closing
@@ -93,6 +94,9 @@ def test_ids_begin_as_in_1_1(method, parameters, begins):
     """Those of suites quick, with 60 trials, and comparison; an id ends with the hash of code."""
     setting = Setting(load_task("ascending"), method, "", (), parameters, None)
     assert setting.key(0, 0).id == begins
+    row = setting.to_row()
+    again = Setting.from_row(row | {"definition": json.dumps(row["definition"])}, "")
+    assert again == setting  # told nothing
 
 
 @pytest.mark.parametrize(

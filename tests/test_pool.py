@@ -58,9 +58,9 @@ class Again(Does):
 HONEST = -319  # what these movements are worth
 HANDLED = {
     "hangs": ("time.sleep(999)", "timeout", "wall time limit of 1.4 s exceeded"),
-    "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 1 s exceeded"),
+    "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
-                       "        while True: pass", "timeout", "CPU time limit of 1 s exceeded"),
+                       "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
     "quits_well": ("os._exit(0)", "crashed", "exit code 0): it left no message"),
@@ -137,7 +137,7 @@ def folder(tmp_path_factory):
         others += [Cell(task, again), Cell(task, KNOWN["corrective-alone/given"])]
         for name, cells, patience_s, limit_s in (
             ("hangs", [hangs], 0.5, 0.3),
-            ("others", others, 600.0, 1.0),
+            ("others", others, 600.0, 0.5),
         ):
             run_and_write(
                 folder / name, cells, executor=Local(2, patience_s=patience_s), runs=1,
