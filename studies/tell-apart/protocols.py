@@ -2,8 +2,8 @@
 
     python studies/tell-apart/protocols.py [SPLIT] [FOLDER]
 
-writes changes.csv, starts.csv and steps.csv into the folder, by default this one, in a quarter of
-an hour of one core. Split ``d`` runs a few development instances in place of the test instances.
+writes changes.csv, starts.csv and steps.csv into the folder, by default this one, in five
+minutes of one core. Split ``d`` runs a few development instances in place of the test instances.
 """
 
 import sys

@@ -1,6 +1,6 @@
 """What would tell trial and error from planning?
 
-    python studies/tell-apart/protocols.py      # a quarter of an hour of one core
+    python studies/tell-apart/protocols.py      # five minutes of one core
     python studies/tell-apart/study.py          # results, power, claims, figure.svg, README.md
 
 All predictions with their rules are in :func:`judge_claims`, committed before the test instances
@@ -196,7 +196,7 @@ def draw(table):
     blue, _, _, red, _, sky = figures.PALETTE
     for model, words, color, up in (
         ("planner, all goals", "planner: all of it at once", blue, 0.05),
-        ("learner, told", "learner whose corrective process is told the next goal", sky, 0.14),
+        ("learner, told", "learner whose corrective process\nis told the next goal", sky, 0.25),
         ("learner", "learner by trial and error: none of it at once", red, -0.09),
     ):
         row = table.loc[f"change 0.5 {model}"]
