@@ -78,7 +78,9 @@ class Robots:
     move, in the order of a configuration; in a family, of arms with the most links.
 
     An observation has an entry for the next goal and for each of those ahead, 1 where there is
-    one; x and y of each from the base, length unit, 0 where there is none; and the joints.
+    one; x and y of each from the base, length unit, 0 where there is none; and the joints. In a
+    family whose robots differ in links an entry for each joint follows, 1 where the robot can move
+    it.
 
     An action has an entry for the hand, where the robot has two, and one for each joint. The box is
     from -1 to 1; what is beyond is clipped. Up to 0.5 the hand is the one that the corrective
@@ -108,13 +110,14 @@ class Robots:
             self.tasks: list[Task | str] = [*instances]
             goals, links, hands = family.goals[1], family.links[1], family.hands
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
+            self.differ = family.links[0] < links
         elif (split, count, year) != (None, None, None):
             raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
         else:
             only = as_task(task)
             self.tasks = [only]
             goals, links, hands = len(only.goals), only.robot.most_links, only.hands
-            locked = {*only.locked_base}
+            locked, self.differ = {*only.locked_base}, False
         # All configurations have one width: base, left arm, right arm, 0 beyond its links.
         self.links, width, number = links, BASE_DOF + 2 * links, len(self.tasks)
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
@@ -123,15 +126,16 @@ class Robots:
         base = [place for place, axis in enumerate("xy") if axis not in locked]
         self.joints = np.array([*base, *arms])
         self.starts, self.goals = np.zeros((number, width)), np.zeros((number, goals, 2))
+        self.movable = np.zeros((number, width), np.bool_)
         self.counts, self.kinds = np.zeros(number, np.int64), np.full(number, -1)
         self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
         self.task, self.goal = np.zeros((2, num_envs), np.int64)
         self.q, self.view = np.zeros((num_envs, width)), np.arange(ahead + 1)
         entries = (len(hands) > 1) + len(self.joints)
         self.action_space = Box(-1.0, 1.0, (entries,), np.float32)
-        high = np.full(3 * (ahead + 1) + len(self.joints), LARGEST_FIGURE, np.float32)
-        low = -high
-        low[self.view], high[self.view] = 0.0, 1.0
+        places, flags = 2 * (ahead + 1) + len(self.joints), len(self.joints) * self.differ
+        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], [ahead + 1, places, flags]).astype(np.float32)
+        low = np.where(high > 1.0, -high, np.float32(0.0))
         self.observation_space = Box(low, high, dtype=np.float32)
 
     def task_at(self, number: int) -> Task:
@@ -140,7 +144,9 @@ class Robots:
         if self.kinds[number] < 0:
             check_model(self.model, radius=task.radius)
             self.tasks[number] = task
-            self.starts[number, places_of(task.robot, self.links)] = task.q0
+            places = places_of(task.robot, self.links)
+            self.starts[number, places], self.movable[number, places] = task.q0, True
+            self.movable[number, ["xy".index(axis) for axis in task.locked_base]] = False
             self.goals[number, : len(task.goals)] = task.goal_array
             self.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
@@ -162,6 +168,7 @@ class Robots:
         places = self.goals[task[:, None], np.where(there, goals, 0)] - q[:, None, :BASE_DOF]
         places[~there] = 0.0
         seen = [there, places.reshape(len(rows), -1), q[:, self.joints]]
+        seen += [self.movable[task[:, None], self.joints]] if self.differ else []
         return np.concatenate(seen, axis=1, dtype=np.float32)
 
     def step(self, actions: ArrayLike, rows: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
@@ -189,11 +196,10 @@ class Robots:
             reach = partial(
                 reach_unchecked, robot, radius=radius, locked_base=locked, model=self.model
             )
-            each = len(self.sides), len(some), len(places)  # hands of all robots, one call
-            starts, ends = np.broadcast_to(q, each), np.broadcast_to(goals, (*each[:2], 2))
-            sides = np.repeat(self.sides, len(some))
-            alone = reach(starts.reshape(-1, each[2]), sides, ends.reshape(-1, 2), looks=False)
-            corrected = alone.corrected.reshape(each)
+            hands = len(self.sides)  # of each robot, which are corrected in one call
+            every = np.concatenate([q] * hands), np.repeat(self.sides, len(some))
+            alone = reach(*every, np.concatenate([goals] * hands), looks=False)
+            corrected = alone.corrected.reshape(hands, *q.shape)
             ways = np.sqrt(((corrected - q) ** 2).sum(axis=2))
             ways[np.isnan(ways)] = np.inf
             hand = ways.argmin(axis=0)
@@ -348,7 +354,7 @@ class TaskVectorEnv(VectorEnv):
 
     def _begin(self, rows: NDArray[np.int64]) -> None:
         number = len(self.robots.tasks)
-        drawn = [self._rngs[row].integers(number) for row in rows.tolist()]
+        drawn = [self._rngs[row].integers(number) if number > 1 else 0 for row in rows.tolist()]
         self.robots.begin(rows, np.array(drawn))
 
     def _infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:

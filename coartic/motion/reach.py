@@ -206,7 +206,7 @@ def reach_goals(arms: Any, setup: Any, reached: Any, batch: Any) -> None:
         reach_lot(first, min(room, count - first), arms, setup[0], reached, batch)
 
 
-SHARE = 10 * LANES
+SHARE = 14 * LANES
 """Arms for a thread, at least: to begin one takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Arrays for the kernel to work on that nobody uses, by :attr:`Robot.most_links`."""
