@@ -95,20 +95,19 @@ def bibliography(
         reasons.setdefault(key, []).append("the analysis")
     entries = [f"{comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
     slug = slugs(others)
-    entries += [declared_entry(name, methods[name], f"method-{slug[name]}") for name in others]
+    for name in others:
+        method = methods[name]
+        if not (citation := " ".join(method.citation.split())):
+            entries.append(
+                comment(f"{name}: it declares no citation; ask its authors what to cite")
+            )
+            continue
+        ours = method.origin == BUILT_IN
+        whose = "built in, without a row in methods.toml" if ours else "a method of others"
+        title = latex(" ".join(method.title.split()) or name)
+        declared = misc(f"method-{slug[name]}", title=title, note=latex(citation))
+        entries.append(f"{comment(f'{name}, {whose}, cites: {citation}')}\n{declared}")
     return "\n\n".join(entries) + "\n"
-
-
-def declared_entry(name: str, method: MethodCard, key: str) -> str:
-    """A method with no more than what it declares, in BibTeX."""
-    citation = " ".join(method.citation.split())
-    if not citation:
-        return comment(f"{name}: it declares no citation; ask its authors what to cite")
-    ours = method.origin == BUILT_IN
-    whose = "built in, without a row in methods.toml" if ours else "a method of others"
-    title = latex(" ".join(method.title.split()) or name)
-    words = comment(f"{name}, {whose}, cites: {citation}")
-    return f"{words}\n{misc(key, title=title, note=latex(citation))}"
 
 
 def misc(key: str, **fields: str) -> str:

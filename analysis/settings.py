@@ -11,9 +11,6 @@ from collections.abc import Iterable
 from coartic.analysis.methods import INITIAL, PLACEBOS, is_search, main_methods, name_of
 from coartic.analysis.study import Study, cached
 
-REFERENCES = (INITIAL, *PLACEBOS)
-"""Methods that may stand beside the settings of others."""
-
 
 @cached
 def varied(study: Study) -> dict[str, list[str]]:
@@ -36,7 +33,7 @@ def compares_settings(study: Study) -> bool:
     methods = {
         method: names
         for method, names in varied(study).items()
-        if method not in REFERENCES and not is_search(method)
+        if method not in (INITIAL, *PLACEBOS) and not is_search(method)
     }
     return bool(methods) and all(methods.values())
 

@@ -69,12 +69,6 @@ def number(value: float, digits: int | None = None) -> str:
     return sign + text.replace(",", NARROW_SPACE)
 
 
-def two_figures(value: float) -> str:
-    """A number with two figures: 0.46, 13, 7300, 980 000."""
-    rounded = float(f"{value:.2g}")
-    return number(rounded, 1 if 1 <= abs(rounded) < 10 else None)
-
-
 def p_value(p: float) -> str:
     """``p < 0.001`` or ``p = 0.012``, which no line breaks; empty for NaN."""
     if math.isnan(p):

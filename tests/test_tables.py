@@ -139,7 +139,6 @@ def test_runtimes(study):
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
     assert len(table) == 3
-    assert costs.learner_and_rival(study).index.tolist() == [BOTH, CMA]
     assert "1000 [200, 1000] trials; CMA-ES needs 10" in costs.what_it_costs(study)
 
 

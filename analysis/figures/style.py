@@ -23,8 +23,6 @@ from matplotlib.ticker import EngFormatter, NullFormatter
 from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, is_built_in, look_alike
 from coartic.analysis.statistics import estimates
 
-amount = EngFormatter(sep="")
-"""A number on a logarithmic axis: 1, 10, 100, 1k, 1M; 100m for 0.1."""
 INCH = 25.4  # mm
 ONE = 89 / INCH
 """Width of one journal column, inches."""
@@ -210,9 +208,9 @@ def on(color: str) -> str:
 
 
 def log_axis(axes: Axes) -> None:
-    """A logarithmic x axis with plain numbers at whole decades."""
+    """A logarithmic x axis with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(amount)
+    axes.xaxis.set_major_formatter(EngFormatter(sep=""))
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 

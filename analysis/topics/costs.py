@@ -204,25 +204,20 @@ def draw_shares(
     axes.set_ylim(-2, 102)
 
 
-def learner_and_rival(study: Study) -> pd.DataFrame:
-    """Rows of :func:`runtimes`: the learner's, and that of the other method which learns from the
-    reward of trials and reaches most targets."""
-    rows = runtimes(study)
-    learners = [label for label in methods.main_methods(rows.index) if methods.is_learner(label)]
-    others = [
-        label
-        for label in rows.index
-        if not methods.is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
-    ]
-    rival = [rows.reached[others].idxmax()] if others else []
-    return rows.loc[[*learners[:1], *rival] if learners else []]
-
-
 def what_it_costs(study: Study) -> str:
     """Trials that the learner and its rival need for half of the targets."""
-    rows = learner_and_rival(study).to_dict("records")
-    if not rows:
+    table = runtimes(study)
+    learners = [label for label in methods.main_methods(table.index) if methods.is_learner(label)]
+    if not learners:
         return ""
+    others = [
+        label
+        for label in table.index
+        if not methods.is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
+    ]
+    # The other method that learns from the reward of trials and reaches most targets.
+    rival = [table.reached[others].idxmax()] if others else []
+    rows = table.loc[[learners[0], *rival]].to_dict("records")
     names = ["the learner", *(methods.name_of(row["method"]) for row in rows[1:])]
     halves = [row["trials_to_half"] for row in rows]
     ends = [f"{number(100 * row['reached'], 0)} %" for row in rows]

@@ -21,7 +21,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.costs import improvements
 from coartic.analysis.topics.ranking import optimum_in_words
-from coartic.analysis.words import marked, two_figures
+from coartic.analysis.words import marked, number
 from coartic.robot import Array
 
 BUDGETS = (100, 1_000, 10_000)
@@ -188,7 +188,7 @@ def how_fast(study: Study) -> str:
     """When half of the gain of the learner that explores most is there, by task."""
     half = learning(study).half_gain
     after = [
-        f"{two_figures(half[row])} trials on {marked(task)}"
+        f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"
         for name, task in study.tasks.items()
         if half.get(row := f"{name} {methods.most_exploring(task)}", math.inf) < math.inf
     ]
