@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.benchmarks.planning import plan_suite
-    from coartic.benchmarks.run import RunReport, perform, run_suite
+    from coartic.benchmarks.run import Progress, perform, run_suite
 
-__all__ = ["RunReport", "perform", "plan_suite", "run_suite"]
+__all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
 
 def __getattr__(name: str) -> Any:

@@ -33,11 +33,13 @@ _SURE = frozenset({"ok", "infeasible"})  # whatever else is in the batch
 _RETRIED = frozenset({"timeout", "crashed"})
 
 
-@dataclass
+@dataclass(repr=False)
 class Progress:
-    """How far a plan is."""
+    """How far a plan is in a folder; shown as a sentence."""
 
+    folder: Path
     total: int
+    """Runs that are asked for."""
     present: int = 0
     """Runs that were there before."""
     stale: int = 0
@@ -48,7 +50,10 @@ class Progress:
     """Of all runs, those that are not ok."""
     crashed: int = 0
     """Of all runs, those that crashed."""
-
+    others: int = 0
+    """Runs in the folder that are not asked for."""
+    wall_s: float = 0.0
+    """Seconds from the call until the last run was kept, or nothing found to do."""
     waiting: Counter[str] = field(default_factory=Counter)
     """Runs that are to come, by method."""
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -81,10 +86,28 @@ class Progress:
         seconds = sum(coming[m] * self.took[m] / self.timed[m] for m in known)
         return seconds / self.workers, len(known) == len(coming)
 
+    def __repr__(self) -> str:
+        """How many runs were made in how long, how many failed, and where they are."""
+        minutes, seconds = divmod(self.wall_s, 60)
+        long = self.wall_s >= 100
+        time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
+        runs = counted(self.total, "run") + (f" ({self.present} reused)" if self.present else "")
+        failed = f"{self.failed} failed" if self.failed else "none failed"
+        left_out = [
+            f"{counted(count, 'run')} {what}"
+            for count, what in (
+                (self.stale, "made by a different version of the code"),
+                (self.others - self.stale, "of earlier commands, which are kept"),
+            )
+            if count > 0
+        ]
+        without = f" (leaving out {' and '.join(left_out)})" if left_out else ""
+        return f"{runs} in {time_taken}, {failed}: {self.folder}{without}"
+
 
 Watcher = Callable[[Progress, str], None]
-"""Called with how far a plan is before the first run and after each, and with what was run: the
-task and the method, empty before the first."""
+"""Called before the first run and after each, with the progress and with the task and the method of
+the run; these are empty before the first."""
 
 
 def run_suite(
@@ -94,11 +117,33 @@ def run_suite(
     executor: Executor | None = None,
     watch: Watcher = lambda progress, what: None,
     **options: Any,
-) -> RunReport:
+) -> Progress:
     """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
 
-    ``options`` are those of :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell
-    and ``trials`` per run.
+    Parameters
+    ----------
+    suite : str, Path or Suite
+        A shipped suite by name, or a suite file (``.toml``).
+    folder, executor, watch
+        As in :func:`perform`.
+    options
+        As in :func:`plan_suite`, such as ``tasks``, ``methods``, ``runs`` per cell and ``trials``
+        per run.
+
+    Returns
+    -------
+    Progress
+        Counts of runs, shown as a sentence.
+
+    Raises
+    ------
+    CoarticError
+        As :func:`plan_suite` and :func:`perform` do.
+
+    Examples
+    --------
+    >>> run_suite("paper", "results/first", tasks=["ascending"], runs=3)  # doctest: +SKIP
+    3 runs in 4 s, none failed: results/first
     """
     plan = plan_suite(suite, **options)
     return perform(plan, folder, executor=executor, watch=watch)
@@ -111,21 +156,40 @@ def perform(
     executor: Executor | None = None,
     retry_failed: bool = False,
     watch: Watcher = lambda progress, what: None,
-) -> RunReport:
+) -> Progress:
     """Perform what a results folder lacks of a plan.
 
-    ``executor`` is this machine, a process for every core, by default; ``retry_failed`` performs
-    anew what timed out or crashed; ``watch`` is called before the first run and after each.
+    Whatever interrupts it, finished runs are kept. Called again, it goes on from there.
 
-    A KeyboardInterrupt ends it and keeps what is done; so does whatever else. Called again,
-    it goes on from there. Raises CoarticError where something else is in the way in the
-    folder, another process is at work in it, or it cannot be written.
+    Parameters
+    ----------
+    plan : Plan
+        The runs that are asked for.
+    folder : str or Path
+        Results folder, made where there is none.
+    executor : Executor, optional
+        Where methods run; by default this machine, in a process for every core.
+    retry_failed : bool
+        Perform anew the runs that timed out or crashed.
+    watch : callable
+        Called before the first run and after each.
+
+    Returns
+    -------
+    Progress
+        Counts of runs, shown as a sentence.
+
+    Raises
+    ------
+    CoarticError
+        Something else is in the way in the folder, another process is at work in it, or it cannot
+        be written.
     """
     folder, clock = folder_named(folder), time.perf_counter()
     executor = executor or Local()
     with writing(folder) as store:
         store.ask(plan, current_environment(), command(), now())
-        progress = Progress(plan.size, stale=store.stale())
+        progress = Progress(folder, plan.size, stale=store.stale())
         missing = missing_jobs(plan, store, progress, retry_failed=retry_failed)
         for job in missing:
             progress.waiting[job.setting.method] += len(job.keys)
@@ -146,8 +210,9 @@ def perform(
                         progress.finish(run)
                         watch(progress, f"{run.setting.task.name} {run.setting.method}")
             jobs = alone
-        wall_s = time.perf_counter() - clock
-        return RunReport(folder, progress, wall_s, store.count() - plan.size)
+        progress.wall_s = time.perf_counter() - clock
+        progress.others = store.count() - plan.size
+        return progress
 
 
 def missing_jobs(plan: Plan, store: Store, progress: Progress, *, retry_failed: bool) -> list[Job]:
@@ -198,38 +263,3 @@ def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
         return trials_in(job.setting.parameters) * len(job.keys) or math.inf
 
     return sorted(whole, key=trials, reverse=True)
-
-
-@dataclass(frozen=True, repr=False)
-class RunReport:
-    """What performing a plan came to; shown as a sentence."""
-
-    folder: Path
-    progress: Progress
-    wall_s: float
-    """Seconds from the call until the last run was kept, or nothing found to do."""
-    others: int
-    """Runs in the folder that were not asked for."""
-
-    def __repr__(self) -> str:
-        """How many runs were made in how long, how many failed, and where they are."""
-        progress, seconds = self.progress, self.wall_s
-        time_taken = (
-            f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min {seconds % 60:.0f} s"
-        )
-        reused = f" ({progress.present} reused)" if progress.present else ""
-        failed = f"{progress.failed} failed" if progress.failed else "none failed"
-        unasked = self.others - progress.stale
-        left_out = [
-            f"{counted(count, 'run')} {what}"
-            for count, what in (
-                (progress.stale, "made by a different version of the code"),
-                (unasked, "of earlier commands, which are kept"),
-            )
-            if count > 0
-        ]
-        without = f" (leaving out {' and '.join(left_out)})" if left_out else ""
-        return (
-            f"{counted(progress.total, 'run')}{reused} in {time_taken}, {failed}: "
-            f"{self.folder}{without}"
-        )

@@ -219,7 +219,7 @@ def without_posix(out):
 
     methods = ["EC1", "random-search/climbing", "nullspace-qp/next-goal"]
     plan = plan_suite("quick", runs=2, trials=5, tasks=["ascending"], methods=methods)
-    assert perform(plan, out, executor=InProcess()).progress.failed == 0
+    assert perform(plan, out, executor=InProcess()).failed == 0
     runs = load(out).runs
     assert len(runs) == plan.size
     assert runs.process_peak_mb.isna().all()

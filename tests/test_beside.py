@@ -49,7 +49,7 @@ def parts(tmp_path_factory):
 def joined(folders, out, cells=WHOLE, **options):
     """What is performed where folders stand beside a plan of cells."""
     whole = put_beside(planned(cells, **OPTIONS | options), folders, out)
-    return perform(whole, out, executor=InProcess()).progress
+    return perform(whole, out, executor=InProcess())
 
 
 def test_parts_make_a_whole(parts, tmp_path):
@@ -170,7 +170,7 @@ def test_a_stranger_beside_others(parts, tmp_path):
     for present, done in ((4, plan.size), (4 + plan.size, 0)):
         whole = put_beside(plan, parts[1:], out)
         report = perform(whole, out, executor=InProcess())
-        assert (report.progress.present, report.progress.done) == (present, done)
+        assert (report.present, report.done) == (present, done)
     study = load(out)
     theirs = study.runs[study.runs.method != "NAME"]
     assert set(theirs.result) == set(load(parts[1]).runs.result)

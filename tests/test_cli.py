@@ -83,7 +83,7 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
 def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys):
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "80")
-    progress = Progress(63, done=28, timed=Counter(x=28), waiting=Counter(x=35))
+    progress = Progress(Path("results"), 63, done=28, timed=Counter(x=28), waiting=Counter(x=35))
     progress.took["x"] = 2800.0
     with Display("paper") as display:
         display.update(progress, f"two-armed-1 {'method' * 20}")

@@ -176,7 +176,7 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
         perform(plan, tmp_path, executor=Two(), watch=watch)
     with pytest.raises(CoarticError, match=r"has 8 of 9 runs.*Repeat"):
         load(tmp_path)
-    assert perform(plan, tmp_path, executor=Two()).progress.done == 1
+    assert perform(plan, tmp_path, executor=Two()).done == 1
     same_results(load(tmp_path), undisturbed)
 
 
@@ -306,7 +306,7 @@ class TooSlow(InProcess):
 def test_what_is_performed_again(undisturbed, tmp_path):
     def counts(executor=None, *, time_limit_s=1.0, **how):
         plan = planned(ONE, time_limit_s=time_limit_s, **FEW)
-        progress = perform(plan, tmp_path, executor=executor or InProcess(), **how).progress
+        progress = perform(plan, tmp_path, executor=executor or InProcess(), **how)
         return progress.present, progress.done, progress.failed, progress.crashed
 
     assert counts(TooSlow()) == (0, 9, 9, 0)
@@ -324,7 +324,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     other = Cell(cell.task, replace(cell.method, code="0" * 12))
     run_and_write(tmp_path, [other], **FEW)
     report = perform(planned(ONE, **FEW), tmp_path, executor=InProcess())
-    assert (report.progress.stale, report.progress.present, report.progress.done) == (9, 0, 9)
+    assert (report.stale, report.present, report.done) == (9, 0, 9)
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:

@@ -90,7 +90,7 @@ def run(
 
     pairs = answers_in_words(load(report.folder))
     say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
-    if report.progress.crashed:
+    if report.crashed:
         sys.exit(1)
 
 
