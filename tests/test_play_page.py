@@ -192,7 +192,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     assert done.hands.startswith("RL")
     assert ticks(page, "You") == done.ticks
     again = settled(opened(page.url.partition("#")[2]))
-    assert text(again, "score") == text(page, "score")
+    assert text(again, "score") == text(settled(page), "score")
 
 
 def test_the_link_holds_the_whole_state(opened):

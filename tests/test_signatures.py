@@ -216,6 +216,10 @@ def test_isolated_reaches_are_the_corrective_process():
     assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
     stays = posed(unreachable, "", [unreachable.q0])
     assert subtasks.ticks_slower(stays)[0, 2] == math.inf
+    task = tiny_task(goals=[[2.0, 1.0], [4.4, 0.5]], locked_base=["x", "y"],
+                     start={"left": [0.5] * 4, "right": [0.5] * 4})  # fmt: skip
+    right = Solutions(task, "", (corrective_trial(task, "RR"),))
+    assert subtasks.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
 
 
 def test_what_a_posture_serves():
@@ -265,12 +269,12 @@ def test_choice_in_isolation():
     """Each hand beside its goal: the near one is the isolated choice."""
     start = {"base": [0.0, 0.0], "left": [math.pi, 0, 0, 0], "right": [0.0] * 4}
     task = tiny_task(goals=[[5.0, 0.1], [-5.0, 0.1]], initial_hands="RL", start=start)
-    both = Solutions(task, "", tuple(corrective_trial(task, hands) for hands in ("RL", "LR")))
-    agrees = as_in_isolation(both)
-    assert agrees[:, 0].tolist() == [1, 0]
-    assert agrees[0, 1] == 1
+    some = tuple(corrective_trial(task, hands) for hands in ("RL", "LR", "RR"))
+    agrees = as_in_isolation(Solutions(task, "", some))
+    assert agrees[:, 0].tolist() == [1, 0, 1]
+    assert agrees[[0, 2], 1].tolist() == [1, 0]
     # Not of the last goal.
-    assert SIGNS["hand"].of(both).tolist() == [0.0, 1.0]
+    assert SIGNS["hand"].of(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
 
 
 # The other arm

@@ -466,11 +466,12 @@ def bomb(count):
         "learning SET rewards = 'x'",
         f"learning SET rewards = {bomb(21)}",
         f"learning SET rewards = {bomb(30_000_000)}",
+        "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells",
     ],
 )
 def test_content_of_another_kind_is_one_sentence(undisturbed, tmp_path, change):
     (tmp_path / RUNS_FILE).write_bytes((undisturbed.folder / RUNS_FILE).read_bytes())
-    sql(f"UPDATE {change}")(tmp_path / RUNS_FILE)
+    sql(change if "INSERT" in change else f"UPDATE {change}")(tmp_path / RUNS_FILE)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)
     assert str(tmp_path) in str(caught.value)
