@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
@@ -40,6 +40,8 @@ FORMATS = (".svg", ".pdf", ".png")
 DPI = 300
 MAGNIFIED = 1.3
 """Enlarges figures on the page, so that their 8 pt are as large as its text."""
+PHONE = 320 / 72
+"""Width in inches that a phone shows: it stacks panels, or scrolls one that is wider."""
 _FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
@@ -131,20 +133,13 @@ def save(plot: Plot, folder: Path) -> list[Path]:
     return paths
 
 
-class PagePicture(NamedTuple):
-    """A figure for a page of HTML."""
+def for_page(plot: Plot) -> dict[str, Any]:
+    """A figure for the template of the page.
 
-    svg: str
-    """The whole of it as one ``<svg>`` element."""
-    pieces: tuple[str, ...]
-    """Its panels and what its legend says, an ``<svg>`` each, for screens too narrow for panels
-    side by side: they show parts of the whole. Empty where nothing stands side by side."""
-    curves: tuple[tuple[str, str], ...]
-    """Names of its curves, and how their lines are drawn (CSS)."""
-
-
-def for_page(plot: Plot) -> PagePicture:
-    """A figure for a page of HTML.
+    Keys ``id``, ``title`` and ``caption``; ``svg``, the figure as one ``<svg>`` element;
+    ``pieces``, its panels and legend entries, an ``<svg>`` each, for screens too narrow for panels
+    side by side (empty where none stand so); ``curves``, names of curves and the CSS of their
+    lines; ``width`` in rem; ``wide``, whether it is wider than a phone.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
@@ -195,7 +190,12 @@ def for_page(plot: Plot) -> PagePicture:
         f'style="width: {MAGNIFIED * box.width / 12:.1f}rem"><use href="#{plot.id}-all"/></svg>'
         for box in boxes
     )
-    return PagePicture(whole, pieces, tuple(curves.items()))
+    inches = figure.get_figwidth()
+    return {
+        **{"id": plot.id, "title": plot.title, "caption": plot.caption},
+        **{"svg": whole, "pieces": pieces, "curves": tuple(curves.items())},
+        **{"wide": inches > PHONE, "width": f"{MAGNIFIED * inches * 72 / 12:.0f}"},
+    }
 
 
 def shorten(attribute: re.Match[str]) -> str:

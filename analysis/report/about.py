@@ -78,15 +78,14 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
 
 def notes_on_tables(study: Study) -> str:
     """Notes for readers of the CSV files, a line each."""
-    tasks = [study.tasks[name] for name in sorted(one_by_one(study), key=list(study.tasks).index)]
-    daggers = (
-        [f"{RECONSTRUCTED} ({listed(map(marked, their))})"]
-        if (their := [task for task in tasks if task.reconstructed])
-        else []
-    )
+    reconstructed = [
+        marked(task)
+        for name, task in study.tasks.items()
+        if name in one_by_one(study) and task.reconstructed
+    ]
     lines = [
         "Rewards are in ticks. Gaps are shares of the optimum, 0.05 being 5 %.",
-        *daggers,
+        *([f"{RECONSTRUCTED} ({listed(reconstructed)})"] if reconstructed else []),
         *notes_of(study, ["gap"]),
         "run_ids: the runs behind a row; the beginning of an id names a run.",
     ]

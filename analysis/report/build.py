@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
-from coartic.analysis.figures.plot import MAGNIFIED, Plot, for_page, picture
+from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, html_table, latex_table
@@ -32,7 +32,6 @@ SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
 LONG = 20
 """Rows of a table above which it scrolls in a box of its own."""
-_PHONE = 320 / 72  # inches: a phone stacks panels, or scrolls one that is wider
 
 
 def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
@@ -114,18 +113,11 @@ def sections(study: Study) -> list[dict[str, Any]]:
             "long": len(frame) > LONG,
             "example": f"'{frame.index[0]}'",
         } if len(frame) else None  # fmt: skip
-        inches = plot.figure.get_figwidth() if plot else 0.0
-        figure = plot and {
-            **{"id": plot.id, "title": plot.title, "caption": plot.caption},
-            **for_page(plot)._asdict(),
-            "wide": inches > _PHONE,
-            "width": f"{MAGNIFIED * inches * 72 / 12:.0f}",
-        }
         words = {
             "table": name,
             "finding": about.sentences(study).get(section.id, ""),
             "rows": rows,
-            "figure": figure,
+            "figure": plot and for_page(plot),
         }
         allowed.append(vars(section) | words)
     return allowed
