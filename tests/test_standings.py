@@ -212,6 +212,13 @@ def test_what_was_not_tested_is_not_said_to_be_alike():
         assert "; the runs are too few, or too alike, to tell" in ranking.from_files(seen)
 
 
+def test_a_method_from_a_file_on_one_task_has_its_sentence():
+    seen = study(TEN | {("ascending", "mine"): [-300, -300]})
+    best = seen.optima["ascending"].reward
+    words = f"mine, not of this project, ends {100 * (best + 300) / -best:.1f} % away on Ascending"
+    assert words in ranking.nearest(seen)
+
+
 def test_a_method_from_a_file_stands_with_its_parameters():
     """In ranking, tests and headline; a setting of a built-in method is a variant."""
     rewards = TEN | strangers(("mine", 2), ("random-search/climbing", 5), runs=10)

@@ -22,7 +22,7 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.failed import failed_runs
-from coartic.analysis.words import capital, interval, marked, number, p_value
+from coartic.analysis.words import capital, interval, listed, marked, number, p_value
 from coartic.text import counted
 
 TRIES = *methods.PLACEBOS, "corrective-alone/every"
@@ -269,10 +269,19 @@ def as_declared(method: str) -> str:
 def from_files(study: Study) -> str:
     """Sentences about methods that are not built in, beside the learner where it ran."""
     rows, text = ranking(study), ""
-    rows = rows[~rows.method.map(methods.is_built_in).astype(bool) & rows.gap.notna()]
+    rows = rows[~rows.method.map(methods.is_built_in).astype(bool)]
     learner = any(methods.is_learner(label) for _, label in study.cells)
     for row in rows.head(MOST_FOREIGN).to_dict("records"):
-        text += f" {row['method']}, not of this project, ends {number(100 * row['gap'], 1)} % away"
+        gap, on = row["gap"], ""
+        if math.isnan(gap):  # the mean of the tasks on which it solved every run
+            there = {t: g for t in study.tasks if (g := row.get(f"on {t}", math.nan)) == g}
+            if not there:
+                continue
+            gap, on = (
+                np.mean([*there.values()]),
+                f" on {listed(marked(study.tasks[t]) for t in there)}",
+            )
+        text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % away{on}"
         if learner and math.isnan(row["better"]):
             text += "; the runs are too few, or too alike, to tell it from the learner"
         elif learner:
