@@ -13,7 +13,7 @@ __all__ = ["Progress", "perform", "plan_suite", "run_suite"]
 
 
 def __getattr__(name: str) -> Any:
-    """What is imported when it is asked for: a worker needs none of it."""
+    """Import a name of the API when it is first used: workers need none of it."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from coartic.benchmarks import run

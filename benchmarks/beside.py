@@ -64,8 +64,8 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
 
 
 def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
-    """The plan with all cells of the sources. Raises CoarticError for what does not go together,
-    and for runs that no source has and that are not performed here."""
+    """Return the plan with all cells of the sources. Raises CoarticError where sources contradict
+    each other, and for runs that no source has and that are not performed here."""
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
         (plans[name].settings[position].asked, number)
@@ -111,12 +111,12 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
 
 
 def cells_of(plan: Plan) -> Iterator[tuple[str, Cell]]:
-    """The cells of a plan, each after the hash of what is asked for, which leaves out the code."""
+    """The cells of a plan, each after the hash of its setting without the code."""
     return zip((setting.asked for setting in plan.settings), plan.cells, strict=True)
 
 
 def named(cells: Sequence[Cell]) -> str:
-    """The first of some cells in words, and how many others there are."""
+    """Name the first of some cells, and count the others."""
     others = f" and of {counted(len(cells) - 1, 'other cell')}" if len(cells) > 1 else ""
     return f"{cells[0].label} on {cells[0].task.name}{others}"
 

@@ -23,7 +23,7 @@ _API = PACKAGE / "__init__.py"
 """It imports nothing before it is asked for: names count where they are at home."""
 _EVERY_RUN = PACKAGE / "method.py", PACKAGE / "motion" / "solution.py"
 _AROUND = tuple(Path(__file__).with_name(name) for name in ("worker.py", "scoring.py"))
-"""What performs and scores a run: of what these import only the above decides results."""
+"""Modules that perform and score a run. Of their imports, only the above change results."""
 _WITHIN_STATEMENTS = ast.stmt | ast.excepthandler | ast.match_case
 
 
@@ -64,13 +64,13 @@ def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[
 
 
 def code_text(path: Path) -> str:
-    """What counts of a module: its syntax tree without docstrings and ``__version__``."""
+    """The syntax tree of a module without docstrings and ``__version__``, as text."""
     return syntax(path.read_bytes())[0]
 
 
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
-    """What counts of a module, as a text; its imports: level, module, names."""
+    """The syntax tree of a module as :func:`code_text`, and its imports: level, module, names."""
     imports = []
     for node in statements(tree := ast.parse(content)):
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
@@ -99,7 +99,7 @@ def homes(names: Iterable[str]) -> set[str]:
 
 
 def statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """What :func:`ast.walk` finds, without expressions, which are most of a tree."""
+    """The nodes of :func:`ast.walk` without expressions, which are most of a tree."""
     waiting = deque([tree])
     while waiting:
         node = waiting.popleft()

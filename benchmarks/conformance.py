@@ -1,4 +1,4 @@
-"""The conformance kit: what a contributor runs on a new method or task.
+"""Checks of a new method or task against the rules, for contributors.
 
 A method is checked on runs with a limit of CPU time, in a process that performs them all, and in
 another one.
@@ -37,7 +37,7 @@ BUDGET = 7  # trials of the runs that are to keep to it
 
 
 class Law(NamedTuple):
-    """One law and what was found."""
+    """A law, whether it holds, and the finding in words."""
 
     name: str
     passed: bool
@@ -107,21 +107,21 @@ def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[
 
 
 def changes(before: dict[str, Run], runs: dict[str, Run], how: str) -> Iterator[str]:
-    """In what runs, by task, differ from earlier ones."""
+    """Differences of runs from earlier runs of the same task, in words."""
     for task, run in runs.items():
         for difference in compare_runs(before[task], run):
             yield f"{how.format(task)}: {difference}"
 
 
 def declaration_law(card: MethodCard) -> Law:
-    """It says what it is."""
+    """Title and citation are there."""
     empty = [name for name in ("title", "citation") if not getattr(card, name).strip()]
     finding = f"{card.title}; told: {', '.join(card.told) or 'nothing'}"
     return law("declaration", (f"{name} is empty" for name in empty), finding)
 
 
 def parameters_law(card: MethodCard) -> Law:
-    """Its parameters survive JSON, are checked and cannot be changed."""
+    """The parameters survive JSON, are checked and cannot be changed."""
     parameters = card.complete({})
 
     def problems() -> Iterator[str]:
@@ -143,7 +143,7 @@ def list_values(parameters: dict[str, Any]) -> str:
 
 
 def solution_law(runs: dict[str, Run], parameters: dict[str, Any]) -> Law:
-    """Its solutions can be executed and hit every goal."""
+    """Every solution can be executed and hits all goals."""
     problems = (
         f"on {task}: {run.status}: {run.reason}" for task, run in runs.items() if run.status != "ok"
     )
@@ -153,7 +153,7 @@ def solution_law(runs: dict[str, Run], parameters: dict[str, Any]) -> Law:
 
 
 def budget_law(runs: dict[str, Run]) -> Law:
-    """It keeps to its budget of trials."""
+    """The method keeps to its budget of trials."""
     problems = (
         f"a budget of {BUDGET} trials on {task}: {run.reason or (run.meter and run.meter.trials)}"
         for task, run in runs.items()
@@ -163,7 +163,7 @@ def budget_law(runs: dict[str, Run]) -> Law:
 
 
 def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
-    """It uses what it declares, and nothing else."""
+    """The method uses all that it declares, and nothing else."""
     declared = {item.value for item in METERED if item.value in card.told}
     used = {name for run in runs.values() for name in run.used}
     problems = [
@@ -182,7 +182,7 @@ def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
 
 
 def failure_law(runs: Sequence[Run]) -> Law:
-    """It says so where a task cannot be completed."""
+    """The method gives a reason where a task cannot be completed."""
     problems = (
         f"on a task that nobody can complete it gives {run.status} {run.reason}; it should "
         "give infeasible, with a reason"

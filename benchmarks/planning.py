@@ -25,7 +25,7 @@ LIMITS = {
 
 
 def check_list(name: str, value: object) -> None:
-    """Raises CoarticError for what is no list of names, one text above all."""
+    """Raises CoarticError unless the value is a list of names or paths."""
     if isinstance(value, str | Path):
         raise CoarticError(f"{name} is a list: write {name}=[{str(value)!r}]")
     if not isinstance(value, Sequence) or not all(isinstance(item, str | Path) for item in value):

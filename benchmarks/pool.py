@@ -139,7 +139,7 @@ class Local:
         return 3 * (job.time_limit_s or _LONGEST_S) + self.patience_s
 
     def is_late(self, worker: Worker) -> bool:
-        """Whether the job that a process is at takes too long."""
+        """Whether the current job of a process takes too long."""
         since_s, limit_s = worker.since_s, self.wall_limit(worker.jobs[0])
         return since_s is not None and time.monotonic() > since_s + limit_s
 
@@ -159,9 +159,9 @@ class Worker:
 
     def __init__(self, folder: str, jobs: Sequence[Job], workers: int) -> None:
         self.jobs = deque(jobs)
-        """Those that are not answered yet."""
+        """Jobs that are not answered yet."""
         self.since_s: float | None = None
-        """When it was seen to begin the first of them."""
+        """Clock when it began the first of these; None before."""
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
         self._process = WorkerProcess(target=perform_jobs, args=(self._folder, jobs, workers))
@@ -179,7 +179,7 @@ class Worker:
 
     @property
     def sentinels(self) -> list[int]:
-        """What is ready when it has ended."""
+        """A handle that is ready when the process has ended."""
         return [] if self._process.pid is None else [self._process.sentinel]
 
     @property
@@ -227,7 +227,7 @@ def signal_named(exit_code: int) -> str:
 
 
 def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
-    """What a process does, in a folder of its own."""
+    """Perform jobs in this process, which answers in a folder of its own."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     begin_worker(folder.parent)
     descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
@@ -276,7 +276,7 @@ def perform_within_limit(job: Job) -> list[Outcome]:
 
 
 def bound_resources(workers: int) -> None:
-    """A method that allocates or writes without end gets an error, not the whole machine."""
+    """Limit memory and size of files, so that a method gets an error before the machine swaps."""
     try:
         import resource
 

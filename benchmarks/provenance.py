@@ -1,4 +1,4 @@
-"""Where and with what a result was made, recorded while it is made."""
+"""The surroundings in which a result is made: versions, machine, commit, command."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _LIBRARIES = (
     "pydantic",
     "scipy",
 )
-"""Those that results may hang on."""
+"""Libraries on which results may depend."""
 
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """With what this process makes results: versions, platform, commit."""
+    """Versions, platform and commit of this process."""
     return {
         "coartic": coartic.__version__,
         "model_code": FINGERPRINT,

@@ -30,7 +30,8 @@ _LONGEST_ANSWER = 2**24  # bytes
 
 
 class Reader:
-    """Asks a process that has imported a file; what that has started ends with this one."""
+    """Asks a process that has imported a method file. It ends with this process, with all that it
+    has started."""
 
     def __init__(self, path: Path, shown: str) -> None:
         self._shown = shown
@@ -60,7 +61,7 @@ class Reader:
 
 
 def answer_questions(pipe: Any, path: str, shown: str) -> None:
-    """What the process does."""
+    """Answer questions until the pipe is closed."""
     begin_worker()
     methods: dict[str, type[Method]] = {}
     while True:
@@ -129,7 +130,7 @@ def cards_of_module(
 
 
 def check_declaration(method: type[Method], origin: str) -> None:
-    """Raises CoarticError where a method does not declare what every method does."""
+    """Raises CoarticError where a method lacks a declaration that every method needs."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation"):
         text = getattr(method, attribute, None)

@@ -32,7 +32,7 @@ ENTRY_POINTS = "coartic.methods"
 RESERVED = (METHOD_PREFIX, SEARCH)
 """Ids that begin so have a meaning in every table: methods of this project alone have them."""
 NAMES = ("CMA-ES", "learner", "optimum")
-"""What people call methods of this project, where it could be an id."""
+"""Names of this project's methods that could be ids of others."""
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",

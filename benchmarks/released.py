@@ -17,7 +17,7 @@ from coartic.files import folder_named
 from coartic.runs.store import RUNS_FILE, Store, open_content, open_store, writing
 
 RELEASED = "released"
-"""What stands for the shipped results in place of a folder."""
+"""Stands for the shipped results in place of a folder."""
 _FOLDER = Path(__file__).with_name("released")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"

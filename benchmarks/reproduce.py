@@ -1,4 +1,4 @@
-"""Runs performed anew, and compared with what is stored of them."""
+"""Perform stored runs again, and compare."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def perform_some_again(
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """In what the results of two runs differ; times and surroundings apart."""
+    """Differences of the results of two runs in words, without times and surroundings."""
     if a.is_thin or b.is_thin:
         a, b = a.thin(), b.thin()
     first, second = a.to_row(), b.to_row()

@@ -1,4 +1,4 @@
-"""Run a suite into a folder, from Python: what ``coartic run`` does, without a terminal.
+"""Run a suite into a folder, as ``coartic run`` does.
 
 ``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite and performs what the
 folder lacks; ``coartic.analysis.load("results/quick")`` reads it.
@@ -47,9 +47,9 @@ class Progress:
     done: int = 0
     """Runs performed now."""
     failed: int = 0
-    """Of all runs, those that are not ok."""
+    """Runs that are not ok, of all."""
     crashed: int = 0
-    """Of all runs, those that crashed."""
+    """Runs that crashed, of all."""
     others: int = 0
     """Runs in the folder that are not asked for."""
     wall_s: float = 0.0
@@ -59,7 +59,7 @@ class Progress:
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     """Wall time of the runs performed now, by method, s."""
     timed: Counter[str] = field(default_factory=Counter)
-    """Number of those whose time is known."""
+    """Number of runs whose time is known, by method."""
     workers: int = 1
 
     def count(self, status: str) -> None:
@@ -79,8 +79,8 @@ class Progress:
 
     @property
     def time_left(self) -> tuple[float, bool]:
-        """Seconds that the runs to come take, judged by earlier ones of their methods, and whether
-        that is all of them: a method of which none is done yet counts nothing."""
+        """Seconds that the runs to come take, by the mean of earlier runs of their methods, and
+        whether every method that is to come has an earlier run."""
         coming = +self.waiting
         known = [method for method in coming if self.timed[method]]
         seconds = sum(coming[m] * self.took[m] / self.timed[m] for m in known)

@@ -1,5 +1,5 @@
-"""From what a worker states of runs to runs: executed and scored here, where the method has never
-been."""
+"""Execute and score the solutions that workers hand over, in a process that no method has been
+in."""
 
 from __future__ import annotations
 

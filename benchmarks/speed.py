@@ -145,7 +145,7 @@ methods = ["dual-process/EC1"]
 
 
 class Spent(NamedTuple):
-    """What a command takes."""
+    """Time and memory of a command."""
 
     cpu_s: float
     """Of its process and of all that it starts."""
@@ -192,7 +192,7 @@ def show_commands(*, is_long: bool) -> None:
 
 
 def spent_by(command: list[str], cache: str) -> Spent:
-    """What a command takes, with kernels kept in a folder.
+    """Measure a command, with kernels kept in a folder.
 
     On Linux also the processes that end after it, such as the server of worker processes.
     """

@@ -1,4 +1,4 @@
-"""What a worker process does: it lets a method solve a task, and states what came of it.
+"""Let a method solve a task in a worker process, and state the outcome as plain data.
 
 It may run code that nobody here has read, so its word is no more than that: it answers in plain
 data, and what it hands over as a solution is executed and scored in the parent process, where
@@ -68,7 +68,7 @@ _Reward = Annotated[int, Field(gt=-(2**31), lt=2**31)]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a method states of one run."""
+    """The statement of a worker about one run."""
 
     status: Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
     reason: str = ""
@@ -102,7 +102,7 @@ def fail(
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Outcomes as JSON. Raises TypeError or ValueError for what a method left that cannot be."""
+    """Outcomes as JSON. Raises TypeError or ValueError where a method left other data."""
 
     def numbers(array: Any) -> Any:
         return None if array is None else array.tolist()
@@ -183,7 +183,7 @@ _seen: set[str] = set()
 
 
 def solve(job: Job, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
-    """What the method returns in each session."""
+    """The result of the method in each session."""
     method = job.method.configure(job.setting.parameters)
     reason_not = method.why_not(outline_of(job.setting.task))
     if reason_not is not None:
@@ -222,7 +222,7 @@ def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outc
 
 
 def statement(method: str, result: Any, session: Session) -> dict[str, Any]:
-    """What a method's result says, as plain data. Raises SolutionError for what cannot be kept."""
+    """A method's result as plain data. Raises SolutionError where it cannot be kept."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     if result.bound is not None and not method.startswith(SEARCH):

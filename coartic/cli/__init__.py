@@ -59,7 +59,7 @@ COMMANDS = (
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
     (play.play, "two-armed-1 --out play.html"),
 )
-"""The commands, each with what stands behind its name in the example of its help."""
+"""The commands, each with the arguments of the example in its help."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
     app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
@@ -67,7 +67,7 @@ app.add_typer(new.group, name="new")
 
 
 class Said(logging.Handler):
-    """Says what the package logs."""
+    """Prints the log of the package."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """One record, to standard error."""
@@ -75,7 +75,7 @@ class Said(logging.Handler):
 
 
 def main() -> None:
-    """Run the command line; exit code 2 for what the user can put right."""
+    """Run the command line; exit code 2 for errors that the user can put right."""
     gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks ± gets a ?

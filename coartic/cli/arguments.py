@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def job_count(text: str | int) -> int:
-    """A number of processes. Raises CoarticError for 0 and for what is none."""
+    """A number of processes. Raises CoarticError for anything else."""
     try:
         threads_for(int(text))
     except ValueError:
@@ -29,8 +29,8 @@ def job_count(text: str | int) -> int:
 
 
 def whole(option: str, least: int, most: int | None = None) -> Callable[[str | int], int]:
-    """What reads an option as a whole number. It raises CoarticError for what is none, and for
-    one out of its limits."""
+    """Return a function that reads an option as a whole number. It raises CoarticError for anything
+    else, and for numbers out of the limits."""
 
     def read(text: str | int) -> int:
         try:

@@ -1,4 +1,4 @@
-"""Commands that read what stored runs say."""
+"""Commands that read stored runs."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPape
 
 
 def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
-    """What a folder answers, and why runs failed if some did: word and text."""
+    """The answers of a folder, and why runs failed if some did: word and text."""
     from coartic.analysis.report.about import answers, limits
 
     yield from ((section.answer, text) for section, text in answers(study))

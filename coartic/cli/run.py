@@ -1,4 +1,4 @@
-"""Commands that run suites and single runs, and show what there is to run."""
+"""Commands that run suites and single runs, and list them."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def list_(name: given.Something = None, method_file: given.MethodFiles = None) -
 
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
-    """One screen: names of tasks and methods, suites with what they are for."""
+    """Names of tasks, families, suites and methods, on one screen."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
@@ -170,7 +170,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
 
 
 def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
-    """What a method is told and takes, and the tasks that it applies to."""
+    """Information and parameters of a method, and the tasks that it applies to."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import name_of
 
@@ -240,7 +240,7 @@ def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None
 
 
 def show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print what was found; the number of laws that are broken."""
+    """Print the findings; returns the number of broken laws."""
     for law in laws:
         first, *more = law.finding.splitlines() or [""]
         say(

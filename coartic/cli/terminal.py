@@ -1,4 +1,4 @@
-"""What a command says: sentences, tables, and how far a suite is."""
+"""The output of commands: sentences, tables, and progress."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def console() -> Console:
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print words and what is to be said of each, below each other; long text is wrapped."""
+    """Print pairs of word and text below each other; long text is wrapped."""
     kept = list(pairs)
     indent = max((len(word) for word, _ in kept), default=0) + 2
     width = max(console().width, indent + READABLE)
@@ -111,7 +111,7 @@ class Display:
             self._bar.stop()
 
     def update(self, progress: Progress, what: str) -> None:
-        """Show how far the plan is, and what was run last."""
+        """Show the progress, and the task and method of the last run."""
         self.done = progress.done
         if not what:
             if progress.stale:

@@ -1,4 +1,4 @@
-"""What is known of a method without its code: what it declares, and where its code is."""
+"""The declaration of a method without its code, and where its code is."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Late:
 
 @dataclass(frozen=True)
 class MethodCard:
-    """What a method declares, where it comes from, and where its code is."""
+    """The declaration of a method, its origin, and where its code is."""
 
     name: str
     title: str
@@ -60,7 +60,7 @@ class MethodCard:
     code: str = Late()  # type: ignore[assignment]
     """Hash of the code that its results come from. It takes a while, and names need none."""
     where: str = field(default="", compare=False)
-    """What a worker imports: the name of a module, or the path of a method file. Not stored."""
+    """Module or method file that a worker imports. Not stored."""
 
     def __getstate__(self) -> dict[str, Any]:
         """For other processes: with the hash."""
@@ -113,12 +113,11 @@ class MethodCard:
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""What answers for methods whose files this process does not import, by
-:attr:`MethodCard.where`."""
+"""Readers of method files, which this process does not import, by :attr:`MethodCard.where`."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """What a method answers to :class:`MethodCard`, as plain data. Raises CoarticError."""
+    """The answer of a method to :class:`MethodCard`, as plain data. Raises CoarticError."""
     if question == "rules":
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
@@ -190,7 +189,7 @@ def methods_in(module: ModuleType) -> list[type[Method]]:
 
 
 def load_file(path: Path) -> ModuleType:
-    """The module of a method file; what lies beside it can be imported by it."""
+    """Import a method file, which can import modules beside it."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

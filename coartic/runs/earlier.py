@@ -1,4 +1,4 @@
-"""What runs of versions 1.0 and 1.1 stored beside.
+"""Columns that versions 1.0 and 1.1 stored, and this version does not have.
 
 That is how they read the paper, which could then be read in several ways, and how null-space
 control stated its programmes. Runs that did as this version does count as its own. What they stored

@@ -118,7 +118,7 @@ class Setting:
         )
 
     def key(self, suite_seed: int, number: int) -> RunKey:
-        """The key of a run: its id is a hash of what was asked for, then that of the code."""
+        """The key of a run. Its id is a hash of setting, seed and number, then that of the code."""
         text = f"{self.asked} {suite_seed} {number}"
         run_id = f"{hashlib.sha256(text.encode()).hexdigest()[:_KEY]}-{self.code}"
         return RunKey(run_id, suite_seed, number, run_seed(suite_seed, self.task.name, number))

@@ -1,4 +1,4 @@
-"""One run: who it is, what it was asked, what came out, and what that took."""
+"""A run: its key, its setting, its results and its cost."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ RESULTS = {
 }
 """Columns of table ``results`` beside its ``id``."""
 STATUSES = ("ok", "infeasible", "solver-failed", "timeout", "crashed")
-"""What came of a run."""
+"""Statuses of a run."""
 MOST_MOVEMENTS = 10_000
 """Movements of one solution."""
 MOST_STEPS = 1_000_000
@@ -124,7 +124,7 @@ class Run:
     bound: int | None = None
     """Reward that no solution exceeds, where proven."""
     used: tuple[str, ...] = ()
-    """What the method used of what it was told."""
+    """Declared information that the method used."""
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method keeps beside its solution."""
 

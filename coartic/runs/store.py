@@ -55,7 +55,7 @@ _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("result_id", "order", "goal", "ticks", "waypoint"), "Int64"),
     "warm": "boolean",
 }
-"""How columns of views are read: with types that have room for what is missing."""
+"""Types with which columns of views are read; all have room for missing values."""
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
 _OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
 _REWARDS = ("reward", "replay_reward", "initial_reward", "proven_bound")  # minus a count
@@ -119,7 +119,7 @@ class Commit(BaseModel):
 
 
 class MadeWith(BaseModel):
-    """With what a suite was run."""
+    """The surroundings in which a suite was run."""
 
     command: list[str]
     date: str
@@ -154,7 +154,7 @@ UNREADABLE = (
     *(sqlite3.DatabaseError, zlib.error),
     *(ValueError, KeyError, TypeError, RecursionError),
 )
-"""What is raised where content of a file is not as coartic writes it."""
+"""Errors where the content of a file is not as coartic writes it."""
 
 Given = ParamSpec("Given")
 Returned = TypeVar("Returned")
@@ -189,7 +189,7 @@ class Store:
     # What was asked for.
 
     def ask(self, plan: Plan, environment: dict[str, Any], command: list[str], date: str) -> None:
-        """Say what is asked for from here on; runs of earlier plans stay, and are not shown.
+        """Replace the plan of the folder. Runs of earlier plans stay, and are not shown.
 
         Raises CoarticError for a folder of another suite.
         """
@@ -219,7 +219,7 @@ class Store:
 
     @explained
     def plan(self) -> Plan:
-        """What was asked for last. Raises CoarticError where nothing was yet."""
+        """The plan of the folder. Raises CoarticError where there is none yet."""
         cells = (
             "cells.*, settings.task, method, definition, settings.parameters AS complete "
             "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
@@ -235,7 +235,7 @@ class Store:
 
     @explained
     def made_with(self) -> dict[str, Any]:
-        """With what the suite was run last: versions, platform, commit, command, date."""
+        """Versions, platform, commit, command and date of the last command."""
         row = self._one(
             "SELECT content, command, date FROM suite JOIN environments ON id = environment"
         )
@@ -246,7 +246,7 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """What is written in this block is there whole or not at all; it may stand within another.
+        """Write all of this block or nothing; it may stand within another.
 
         Raises CoarticError where the disk does not take it, or the file is no longer there.
         """
@@ -287,7 +287,7 @@ class Store:
 
     @explained
     def stale(self) -> int:
-        """Runs of what is asked for now that other code made."""
+        """Number of runs of the plan that other code made."""
         rows = self._db.execute(
             """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
             WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
@@ -740,7 +740,7 @@ def explain_errors(folder: Path) -> Iterator[None]:
 
 
 def damage(path: Path, error: Exception) -> str:
-    """What is wrong with a file, and what to do where SQLite cannot use it at all."""
+    """A sentence on a file that cannot be used, with advice where SQLite cannot read it."""
     wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
     wrong = plain(wrong, 200) or type(error).__name__
     if type(error) is sqlite3.DatabaseError:  # malformed, or no database
