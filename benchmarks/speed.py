@@ -21,11 +21,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coartic import CONDITIONS, Objective, Task, learn_many, load_task
+from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
 from coartic.baselines.random_search import Climbing, Guesses
 from coartic.benchmarks.planning import plan_suite
-from coartic.gym import TaskVectorEnv
+from coartic.gym import TaskEnv, TaskVectorEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Method, Session
@@ -38,11 +38,7 @@ from coartic.robot import Array
 
 def main(*, is_long: bool = False) -> None:
     """Measure and print."""
-    rates = trials_a_second()
-    print(f"{'way':32}{'trials a second':>18}{'times the kernel':>20}")
-    for way, rate in rates.items():
-        kernel = rates[ALONE if "one by one" in way else TOGETHER]
-        print(f"{way:32}{rate:18,.0f}{kernel / rate:20.2f}")
+    show_ways()
     warm_up(load_task("ascending"))
     print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
     for cell in plan_suite("paper").cells:
@@ -53,16 +49,24 @@ def main(*, is_long: bool = False) -> None:
     show_commands(is_long=is_long)
 
 
-ALONE, TOGETHER = "bare kernel, one by one", "bare kernel, 1000 at once"
+def show_ways() -> None:
+    """Print what a trial costs through each public way, and what a call of the kernel costs that
+    makes none."""
+    tasks = ("ascending", "two-armed-1")
+    columns = [ways(load_task(name)) for name in tasks]
+    heads = "".join(f"{name:>14}{'least':>8}{'most':>8}" for name in tasks)
+    print(f"{'way':32}{heads}   CPU microseconds a trial, median")
+    for way in columns[0]:
+        times = [_us(*column[way]) for column in columns]
+        print(f"{way:32}" + "".join(f"{a:14.2f}{b:8.2f}{c:8.2f}" for a, b, c in times), flush=True)
 
 
-def trials_a_second() -> dict[str, float]:
-    """Trials a CPU second through each public way: the same trials, of ``two-armed-1``.
+def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
+    """Ways to make trials: how many each makes, and a function that makes them.
 
-    They are around what CMA-ES finds, so that few goals are missed; those of the vector environment
-    are others, around what the corrective process does.
+    They are around what CMA-ES finds, so that few goals are missed; those of the environments are
+    others, around what the corrective process does, and count by their steps.
     """
-    task = load_task("two-armed-1")
     session = Session(task, 0, CMAES.told)
     solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
     hands = "".join(movement.hand[0].upper() for movement in solution)
@@ -70,10 +74,7 @@ def trials_a_second() -> dict[str, float]:
     cost = Objective(session, hands)
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
-    single = [movements_of(hands, target) for target in targets[:100]]
-    many = TaskVectorEnv(1000, task)
-    actions = np.random.default_rng(0).uniform(-0.1, 0.1, (4, *many.action_space.shape))
-    many.reset()
+    points, solutions = targets[:100, cost.joints], [movements_of(hands, t) for t in targets[:100]]
     bench, codes = bench_of(task, PAPER), hand_codes(task, hands, 1000)
 
     def arguments(targets: Array) -> tuple[Any, ...]:
@@ -81,31 +82,43 @@ def trials_a_second() -> dict[str, float]:
         arms = Requests(bench.starts, codes[: len(targets)], asked, ALL_STOP, bench.goals)
         return arms, bench.setup, blank(arms), batch_for(task.robot)
 
-    together, *alone = map(arguments, (targets, *targets[:100, None]))
+    none, together, *alone = map(arguments, (targets[:0], targets, *targets[:100, None]))
+    env, many = TaskEnv(task), TaskVectorEnv(1000, task)
+    shape = (len(best), *many.action_space.shape)
+    actions = np.random.default_rng(0).uniform(-0.1, 0.1, shape)
+    many.reset()
+
+    def episode() -> None:
+        env.reset()
+        for action in actions[:, 0]:
+            env.step(action)
+
     return {
-        TOGETHER: _rate(1000, lambda: reach_goals(*together)),
-        "Session.trials, 1000 at once": _rate(1000, lambda: session.trials(hands, targets)),
-        "objective.many, 1000 at once": _rate(1000, lambda: cost.many(targets[:, cost.joints])),
-        "vector environment of 1000": _rate(1000, lambda: [*map(many.step, actions)]),
-        ALONE: _rate(100, lambda: [reach_goals(*arguments) for arguments in alone]),
-        "objective, one by one": _rate(
-            100, lambda: [cost(target[cost.joints]) for target in targets[:100]]
+        "the empty call": (100, lambda: [reach_goals(*none) for _ in range(100)]),
+        "kernel, one by one": (100, lambda: [reach_goals(*each) for each in alone]),
+        "objective, one by one": (100, lambda: [cost(point) for point in points]),
+        "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
+        "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
+        "environment, a step": (len(best), episode),
+        "kernel, 1000 at once": (1000, lambda: reach_goals(*together)),
+        "Session.trials, 10,000 at once": (
+            10_000,
+            lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),
         ),
-        "Session.trial, one by one": _rate(
-            100, lambda: [session.trial(solution) for solution in single]
-        ),
+        "objective.many, 1000 at once": (1000, lambda: cost.many(targets[:, cost.joints])),
+        "environments, a step of 1000": (1000 * len(best), lambda: [*map(many.step, actions)]),
     }
 
 
-def _rate(trials: int, make: Callable[[], object]) -> float:
-    """Trials a second, the median of several times; ``make`` makes so many."""
+def _us(trials: int, make: Callable[[], object]) -> tuple[float, float, float]:
+    """CPU time of a trial in microseconds: median, least and most; ``make`` makes so many."""
     make()
     times: list[float] = []
     while len(times) < 5 or (sum(times) < 1.0 and len(times) < 500):
         clock = time.process_time()  # of all threads
         make()
-        times.append(time.process_time() - clock)
-    return trials / float(np.median(times))
+        times.append((time.process_time() - clock) / trials * 1e6)
+    return float(np.median(times)), min(times), max(times)
 
 
 def _us_a_trial(task: Task, condition: str, runs: int) -> float:
