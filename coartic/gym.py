@@ -183,16 +183,18 @@ class Robots:
             row = int(np.isnan(chosen).any(axis=1).argmax())
             raise ValueError(f"the action of robot {row} has NaN; it must be numbers")
         chosen = np.minimum(np.maximum(chosen, -1.0), 1.0)
+        task, goal = self.task[rows], self.goal[rows]
         away = np.zeros((len(rows), self.q.shape[1]))
         away[:, self.joints] = REACH * chosen[:, -len(self.joints) :]
+        away[~self.movable[task]] = 0.0
         other = (chosen[:, 0] > 0.5) & (len(self.sides) > 1)
-        rewards, kinds = np.empty(len(rows)), self.kinds[self.task[rows]]
+        rewards, kinds = np.empty(len(rows)), self.kinds[task]
         for (robot, radius, locked), kind in self.kind_of.items():
             of_kind = np.flatnonzero(kinds == kind)
             if not len(of_kind):
                 continue
             some, places = rows[of_kind], places_of(robot, self.links)
-            q, goals = self.q[some[:, None], places], self.goals[self.task[some], self.goal[some]]
+            q, goals = self.q[some[:, None], places], self.goals[task[of_kind], goal[of_kind]]
             reach = partial(
                 reach_unchecked, robot, radius=radius, locked_base=locked, model=self.model
             )
@@ -205,14 +207,13 @@ class Robots:
             hand = ways.argmin(axis=0)
             hand = np.where(other[of_kind], 1 - hand, hand)
             middle = corrected[hand, np.arange(len(some))]
-            moved = away[of_kind[:, None], places]
-            moved[:, ["xy".index(axis) for axis in locked]] = 0.0
-            targets = np.where(np.isnan(middle), q, middle) + moved
+            middle = np.where(np.isnan(middle), q, middle)
+            targets = middle + away[of_kind[:, None], places]
             reached = reach(q, self.sides[hand], goals, targets=targets)
             self.q[some[:, None], places] = reached.q
             self.goal[some] += reached.hit
             rewards[of_kind] = np.where(reached.hit, -reached.ticks, -FAILED)
-        return rewards, (rewards == -FAILED) | (self.goal[rows] == self.counts[self.task[rows]])
+        return rewards, (rewards == -FAILED) | (self.goal[rows] == self.counts[task])
 
     def infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
         """Names of tasks, and whether all goals are hit."""
