@@ -70,10 +70,10 @@ def test_seed_jobs_and_budget_reach_the_runs(coartic, monkeypatch, tmp_path):
     assert list(runs.trials) == [12, 12]
 
 
-@pytest.mark.process
+@pytest.mark.usefixtures("in_this_process")
 def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
     code, text, _ = coartic(
-        "run", "paper", "--tasks", "ascending", "--methods", "test/dies",
+        "run", "paper", "--tasks", "ascending", "--methods", "test/quits",
         "--method-file", BROKEN, "--runs", 1, "--jobs", 1, "--out", tmp_path / "out",
     )  # fmt: skip
     assert code == 1

@@ -10,9 +10,7 @@ from scipy.spatial import KDTree
 from coartic import PAPER, Robot, load_task
 from coartic.baselines.optimum import Optimum
 from coartic.baselines.receding_horizon import RecedingHorizon
-from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.strategies import solve, tiny_task
-from tests.support.suites import KNOWN, ROOT
 
 FEW = {"graphs": 1, "chains": 1}
 # With four links, for which kernels are compiled anyway, and at most three goals.
@@ -115,20 +113,3 @@ def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view()
 def test_the_shortest_starts_are_polished():
     """Of one graph's chains one has the best hands already."""
     assert planned("two-armed-2", horizon=3, starts=1)[1].hands == "RLRR"
-
-
-def test_the_suite_has_test_instances_of_all_families():
-    cells = select_cells(load_suite(str(ROOT / "studies" / "horizon" / "suite.toml")), KNOWN)
-    tasks = {cell.task.name: cell.task for cell in cells}
-    assert len(tasks) >= 200
-    assert {task.split for task in tasks.values()} == {"test"}
-    assert {len(task.goals) for task in tasks.values()} == set(range(2, 9))
-    curve = [
-        (cell.task.name, cell.parameters["horizon"])
-        for cell in cells
-        if cell.method.name == RecedingHorizon.name
-    ]
-    for name, task in tasks.items():
-        seen = {horizon for of_task, horizon in curve if of_task == name}
-        assert set(range(min(5, len(task.goals)))) <= seen
-        assert max(seen) == len(task.goals) - 1  # all goals, and no plan twice

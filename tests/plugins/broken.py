@@ -1,6 +1,5 @@
 """Methods that break one law of the conformance kit each, and one that keeps them all."""
 
-import itertools
 import random
 
 from pydantic import ConfigDict
@@ -11,7 +10,6 @@ from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
-COUNTER = itertools.count()
 SEEN = []
 AT_IMPORT = random.random()
 
@@ -107,16 +105,6 @@ class Unhelpful(Good):
         if session.goals_count == 1:
             raise ZeroDivisionError("no goal is that far")
         return Result(by_correction(session))
-
-
-class Dies(Good):
-    name = "test/dies"
-
-    def solve(self, session):
-        import os
-
-        print("last words", flush=True)
-        os._exit(7)
 
 
 class Taker(Good):
