@@ -325,6 +325,19 @@ def test_the_runs_of_a_batch_are_scored():
     assert runs[3].scores == {}
 
 
+def test_a_solution_that_misses_a_goal_is_infeasible():
+    """Whatever the method says: its corrective process cannot leave where it starts."""
+    stuck = tiny_task(
+        name="stuck", locked_base=["x", "y"], hands=["right"],
+        goals=[[2.5, 0.1]], initial_hands="R",
+    )  # fmt: skip
+    card = KNOWN["corrective-alone/given"]
+    setting = Setting(stuck, card.name, card.code, card.told, {}, None)
+    job = Job(setting, card, (RunKey("run", 0, 0, 1),), 60.0)
+    (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
+    assert (run.status, run.scores) == ("infeasible", {})
+
+
 def test_ten_thousand_movements_are_not_too_many():
     task, move = load_task("ascending"), Movement(1, "right", "corrective")
     assert too_long(task, [move] * 10_000) is None
