@@ -154,21 +154,20 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
     for _, cell in source.frame("runs").groupby(["task", "label"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
         for run_id in results.keys() & there.keys():
-            if results[run_id] != there[run_id]:
-                check_same(name, source.run(run_id), origin[run_id], target.run(run_id))
+            if results[run_id] != there[run_id]:  # but for trials that one of them does not keep
+                run, other = source.run(run_id), target.run(run_id)
+                if changes := compare_runs(other, run):
+                    which = (
+                        f"run {run.key.number} of {run.setting.method} on {run.setting.task.name}"
+                    )
+                    raise CoarticError(
+                        f"{which} differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
+                    )
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != RELEASED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
         target.write(runs)
         origin |= {run.key.id: name for run in runs}
-
-
-def check_same(name: str, run: Run, origin: str, other: Run) -> None:
-    """Raises CoarticError where two folders have different results of one run, but for rewards of
-    trials that one of them does not keep."""
-    if changes := compare_runs(other, run):
-        which = f"run {run.key.number} of {run.setting.method} on {run.setting.task.name}"
-        raise CoarticError(f"{which} differs in {origin} and {name} ({run.key.id}): {changes[0]}")
 
 
 def check_scores(

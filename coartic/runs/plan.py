@@ -38,7 +38,12 @@ class Cell:
     @property
     def variant(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-        return variant_of(self.parameters, self.method.defaults)
+        defaults = self.method.defaults
+        return ", ".join(
+            f"{name}={value}"
+            for name, value in self.parameters.items()
+            if name not in defaults or value != defaults[name]
+        )
 
     @property
     def label(self) -> str:
@@ -247,15 +252,6 @@ def trials_in(parameters: Mapping[str, Any]) -> int:
     """Trials that a run with these parameters makes; 0 where they do not say."""
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0
-
-
-def variant_of(parameters: Mapping[str, Any], defaults: Mapping[str, Any]) -> str:
-    """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
-    return ", ".join(
-        f"{name}={value}"
-        for name, value in parameters.items()
-        if name not in defaults or value != defaults[name]
-    )
 
 
 def label_of(method: str, variant: str) -> str:
