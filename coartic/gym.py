@@ -359,7 +359,8 @@ class TaskVectorEnv(VectorEnv):
         self.robots.begin(rows, np.array(drawn))
 
     def _infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
-        there = np.isin(self._all, rows)
+        there = np.zeros(self.num_envs, np.bool_)
+        there[rows] = True
         infos = self.robots.infos(self._all)
         return infos | {f"_{name}": there.copy() for name in infos}
 
