@@ -61,11 +61,9 @@ def best_known(
     highest = runs[runs.status == "ok"].groupby("task").reward.max()
     for name, task in tasks.items():
         if task.family is not None and name in highest.index:
-            optimum = known.get(name)
-            reward, bound = int(highest[name]), None
-            if optimum is not None:
-                reward, bound = max(reward, optimum.reward), optimum.bound
-            known[name] = KnownOptimum(reward, bound)
+            best = KnownOptimum(int(highest[name]), None)
+            proven = known.get(name, best)
+            known[name] = KnownOptimum(max(best.reward, proven.reward), proven.bound)
     return {name: optimum for name, optimum in known.items() if optimum.reward < 0}
 
 

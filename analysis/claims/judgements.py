@@ -52,13 +52,17 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
     """
     groups: dict[str, dict[str, tuple[str, str, Finding]]] = {}
     rows = []
+    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
+    task_name = re.compile(rf"(?<![\w.-])({ids})(?![\w-]|\.\w)")
     for claim in claims:
         read = Reader(study)
         try:
             finding = claim.judge(read)
         except MissingError as missing:
             finding, read.run_ids = Finding(None, str(missing)), []
-        finding = replace(finding, evidence=with_names(finding.evidence, study))
+        # People's names of tasks in place of their ids.
+        evidence = task_name.sub(lambda match: study.tasks[match[1]].label, finding.evidence)
+        finding = replace(finding, evidence=evidence)
         groups.setdefault(claim.group, {})[claim.id] = claim.text, claim.test, finding
         run_ids = " ".join(dict.fromkeys(read.run_ids))
         rows.append((claim.id, run_ids, tuple(dict.fromkeys(read.failed)), claim.depends))
@@ -67,13 +71,6 @@ def judge_claims(study: Study, claims: Iterable[Claim]) -> pd.DataFrame:
     judged = read_of.join(pd.concat(map(judge, groups.values())))
     goals = judged.pop("depends") & (judged.verdict == "supported")
     return judged.assign(verdict=judged.verdict.mask(goals, "depends on the goals"))
-
-
-def with_names(text: str, study: Study) -> str:
-    """A text with people's names of tasks in place of their ids."""
-    ids = "|".join(re.escape(name) for name in sorted(study.tasks, key=len, reverse=True))
-    task_name = rf"(?<![\w.-])({ids})(?![\w-]|\.\w)"
-    return re.sub(task_name, lambda match: study.tasks[match[1]].label, text)
 
 
 def counts(verdicts: Iterable[str]) -> Mapping[Verdict, int]:

@@ -15,7 +15,7 @@ from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Rows, table
 from coartic.analysis.topics.paper.published import RUNS
-from coartic.analysis.topics.paper.rewards import beside_paper, named, published_of
+from coartic.analysis.topics.paper.rewards import beside_paper, published_of, task_and_condition
 from coartic.analysis.topics.scores import best_condition
 from coartic.analysis.words import listed, marked
 
@@ -28,7 +28,7 @@ _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
 def hands(study: Study) -> Rows:
     """Learned rewards by hand sequence, published and ours, where there are several."""
     for row in beside_paper(study):
-        cell, name = row["cell"], named(study, row["cell"])
+        cell, name = row["cell"], task_and_condition(study, row["cell"])
         if row["hands"]:
             ids = cell.good.run_id[cell.good.hands == row["hands"]]
             behind = {"run_ids": " ".join(map(str, ids))}

@@ -94,7 +94,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
 def published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
     for row in beside_paper(study):
-        cell, name = row["cell"], named(study, row["cell"])
+        cell, name = row["cell"], task_and_condition(study, row["cell"])
         if not row["hands"]:
             printed = published_alone(cell.task, "initial hands")
             initial = {
@@ -104,7 +104,7 @@ def published(study: Study) -> Rows:
             yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
 
 
-def named(study: Study, cell: CellRuns) -> Row:
+def task_and_condition(study: Study, cell: CellRuns) -> Row:
     """The task of a cell by its title, and its condition."""
     task = study.tasks[cell.task]
     return {"task": marked(task), "condition": cell.label.removeprefix(LEARNER)}
