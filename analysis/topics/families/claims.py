@@ -30,7 +30,7 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
 
     Rewards are in per cent of the best known.
     """
-    pairs, parts = [], []
+    tests, without, against, parts = [], [], [], []
     for name, compare in comparisons:
         for family in families:
             values = []
@@ -42,12 +42,16 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
                     values.append(unit * float(first.numbers.mean() - other))
             if len(values) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
-            pairs.append(tests_over_tasks(values, margin))
+            test, without_greatest = tests_over_tasks(values, margin)
+            tests.append(test)
+            without.append(without_greatest)
+            opposites = tests_over_tasks([-value for value in values], -margin)
+            against.append(max(opposites, key=lambda test: test.p))
             seen = estimate(mean(values), 2 if first.quantity else 1) + " %" * (not first.quantity)
             quantity = first.quantity or "gain as a share of the best known reward"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances"))
-    finding = all_positive([test for test, _ in pairs], parts)
-    return replace(finding, without=tuple(without for _, without in pairs))
+    finding = all_positive(tests, parts)
+    return replace(finding, against=tuple(against), without=tuple(without))
 
 
 def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
