@@ -529,7 +529,7 @@ class Play {
       if (spreads === null) {
         finding = distance < 0.005 ? "At goal 1 the two robots stand alike." : `At goal 1 their postures lie ${short(distance)} apart.`;
       } else {
-        finding = `At goal 1 their postures lie ${spreads.toFixed(1)} standard deviations apart (${Math.min(n, m)} runs each; shuffled runs: about ${chance.toFixed(1)}).`;
+        finding = `At goal 1 their postures lie ${spreads.toFixed(1)} standard deviations apart (${Math.min(n, m)} runs each; by chance: about ${chance.toFixed(1)}).`;
       }
     }
     this.find("finding").textContent = finding;
