@@ -31,8 +31,9 @@ def share_by_task(changes):
     half = np.full(len(shares), np.nan)
     for row, curve in enumerate(np.array(list(numbers.values())).T):
         if curve[-1] >= HALF:  # else there is no shift
-            k = max(int((curve >= HALF).argmax()), 1)
-            half[row] = np.interp(HALF, curve[k - 1 : k + 1], np.log10(AFTER[k - 1 : k + 1]))
+            k = int((curve >= HALF).argmax())
+            part = slice(k - 1, k + 1)
+            half[row] = np.interp(HALF, curve[part], np.log10(AFTER[part])) if k else 0.0
     return shares.assign(
         **numbers, half=half, shift=np.sqrt(shares.square / shares.cases),
         drift=shares["same"] / shares.square, from_anew=np.log10(shares.anew / shares.among) / 2,
