@@ -1,10 +1,10 @@
 """CMA-ES that chooses hands goal by goal, by the learner's ε-greedy rule.
 
-``cma-es/bandit`` has tried every hand sequence before it prefers one; of fourteen goals there are
+``cma-es/bandit`` has tried every hand sequence before it prefers one; of 14 goals there are
 16,384. Here each pair of hands at two goals in a row has a value, the highest reward of any trial
 that used it. Goal by goal the hand of higher value is chosen, with probability ε a random one. A
 sequence that comes for the first time takes one trial by the corrective process alone, one that
-comes again a generation of its own strategy. ε is the learner's. On six random tasks with fourteen
+comes again a generation of its own strategy. ε is the learner's. On six random tasks with 14
 goals and two arms, mean reward with ε = 0.05 and 0.2: -1439 and -1351; with hands drawn around
 those of the best trial -1404 and -1331; the learner EC4 -1799.
 """
