@@ -132,11 +132,12 @@ def test_reproduce(coartic, tmp_path):
 
 
 INTERRUPTED = """
-import contextlib, os, sys, tempfile, threading, time
+import contextlib, os, signal, sys, tempfile, threading, time
 import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 sys.argv[1:] = sys.argv[4:]
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # where tests run under nohup it is ignored
 
 def interrupt():
     for _ in range(times):
