@@ -207,7 +207,7 @@ def test_claims_of_generality(monkeypatch):
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    study = with_signs(rewarded(RISING | {PLACEBO: -580}, families=ONE + TWO), placebo=0.1)
+    study = with_signs(rewarded(RISING | {PLACEBO: -580}, families=ONE + TWO, count=8), placebo=0.1)
 
     def verdict(more):
         for (task, label), values in signs(study).items():
@@ -223,7 +223,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
 
 def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
     falling, mixed = (
-        with_signs(rewarded({**RISING, EC4: of_instance}, families=ONE + TWO))
+        with_signs(rewarded({**RISING, EC4: of_instance}, families=ONE + TWO, count=8))
         for of_instance in (lambda n: -570 - n, lambda n: -540 if n % 2 else -560)
     )
     claims = [
