@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import methods as known
+from coartic.analysis import methods as names_of_methods
 from coartic.analysis.statistics.running_times import share_by_budget
 from coartic.analysis.study import Study, load
 from coartic.analysis.topics import scores
@@ -65,7 +65,7 @@ def runtimes(
     chosen = cells_compared(study)
     if methods:
         labels = scores.labels_by_task(study)
-        called = {name: known.name_of(name) for name in labels}
+        called = {name: names_of_methods.name_of(name) for name in labels}
         wanted = [methods] if isinstance(methods, str) else map(str, methods)
         names = [id_named(name, called) for name in wanted]
         for name in names:
@@ -75,7 +75,7 @@ def runtimes(
         if not tasks:
             raise CoarticError(f"no task has runs of all of {', '.join(names)}")
         chosen = {name: [study.cells[task, labels[name][task]] for task in tasks]
-                  for name in known.in_order(names)}  # fmt: skip
+                  for name in names_of_methods.in_order(names)}  # fmt: skip
     rows = []
     for name, cells in chosen.items():
         for spend in SPENDS:

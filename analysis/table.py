@@ -51,21 +51,21 @@ def table(
         @wraps(rows)
         def frame(study: Study) -> pd.DataFrame:
             named = list(rows(study))
-            made = pd.DataFrame([row for _, row in named], [name for name, _ in named])
+            rows_by_name = pd.DataFrame([row for _, row in named], [name for name, _ in named])
             names: list[str] = []
             for column in (*columns.split(", "), "run_ids"):
                 if column.endswith("*"):
-                    names += [name for name in made.columns if name.startswith(column[:-1])]
+                    names += [name for name in rows_by_name.columns if name.startswith(column[:-1])]
                 elif column.endswith("[]"):
                     names += [column[:-2] + ending for ending in ("", "_low", "_high")]
                 elif column.endswith("±"):
                     names += [column[:-1], f"{column[:-1]}_sd"]
                 else:
                     names.append(column)
-            made = made.reindex(columns=names).rename_axis("row")
-            made.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
-            made.attrs["methods"] = names_of_settings(study)
-            return made
+            table = rows_by_name.reindex(columns=names).rename_axis("row")
+            table.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
+            table.attrs["methods"] = names_of_settings(study)
+            return table
 
         return frame
 

@@ -255,11 +255,11 @@ def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
         most = job.method.configure(parameters).most_together() if is_ours else 1
         parts += divide(job, min(most, share))
     rest = len(parts) % workers
-    whole, last = parts[: len(parts) - rest], parts[len(parts) - rest :]
+    jobs_planned, last = parts[: len(parts) - rest], parts[len(parts) - rest :]
     for job in last:
-        whole += divide(job, max(math.ceil(len(job.keys) * rest / workers), LEAST_BATCH))
+        jobs_planned += divide(job, max(math.ceil(len(job.keys) * rest / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
         return trials_in(job.setting.parameters) * len(job.keys) or math.inf
 
-    return sorted(whole, key=trials, reverse=True)
+    return sorted(jobs_planned, key=trials, reverse=True)

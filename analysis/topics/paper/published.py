@@ -70,30 +70,30 @@ def published_alone(task: str, kind: str) -> Summary | None:
 
 def published_cell(task: str, condition: str) -> PublishedCell | None:
     """Printed rewards of a cell; None for a cell that the paper does not have."""
-    said: dict[tuple[str, str | None], dict[str, Any]] = {
+    entries: dict[tuple[str, str | None], dict[str, Any]] = {
         (entry["kind"], entry.get("hands")): entry
         for entry in ENTRIES.values()
         if (entry["task"], entry.get("condition")) == (task, condition)
     }
-    if not said:
+    if not entries:
         return None
-    whole, sequences = None, {}
-    for (kind, hands), entry in said.items():
+    together, sequences = None, {}
+    for (kind, hands), entry in entries.items():
         if kind == "reward":
-            count = said.get(("count", hands), {})
+            count = entries.get(("count", hands), {})
             printed = RUNS if hands is None else count.get("value")
             summary = Summary(
                 entry["value"],
-                said.get(("sd", hands), {}).get("value"),
+                entries.get(("sd", hands), {}).get("value"),
                 count.get("value", RUNS),
                 printed,
                 derived_runs="difference_of" in count,
             )
             if hands is None:
-                whole = summary
+                together = summary
             else:
                 sequences[hands] = summary
-    return PublishedCell(whole or pooled([*sequences.values()]), sequences)
+    return PublishedCell(together or pooled([*sequences.values()]), sequences)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:

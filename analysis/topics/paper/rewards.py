@@ -122,12 +122,12 @@ def task_and_condition(study: Study, cell: CellRuns) -> Row:
 def draw_published(study: Study) -> Parts:
     """Difference of every mean reward to the printed one, with interval and margin."""
     shown: list[Row] = []
-    for found in beside_paper(study):
-        cell, paper = found["cell"], published_of(found["cell"])
+    for pair in beside_paper(study):
+        cell, paper = pair["cell"], published_of(pair["cell"])
         comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
         several = paper is not None and len(paper.sequences) > 1
-        if comparable and found["published"] is not None and (several or not found["hands"]):
-            shown.append(found | {"task": cell.task, "method": cell.label})
+        if comparable and pair["published"] is not None and (several or not pair["hands"]):
+            shown.append(pair | {"task": cell.task, "method": cell.label})
     order = list(study.tasks)
     shown.sort(key=lambda row: (order.index(row["task"]), LEARNERS.index(row["method"])))
     data = pd.DataFrame(shown)
