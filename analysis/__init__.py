@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
-    from coartic.analysis.pages import fill_page
+    from coartic.analysis.pages import fill_page, write_study
     from coartic.analysis.running_times import runtimes
     from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 __all__ = [
     "SIGNS", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps", "interval",
     "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking", "runtimes",
+    "write_study",
 ]  # fmt: skip
 
 _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
-    "pages": ("fill_page",),
+    "pages": ("fill_page", "write_study"),
     "running_times": ("runtimes",),
     "signatures.context_tests": ("beyond_p",),
     "signatures.signs": ("SIGNS",),

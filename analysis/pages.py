@@ -1,11 +1,52 @@
-"""Pages of Markdown whose numbers come from tables: a template is filled in."""
+"""Pages of Markdown whose numbers come from tables, and what a study writes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 from coartic.analysis.words import interval, listed, number, p_value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_study(
+    folder: Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
+) -> None:
+    """Write tables, figure and page of a study into its folder.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        The study's folder. Its ``README.md.jinja`` is filled in from all CSV files of the folder,
+        each a table of the file's name, as :func:`fill_page` says.
+    tables : dict
+        Tables by name; ``results.csv`` is made of ``{"results": ...}``. Without any, the page alone
+        is written, from the tables that are there.
+    draw : callable
+        Draws table ``results`` as ``figure.svg``.
+
+    Examples
+    --------
+    The last lines of a ``study.py`` whose function ``measure`` makes the tables::
+
+        if __name__ == "__main__":
+            study = coartic.analysis.load(sys.argv[1])
+            write_study(Path(__file__).parent, measure(study), draw)
+    """
+    from coartic.analysis.figures import picture
+
+    for name, table in tables.items():
+        table.to_csv(folder / f"{name}.csv", float_format="%.6g")
+    if tables:
+        (folder / "figure.svg").write_bytes(picture(draw(tables["results"]), ".svg"))
+    stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
+    page = fill_page(folder / "README.md.jinja", **stored)
+    (folder / "README.md").write_text(page, encoding="utf-8")
 
 
 def fill_page(template: Path, **values: Any) -> str:

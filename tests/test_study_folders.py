@@ -14,7 +14,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from coartic.analysis import figures, fill_page, load
+from coartic.analysis import figures, fill_page, load, write_study
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families, task_text
 from coartic.tasks.task import address_of
@@ -99,6 +99,24 @@ def test_page_says_what_the_tables_say(folder):
     tables = {path.stem: read(path) for path in folder.glob("*.csv")}
     page = fill_page(folder / "README.md.jinja", **tables)
     assert page == (folder / "README.md").read_text("utf-8")
+
+
+def test_writes_a_study_and_its_page_alone_without_tables(tmp_path):
+    page = tmp_path / "README.md.jinja"
+    page.write_text("{{ results.gap.a }} {{ claims.verdict.b }}")
+    tables = {
+        "results": pd.DataFrame({"gap": [0.25]}, index=["a"]),
+        "claims": pd.DataFrame({"verdict": ["undecided"]}, index=["b"]),
+    }
+    figure, _ = figures.panels((1, 1), (figures.TWO, 2))
+    write_study(tmp_path, tables, lambda drawn: figure if drawn is tables["results"] else None)
+    assert (tmp_path / "README.md").read_text() == "0.25 undecided"
+    assert read(tmp_path / "results.csv").gap.a == 0.25
+    (tmp_path / "figure.svg").write_bytes(b"")
+    page.write_text("{{ 2 * results.gap.a }}")
+    write_study(tmp_path, {}, pytest.fail)
+    assert (tmp_path / "README.md").read_text() == "0.5"
+    assert (tmp_path / "figure.svg").read_bytes() == b""
 
 
 def test_families_of_studies_are_what_they_were():

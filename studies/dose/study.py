@@ -17,14 +17,13 @@ from coartic.analysis import (
     TwoContexts,
     all_of,
     figures,
-    fill_page,
     judge,
     load,
     mean_beyond,
     means,
+    write_study,
 )  # fmt: skip
 
-HERE = Path(__file__).parent
 GUESSES = "placebo/guesses"
 """The best of random guesses, which selects its solution and learns nothing."""
 KEYS = ["group", "counted", "dose"]
@@ -211,17 +210,5 @@ def measure(study):
     return {"results": tabulate(study, runs), "claims": judge_claims(study, runs)}
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

@@ -25,16 +25,15 @@ from scipy import stats
 
 from coartic.analysis import (
     figures,
-    fill_page,
     judge,
     load,
     mean,
     mean_beyond,
     means,
     other_tasks,
+    write_study,
 )  # fmt: skip
 
-HERE = Path(__file__).parent
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
@@ -274,17 +273,5 @@ def measure(study):
     }
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

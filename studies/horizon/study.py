@@ -18,9 +18,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import SIGNS, all_of, figures, fill_page, judge, load, mean_beyond, means
+from coartic.analysis import SIGNS, all_of, figures, judge, load, mean_beyond, means, write_study
 
-HERE = Path(__file__).parent
 PLANNER = "receding-horizon"
 STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
 """Goals ahead. ``5+`` are all beyond the fourth together; ``all`` is over all tasks."""
@@ -142,17 +141,5 @@ def measure(study):
     return {name: make(study, plans) for name, make in makers.items()}
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

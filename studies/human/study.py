@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from measures import MEASURES, MODELS, tidy
 
-from coartic.analysis import figures, fill_page, interval, load
+from coartic.analysis import figures, interval, load, write_study
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
@@ -162,17 +162,5 @@ def measure(study):
     return {"results": tabulate(effects), "effects": effects}
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

@@ -19,10 +19,9 @@ import pandas as pd
 from scipy import stats
 
 from coartic import load_task
-from coartic.analysis import beyond_p, figures, fill_page, load
+from coartic.analysis import beyond_p, figures, load, write_study
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 
-HERE = Path(__file__).parent
 GUESSES = "placebo/guesses"  # which methods that select one of their trials have to exceed
 SELECTS = ["dual-process/EC1", "cma-es/bandit"]
 DRAWN = {  # methods in the figure, and their names
@@ -133,17 +132,5 @@ def measure(study):
     return {"results": tabulate(runs), "slopes": tabulate_slopes(runs)}
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

@@ -15,9 +15,8 @@ from pathlib import Path
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import all_of, figures, fill_page, judge, load, mean, mean_beyond, means
+from coartic.analysis import all_of, figures, judge, load, mean, mean_beyond, means, write_study
 
-HERE = Path(__file__).parent
 WHOSE = {
     "practice/policy": "agents",
     "receding-horizon": "planner",
@@ -204,17 +203,5 @@ def measure(study):
     return {"results": tabulate(gaps), "claims": judge_claims(gaps)}
 
 
-def main():
-    """Measure a folder, if one is given, and write the page."""
-    if len(sys.argv) > 1:
-        tables = measure(load(sys.argv[1]))
-        for name, table in tables.items():
-            table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-        (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

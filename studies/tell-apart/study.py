@@ -14,7 +14,7 @@ import pandas as pd
 from protocols import AFTER, NOISE
 from scipy import stats
 
-from coartic.analysis import all_of, figures, fill_page, judge, mean_beyond, means
+from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
 
 HERE = Path(__file__).parent
 HALF = 0.5
@@ -221,18 +221,6 @@ def measure(changes, starts, steps):
     return {name: make(changes, starts, steps) for name, make in makers.items()}
 
 
-def main():
-    """Measure what protocols.py wrote, and write the page."""
-    names = "changes", "starts", "steps"
-    raw = [pd.read_csv(HERE / f"{name}.csv") for name in names]
-    tables = measure(*raw)
-    for name, table in tables.items():
-        table.to_csv(HERE / f"{name}.csv", float_format="%.6g")
-    (HERE / "figure.svg").write_bytes(figures.picture(draw(tables["results"]), ".svg"))
-    tables = {path.stem: pd.read_csv(path, index_col=0) for path in HERE.glob("*.csv")}
-    page = fill_page(HERE / "README.md.jinja", **tables)
-    (HERE / "README.md").write_text(page, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    written = [pd.read_csv(HERE / f"{name}.csv") for name in ("changes", "starts", "steps")]
+    write_study(HERE, measure(*written), draw)
