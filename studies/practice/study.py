@@ -6,6 +6,11 @@
 
 writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder the page alone,
 from the tables that are there. Each of the 25 agents practises for half a minute, once.
+
+The planner plans three times, with numbers of postures (``nodes``) that differ by 1 %; its gap on a
+task is the mean of these. The repeats were written down before they were run, with what we expect:
+agents stay behind the planner, and the planner with all goals in view is no longer worse than with
+four.
 """
 
 import sys
