@@ -72,10 +72,9 @@ def measured(request, tmp_path_factory):
 def test_tables_are_those_of_version_1(measured, tmp_path):
     folder, _, tables = measured
     expected = {path.stem: read(path) for path in (SMALL / folder.name).glob("*.csv")}
-    assert expected.keys() == tables.keys()
-    for name, table in tables.items():
-        ours = comparable(table, tmp_path / "ours.csv")
-        theirs = comparable(expected[name], tmp_path / "theirs.csv")
+    for name, table in expected.items():
+        ours = comparable(tables[name], tmp_path / "ours.csv")
+        theirs = comparable(table, tmp_path / "theirs.csv")
         pd.testing.assert_frame_equal(ours, theirs, rtol=1e-4, atol=1e-9, check_dtype=False)
 
 
