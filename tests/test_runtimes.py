@@ -7,7 +7,6 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis import runtimes
-from coartic.analysis.topics.costs import SPENDS
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 ONE, TWO, LEARNER, PLAN = "ascending", "two-armed-1", "dual-process/EC4", "nullspace-qp/none"
@@ -66,17 +65,6 @@ def test_shares_are_those_of_all_pairs(study, method, targets):
     assert (steps.share.diff().dropna() > 0).all()
     if len(targets) == 20:
         assert runtimes(study).equals(curves)
-
-
-def test_budgets_to_a_share(study):
-    """Of the targets at half (-305.5 and -570) the first run of ascending hits its own at trial 4,
-    the second at 3, and that of two-armed at 3; evaluations are 10 a trial."""
-    curves = runtimes(study, methods=["own", PLAN], targets=[0.5])
-    half = curves[curves.share >= 0.5].groupby(["method", "spend"]).budget.min()
-    assert half["own"][list(SPENDS)].tolist() == [3.0, 30.0, pytest.approx(0.25 * 3 / 5)]
-    assert half[PLAN][list(SPENDS)].tolist() == [0.0, 7.0, 0.25]
-    top = runtimes(study, targets=[1.0]).groupby("method").share.max()
-    assert (top["own"], top[PLAN]) == (0.25, 0.0)
 
 
 def test_methods_that_are_named_share_their_tasks(study):

@@ -105,27 +105,11 @@ def test_crossings_by_brute_force():
         crossing = running_times.budget_for(spends, level)
         assert crossing.value == least
         assert crossing.low <= least <= crossing.high or math.isinf(least)
-        assert (crossing.low, crossing.high) == resampled_ends(spends, level)
     steps, shares = running_times.share_by_budget(spends)
     for budget, at in zip(steps[::7], shares[::7], strict=True):
         assert at == pytest.approx(share(budget))
     assert running_times.share_reached(spends) == pytest.approx(share(1e300))
     assert math.isnan(running_times.budget_for([spends[0][:2]], 0.5).low)  # too few runs
-
-
-def resampled_ends(spends, level):
-    """Percentiles of crossings, resample by resample, of runs drawn as often as they are there."""
-    rng = np.random.default_rng(SEED)
-    numbers = [len(part) for part in spends]
-    counts = [rng.multinomial(runs, [1 / runs] * runs, size=1_999) for runs in numbers]
-    budgets = np.append(np.unique(np.concatenate([part.ravel() for part in spends])), math.inf)
-    within = [(part[..., None] <= budgets).mean(axis=1) for part in spends]
-    shares = sum(
-        count @ part / len(part) for count, part in zip(counts, within, strict=True)
-    ) / len(spends)
-    shares[:, -1] = 1.0
-    crossed = budgets[(shares >= level - 1e-9).argmax(axis=1)]
-    return tuple(np.quantile(crossed, [0.025, 0.975], method="inverted_cdf"))
 
 
 def test_a_failed_run_reaches_nothing():
@@ -198,25 +182,6 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
-
-
-def test_what_was_not_tested_is_not_said_to_be_alike():
-    """A method with one run, or runs that are all alike, as those of the learner."""
-    once = {(task, "mine"): [reward] for (task, _), (reward, *_) in TEN.items()}
-    alike = {(task, name): [reward - better] * 3
-             for (task, learner), (reward, *_) in TEN.items()
-             for name, better in ((learner, 0), ("mine", 3))}  # fmt: skip
-    for rewards in (TEN | once, alike):
-        seen = study(rewards)
-        assert TABLES["against-learner"](seen).least_p.isna().all()
-        assert "; the runs are too few, or too alike, to tell" in ranking.from_files(seen)
-
-
-def test_a_method_from_a_file_on_one_task_has_its_sentence():
-    seen = study(TEN | {("ascending", "mine"): [-300, -300]})
-    best = seen.optima["ascending"].reward
-    words = f"mine, not of this project, ends {100 * (best + 300) / -best:.1f} % away on Ascending"
-    assert words in ranking.nearest(seen)
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():

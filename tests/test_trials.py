@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from coartic import Movement, execute, load_task
+from coartic import load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.motion.trials import hand_codes, make_trials, movements_of
 from coartic.optimisers import TOLD
-from tests.support.strategies import sample, tiny_task
+from tests.support.strategies import sample
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
 
@@ -40,19 +40,6 @@ def test_a_budget_that_ends_within_a_batch():
         session.trials(hands, targets)
 
 
-def test_until_the_first_that_is_better():
-    task = load_task("two-armed-2")
-    hands, targets = sample(task, 12)
-    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
-    until = np.full(12, np.inf)
-    until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
-    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
-    np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
-    alone.trials(hands[:6], targets[:6])
-    assert session.meter == alone.meter
-    assert session.rewards == alone.rewards
-
-
 def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
     task = load_task("ascending")
     hands, targets = sample(task, 3)
@@ -71,23 +58,6 @@ def test_who_is_not_told_of_the_corrective_process_does_not_see_it():
         session.trials(hands, targets)
     with pytest.raises(UndeclaredError, match="reward by trial"):
         Session(task, 0, TOLD - BLIND).trials(hands, targets)
-
-
-def test_a_locked_base_stays_where_it_starts():
-    start = {"base": [0.0, 0.5], "left": [0.0] * 4, "right": [0.0] * 4}
-    task = tiny_task(locked_base=["y"], start=start)
-    targets = np.tile(task.q0, (1, 2, 1))
-    assert make_trials(task, "RR", targets).completed.all()
-    with pytest.raises(ValueError, match="moves the base in y"):
-        make_trials(task, "RR", 0.0 * targets)
-
-
-def test_a_counter_holds_so_many_in_all():
-    session = Session(load_task("ascending"), 0, TOLD)
-    session.spend(hessians=2**62, corrective_iterations=3, jacobians=3)
-    assert session.meter.corrective_iterations == 3
-    with pytest.raises(ValueError, match="counts to"):
-        session.spend(hessians=2**62)
 
 
 def test_what_was_given_is_left_alone():
@@ -112,26 +82,6 @@ def test_what_was_given_is_left_alone():
 def test_trials_that_cannot_be_made(name, hands, shape, value, message):
     with pytest.raises(ValueError, match=message):
         make_trials(load_task(name), hands, np.full(shape, value))
-
-
-def test_a_trial_of_a_session_is_an_execution():
-    """To the last figure, whichever way it takes."""
-    task = load_task("two-armed-2")
-    hands, targets = sample(task, 12, noise=0.05)
-    targets[::3, 2] = np.nan
-    session = Session(task, 0, TOLD)
-    for letters, goals in zip(hands, targets, strict=True):
-        solution = movements_of(letters, goals)
-        twice = [*solution, Movement(4, solution[-1].hand, "planned", task.q0)]
-        for given in (solution, twice):
-            made, due = session.trial(given), execute(task, given)
-            for one, other in zip(made.movements, due.movements, strict=True):
-                np.testing.assert_array_equal(one.target, other.target)
-                assert (one.hand, one.kind, one.ticks) == (other.hand, other.kind, other.ticks)
-            np.testing.assert_array_equal(made.configurations, due.configurations)
-            for name in ("ticks", "corrections", "iterations", "evaluations"):
-                assert getattr(made, name) == getattr(due, name)
-            assert made.reward == session.rewards[-1]
 
 
 def test_no_number_of_threads_changes_a_trial(monkeypatch):
