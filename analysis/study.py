@@ -99,7 +99,7 @@ def load(folder: str | Path) -> Study:
     folder = folder_named(folder)
     with open_store(folder) as store:
         plan = store.plan()
-        runs = store.frame("runs")
+        runs = store.runs()
         if len(runs) < plan.size:
             raise CoarticError(
                 f"{folder} has {len(runs)} of {counted(plan.size, 'run')}: it was interrupted. "
@@ -192,7 +192,7 @@ class Study:
     def solutions(self) -> pd.DataFrame:
         """One row a movement of each run's solution."""
         with open_store(self.folder) as store:
-            return store.frame("solutions")
+            return store.movements("solution")
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs that made trials, each with the reward of every trial, NaN where it failed."""

@@ -56,8 +56,8 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
         with writing(out) as target, target.transaction():
-            target.ask(whole, current_environment(), command(), now())
-            origin = dict.fromkeys(target.ids(""), str(out))
+            target.replace_plan(whole, current_environment(), command(), now())
+            origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
                 copy_runs(name, source, target, origin)
     return whole
@@ -150,8 +150,8 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
     are from that the target has. Raises CoarticError where a run does not do what is stored of it,
     or the target has another result of it."""
     methods = source.plan().methods
-    there = target.frame("runs").set_index("run_id").result.to_dict()
-    for _, cell in source.frame("runs").groupby(["task", "label"], sort=False):
+    there = target.runs().set_index("run_id").result.to_dict()
+    for _, cell in source.runs().groupby(["task", "label"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
         for run_id in results.keys() & there.keys():
             if results[run_id] != there[run_id]:  # but for trials that one of them does not keep

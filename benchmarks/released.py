@@ -10,6 +10,7 @@ import hashlib
 import lzma
 import sys
 import tempfile
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from coartic.errors import CoarticError
@@ -23,7 +24,7 @@ _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
 
 
-def open_released(suite: str) -> Store:
+def open_released(suite: str) -> AbstractContextManager[Store]:
     """The shipped results of a suite, unpacked in memory. Raises CoarticError where there are none,
     or they were changed."""
     path = _FOLDER / f"{suite}{_ENDING}"
@@ -54,8 +55,8 @@ def pack(folder: Path, out: Path) -> None:
         plan, made_with = source.plan(), source.made_with()
         ran, date = made_with.pop("command"), made_with.pop("date")
         with writing(Path(made)) as target:
-            target.ask(plan, made_with, ran, date)
-            target.write(source.run(run_id).thin() for run_id in source.frame("runs").run_id)
+            target.replace_plan(plan, made_with, ran, date)
+            target.write(source.run(run_id).thin() for run_id in source.runs().run_id)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
     (out / f"{plan.suite}{_ENDING}").write_bytes(content)
     packed = sorted(out.glob(f"*{_ENDING}"))

@@ -188,7 +188,7 @@ def perform(
     folder, clock = folder_named(folder), time.perf_counter()
     executor = executor or Local()
     with writing(folder) as store:
-        store.ask(plan, current_environment(), command(), now())
+        store.replace_plan(plan, current_environment(), command(), now())
         progress = Progress(folder, plan.size, stale=store.stale())
         missing = missing_jobs(plan, store, progress, retry_failed=retry_failed)
         for job in missing:
@@ -211,7 +211,7 @@ def perform(
                         watch(progress, f"{run.setting.task.name} {run.setting.method}")
             jobs = alone
         progress.wall_s = time.perf_counter() - clock
-        progress.others = store.count() - plan.size
+        progress.others = len(store.ids()) - plan.size
         return progress
 
 

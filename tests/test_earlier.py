@@ -65,7 +65,7 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     plan = plan_suite("paper", runs=2, trials=20, **select)
     put_beside(plan, [then], tmp_path / "out")
     with open_store(tmp_path / "out") as store:
-        assert {*store.ids("")} == {*load(now).runs.run_id}
+        assert {*store.ids()} == {*load(now).runs.run_id}
 
 
 def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
@@ -76,7 +76,7 @@ def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
         "settings SET parameters = json_set(parameters, '$.timing', 'fixed')",
     )
     with open_store(then) as store:
-        run = store.run(store.ids("")[0])
+        run = store.run(store.ids()[0])
     with pytest.raises(
         CoarticError, match=r"timing is an unknown key.* Version 1\.1\.0 of coartic"
     ):

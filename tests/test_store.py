@@ -109,33 +109,6 @@ def read_values(plain_sql, run_id, query):
     return [value for (value,) in plain_sql.execute(f"SELECT {query}", (run_id,))]
 
 
-@pytest.mark.parametrize(
-    ("change", "what"),
-    [
-        ("UPDATE suite SET name = 'objectives'", "objectives"),
-        ("UPDATE methods SET name = 'believed-reward/plan'", "believed-reward/plan"),
-        (
-            "UPDATE tasks SET definition = json_set(definition, '$.penalty', json('{}'))",
-            "tasks with a penalty",
-        ),
-    ],
-)
-def test_what_only_version_1_has_is_refused_in_a_sentence(undisturbed, tmp_path, change, what):
-    shutil.copy(undisturbed.folder / RUNS_FILE, tmp_path)
-    sentence = f"{tmp_path} has results of {what}: version 1.1.0 of coartic reads them"
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE)) as db, db:
-        environment = "UPDATE environments SET content = json_set(content, '$.coartic', ?)"
-        db.execute(environment, ["1.1.0"])
-        db.execute(f"{change} WHERE rowid IN (SELECT min(rowid) FROM {change.split()[1]})")
-    with pytest.raises(CoarticError) as caught:
-        open_store(tmp_path)
-    assert str(caught.value) == sentence
-    with closing(sqlite3.connect(tmp_path / RUNS_FILE)) as db, db:
-        db.execute(environment, ["2.0.0"])  # where the names may be somebody else's
-    with open_store(tmp_path) as store:
-        assert store.count()
-
-
 def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
     movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
@@ -147,13 +120,13 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         raise KeyboardInterrupt
 
     with writing(tmp_path) as store:
-        store.ask(planned(CELLS, trials=40), current_environment(), command(), now())
+        store.replace_plan(planned(CELLS, trials=40), current_environment(), command(), now())
         with pytest.raises(KeyboardInterrupt):
             store.write(some())
-        assert store.count() == 0
+        assert len(store.ids()) == 0
         for _ in range(2):  # the second one replaces the first
             store.write([run])
-            assert store.count() == 1
+            assert len(store.ids()) == 1
         unlike = replace(run, scores={"solution": solution, "initial": solution})
         with pytest.raises(CoarticError, match="cannot be stored: UNIQUE"):
             store.write([unlike])  # paths of two parts
@@ -328,7 +301,7 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     assert "leaving out 9 runs made by a different version of the code" in repr(report)
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
-        assert store.count() == 18
+        assert len(store.ids()) == 18
 
 
 def sql(statement):

@@ -80,7 +80,7 @@ def true_folder(tmp_path_factory):
     cells = tuple(Cell(task, method, each, each, 7) for task, each, _ in asked)
     with writing(folder) as store:
         plan = Plan("suite", 0, 7, 300, None, None, cells)
-        store.ask(plan, {}, [], "")
+        store.replace_plan(plan, {}, [], "")
         for setting, (_, _, runs) in zip(plan.settings, asked, strict=True):
             store.write(run_of(setting, number, made, **more) for number, made, more in runs)
     return folder

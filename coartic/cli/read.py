@@ -98,7 +98,7 @@ def trace(
         say_pairs([("Row", row), *traced.values_of(frame, row, {}), ("Runs", " ".join(ids))])
         return
     with open_store(results) as store:
-        runs, plan = store.frame("runs"), store.plan()
+        runs, plan = store.runs(), store.plan()
     behind = runs[runs.run_id.isin(ids)]
     if len(behind) < len(ids):
         again = f"coartic report {quote(str(results))}"

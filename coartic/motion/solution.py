@@ -176,7 +176,7 @@ def execute_many(
     In their order, each as if it were alone; in place of an execution, the error that
     :func:`execute` raises for such a solution.
     """
-    plans: list[Plan | Refused] = []
+    plans: list[ByGoal | Refused] = []
     for solution in solutions:
         try:
             plans.append(movements_by_goal(bench.task, solution))
@@ -215,7 +215,7 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     return travel
 
 
-Plan = list[list[Movement]]
+ByGoal = list[list[Movement]]
 """The movements of a solution, goal by goal."""
 
 
@@ -231,7 +231,7 @@ class Subtask(NamedTuple):
     """Without a look before the first movement, which :func:`execution_of` counts."""
 
 
-def has_path(plan: Plan) -> bool:
+def has_path(plan: ByGoal) -> bool:
     """Whether a movement follows a path."""
     return any(movement.kind == "path" for movements in plan for movement in movements)
 
@@ -245,7 +245,7 @@ def slots_for(movements: list[Movement]) -> list[Movement | None]:
     return [None, *with_target] if movements[0].kind == "corrective" else [*with_target]
 
 
-def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
+def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
     """Make the movements of plans without paths side by side.
 
     Returns the results of the goals that were attempted, a list for each plan.
@@ -301,7 +301,7 @@ def make_straight(bench: Bench, plans: list[Plan]) -> list[list[Subtask]]:
     return outcomes
 
 
-def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
+def make_one_by_one(bench: Bench, plan: ByGoal) -> list[Subtask]:
     """Make the movements of a plan, of which some follow paths, one after the other.
 
     Returns the results of the goals that were attempted.
@@ -337,7 +337,7 @@ def make_one_by_one(bench: Bench, plan: Plan) -> list[Subtask]:
     return subtasks
 
 
-def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
+def execution_of(plan: ByGoal, subtasks: list[Subtask]) -> Execution:
     """The execution of a plan, of whose goals these were attempted."""
     movements: list[Movement] = []
     hits: list[Array] = []
@@ -372,14 +372,14 @@ def execution_of(plan: Plan, subtasks: list[Subtask]) -> Execution:
     )
 
 
-def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
+def movements_by_goal(task: Task, solution: Iterable[Movement]) -> ByGoal:
     """The movements grouped by goal, checked against the task."""
     if not isinstance(solution, Iterable):
         raise SolutionError(
             f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
             "movements"
         )
-    plan: Plan = []
+    plan: ByGoal = []
     for movement in solution:
         if not isinstance(movement, Movement):
             raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")

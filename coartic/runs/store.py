@@ -9,7 +9,6 @@ whatever interrupts it, a batch is there whole or not at all.
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import re
@@ -17,18 +16,17 @@ import sqlite3
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_TRIALS, explain_inline
+from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
 from coartic.robot import Array
 from coartic.runs.earlier import other_reading
 from coartic.runs.plan import Plan, Setting, hash_of
@@ -133,44 +131,8 @@ class MadeWith(BaseModel):
     cores: int
 
 
-GONE = frozenset(
-    {
-        *("objectives", "reconstructions", "stops"),
-        *("believed-reward/EC1", "believed-reward/EC4", "believed-reward/plan"),
-        *("cma-es/every", "nullspace-qp/preshaping", "nullspace-qp/velocity", "random-search/pure"),
-        *("optimum/dynamic-programming", "optimum/multistart"),
-    }
-)
-"""Suites and methods of version 1 that are no longer here."""
-_ROWS = 2_000  # that are read at once
 WAIT_S = 1.0  # for another program, before more is done about it
 _LOCK_TRIES = 20
-
-_MOVEMENT = ("result_id", "part", "order", "goal", "hand", "kind", "ticks")
-_WAYPOINT = ("result_id", "order", "waypoint")
-
-
-UNREADABLE = (
-    *(sqlite3.DatabaseError, zlib.error),
-    *(ValueError, KeyError, TypeError, RecursionError),
-)
-"""Errors where the content of a file is not as coartic writes it."""
-
-Given = ParamSpec("Given")
-Returned = TypeVar("Returned")
-
-
-def explained(
-    read: Callable[Concatenate[Store, Given], Returned],
-) -> Callable[Concatenate[Store, Given], Returned]:
-    """A method of :class:`Store` that reads, with its errors explained (:func:`explain_errors`)."""
-
-    @wraps(read)
-    def explain(store: Store, /, *given: Given.args, **named: Given.kwargs) -> Returned:
-        with explain_errors(store.folder):
-            return read(store, *given, **named)
-
-    return explain
 
 
 class Store:
@@ -180,16 +142,12 @@ class Store:
         self.folder = folder
         self._db = connection
 
-    def __enter__(self) -> Store:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._db.close()
-
     # What was asked for.
 
-    def ask(self, plan: Plan, environment: dict[str, Any], command: list[str], date: str) -> None:
-        """Replace the plan of the folder. Runs of earlier plans stay, and are not shown.
+    def replace_plan(
+        self, plan: Plan, environment: dict[str, Any], command: list[str], date: str
+    ) -> None:
+        """Ask for the runs of this plan from now on. Runs of earlier plans stay, and are not shown.
 
         Raises CoarticError for a folder of another suite.
         """
@@ -200,8 +158,6 @@ class Store:
                         f"{self.folder} holds results of suite {row['name']!r}: name another "
                         f"folder for suite {plan.suite!r}"
                     )
-            for table in ("suite", "tasks", "methods", "cells"):
-                self._db.execute(f"DELETE FROM {table}")
             rows = plan.to_rows()
             rows["suite"][0] |= {
                 "readings": [],  # of versions 1.0 and 1.1
@@ -212,37 +168,35 @@ class Store:
             for row in rows["cells"]:
                 row["setting"] = self._setting(row["setting"])
             for table, content in rows.items():
+                self._db.execute(f"DELETE FROM {table}")
                 for row in content:
                     self._insert(table, row)
             robots = [task.robot for task in plan.tasks.values()]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
 
-    @explained
     def plan(self) -> Plan:
         """The plan of the folder. Raises CoarticError where there is none yet."""
-        cells = (
-            "cells.*, settings.task, method, definition, settings.parameters AS complete "
+        queries = {table: f"SELECT * FROM {table}" for table in ("suite", "tasks", "methods")}
+        queries["cells"] = (
+            "SELECT cells.*, settings.task, method, definition, settings.parameters AS complete "
             "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
         )
-        tables = {table: f"* FROM {table}" for table in ("suite", "tasks", "methods")}
-        rows = {
-            table: self._db.execute(f"SELECT {text}").fetchall()
-            for table, text in {**tables, "cells": cells}.items()
-        }
-        if not rows["suite"]:
-            raise CoarticError(f"{self.folder} is not finished; repeat the `coartic run` command")
-        return Plan.from_rows(rows, str(self.folder / RUNS_FILE))
+        with explain_errors(self.folder):
+            rows = {table: self._db.execute(text).fetchall() for table, text in queries.items()}
+            if not rows["suite"]:
+                raise CoarticError("it is not finished; repeat the `coartic run` command")
+            return Plan.from_rows(rows, str(self.folder / RUNS_FILE))
 
-    @explained
     def made_with(self) -> dict[str, Any]:
         """Versions, platform, commit, command and date of the last command."""
-        row = self._one(
-            "SELECT content, command, date FROM suite JOIN environments ON id = environment"
-        )
-        how = {"command": json.loads(row["command"]), "date": row["date"]}
-        made_with = json.loads(row["content"]) | how
-        MadeWith.model_validate(made_with)
-        return dict(made_with)
+        with explain_errors(self.folder):
+            row = self._one(
+                "SELECT content, command, date FROM suite JOIN environments ON id = environment"
+            )
+            how = {"command": json.loads(row["command"]), "date": row["date"]}
+            made_with = json.loads(row["content"]) | how
+            MadeWith.model_validate(made_with)
+            return dict(made_with)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -261,42 +215,36 @@ class Store:
             finally:
                 if self._db.in_transaction:
                     self._db.rollback()
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorname == "SQLITE_READONLY_DBMOVED":
-                raise CoarticError(
-                    f"{self.folder} was removed, renamed or replaced while the suite ran: put it "
-                    "back, or repeat the command to begin anew"
-                ) from None
-            raise CoarticError(f"cannot write {self.folder / RUNS_FILE}: {error}") from None
         except sqlite3.DatabaseError as error:
-            raise CoarticError(damage(self.folder / RUNS_FILE, error)) from None
+            raise CoarticError(explain(self.folder / RUNS_FILE, error)) from None
 
     # Which runs there are.
 
-    @explained
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Position of the cell, number, status and time limit of the runs asked for that there
         are."""
         columns = "position, results.run, status, time_limit_s"
-        return list(map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}")))
+        with explain_errors(self.folder):
+            return list(map(tuple, self._db.execute(f"SELECT {columns} {_ASKED_FOR}")))
 
-    @explained
-    def count(self) -> int:
-        """Number of runs, asked for or not."""
-        return int(self._db.execute("SELECT count(*) FROM results").fetchone()[0])
-
-    @explained
     def stale(self) -> int:
         """Number of runs of the plan that other code made."""
-        rows = self._db.execute(
-            """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
-            WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
-                WHERE new.asked = old.asked AND new.code != old.code
-                AND results.run < cells.runs)
-            AND results.suite_seed = (SELECT seed FROM suite)
-            AND old.id NOT IN (SELECT setting FROM cells)"""
-        )
-        return int(rows.fetchone()[0])
+        with explain_errors(self.folder):
+            row = self._one(
+                """SELECT count(*) FROM results JOIN settings AS old ON old.id = results.setting
+                WHERE EXISTS (SELECT * FROM cells JOIN settings AS new ON new.id = cells.setting
+                    WHERE new.asked = old.asked AND new.code != old.code
+                    AND results.run < cells.runs)
+                AND results.suite_seed = (SELECT seed FROM suite)
+                AND old.id NOT IN (SELECT setting FROM cells)"""
+            )
+            return int(row[0])
+
+    def ids(self, prefix: str = "") -> list[str]:
+        """Ids of all runs, asked for or not, that begin so."""
+        query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
+        with explain_errors(self.folder):
+            return [run_id for (run_id,) in self._db.execute(query, (len(prefix), prefix))]
 
     # Runs, in and out.
 
@@ -314,76 +262,63 @@ class Store:
                         f"run {run.key.id} of method {run.setting.method} cannot be stored: {error}"
                     ) from None
 
-    @explained
-    def run(self, prefix: str) -> Run:
-        """The one run whose id begins so. Raises CoarticError where there is none, or several."""
-        ids = self.ids(prefix)
-        if len(ids) != 1:
-            raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs in {self.folder}")
-        row = self._one("SELECT * FROM results WHERE run_id = ?", ids[0])
-        asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
-        setting = Setting.from_row(asked, str(self.folder / RUNS_FILE))
-        environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
-        blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-        movements, waypoints = (
-            self._db.execute(f"SELECT * FROM {table} WHERE result_id = ?", (row["id"],)).fetchall()
-            for table in ("movements", "waypoints")
-        )
-        rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
-        return Run.from_row(
-            row,
-            setting,
-            json.loads(environment["content"]),
-            {
-                part: movements_from(
-                    setting.task, (each for each in movements if each["part"] == part), waypoints
-                )
-                for part in PARTS
-            },
-            [None if reward == FAILED_TRIAL else reward for reward in rewards],
-        )
+    def run(self, run_id: str) -> Run:
+        """A run by its id. Raises CoarticError where there is none."""
+        with explain_errors(self.folder):
+            row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
+            if row is None:
+                raise CoarticError(f"it has no run {run_id}")
+            asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
+            setting = Setting.from_row(asked, str(self.folder / RUNS_FILE))
+            environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
+            blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
+            movements, waypoints = (
+                self._db.execute(f"SELECT * FROM {table} WHERE result_id = ?", (row["id"],))
+                for table in ("movements", "waypoints")
+            )
+            rows: dict[str, list[Any]] = {part: [] for part in PARTS}
+            for each in movements:
+                rows[each["part"]].append(each)
+            points = waypoints.fetchall()
+            rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
+            return Run.from_row(
+                row,
+                setting,
+                json.loads(environment["content"]),
+                {part: movements_from(setting.task, rows[part], points) for part in PARTS},
+                [None if reward == FAILED_TRIAL else reward for reward in rewards],
+            )
 
-    @explained
-    def ids(self, prefix: str) -> list[str]:
-        """Ids of all runs, asked for or not, that begin so."""
-        rows = self._db.execute(
-            "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?", (len(prefix), prefix)
-        )
-        return [run_id for (run_id,) in rows]
+    def runs(self) -> pd.DataFrame:
+        """View ``runs`` as a data frame, with nullable types."""
+        with explain_errors(self.folder):
+            return check_runs(self._table("SELECT * FROM runs"))
 
-    @explained
-    def frame(self, view: str) -> pd.DataFrame:
-        """A view as a data frame: ``runs``, ``solutions`` or ``paths``, with nullable types."""
-        inner = ["result_id", "part"]
-        table = self._table(f"SELECT * FROM {view}").drop(columns=inner, errors="ignore")
-        return check_runs(table) if view == "runs" else table
-
-    @explained
-    def movements(self, part: str, most: int) -> pd.DataFrame:
+    def movements(self, part: str, most: int = MOST_RUNS) -> pd.DataFrame:
         """Movements of one part (:data:`PARTS`), as view ``solutions``, of the first runs of each
         cell that are ok, so many at most."""
         query = f"""SELECT results.run_id, movements.* {_ASKED_FOR}
             JOIN movements ON movements.result_id = results.id AND part = ?
             WHERE {_FIRST} ORDER BY cells.position, results.run, "order" """
-        return self._table(query, part, most).drop(columns=["result_id", "part"])
+        with explain_errors(self.folder):
+            return self._table(query, part, most).drop(columns=["result_id", "part"])
 
-    @explained
     def waypoints(self, most: int) -> pd.DataFrame:
         """View ``paths`` of the same runs."""
         query = f"""SELECT results.run_id, waypoints.* {_ASKED_FOR}
             JOIN waypoints ON waypoints.result_id = results.id
             WHERE {_FIRST} ORDER BY cells.position, results.run, "order", waypoint"""
-        return self._table(query, most).drop(columns="result_id")
+        with explain_errors(self.folder):
+            return self._table(query, most).drop(columns="result_id")
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
         failed."""
+        query = f"""SELECT run_id, rewards, trials {_ASKED_FOR}
+            JOIN learning ON learning.result_id = results.id
+            ORDER BY cells.position, results.run"""
         with explain_errors(self.folder):
-            rows = self._db.execute(
-                f"SELECT run_id, rewards, trials {_ASKED_FOR} JOIN learning "
-                "ON learning.result_id = results.id ORDER BY cells.position, results.run"
-            )
-            for run_id, blob, trials in rows:
+            for run_id, blob, trials in self._db.execute(query):
                 stored = unpack(blob, trials)
                 yield run_id, np.where(stored == FAILED_TRIAL, np.nan, stored)
 
@@ -395,70 +330,35 @@ class Store:
             for table in ("movements", "waypoints", "learning"):
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
-        numbers = {
-            "setting": self._setting(run.setting),
-            "environment": self._environment(run.environment),
-        }
-        result = self._insert("results", run.to_row() | numbers)
-        joints = run.setting.task.robot.joint_names
-        movements: list[tuple[Any, ...]] = []
-        waypoints: list[tuple[Any, ...]] = []
+        row = run.to_row()
+        row["setting"] = self._setting(run.setting)
+        row["environment"] = self._environment(run.environment)
+        result = self._insert("results", row)
+
+        def joints(configuration: Array) -> dict[str, float]:
+            return dict(
+                zip(run.setting.task.robot.joint_names, configuration.tolist(), strict=True)
+            )
+
         for part, score in run.scores.items():
             for order, m in enumerate(score.movements):
                 assert m.target is not None
-                facts = (result, part, order, m.goal, m.hand, m.kind, m.ticks)
-                movements.append((*facts, *m.target.tolist()))
-                points = [] if m.waypoints is None else m.waypoints.tolist()
-                waypoints += [(result, order, n, *q) for n, q in enumerate(points)]
-        self._insert_many("movements", (*_MOVEMENT, *joints), movements)
-        self._insert_many("waypoints", (*_WAYPOINT, *joints), waypoints)
+                place = {"result_id": result, "order": order}
+                facts = {"part": part, "goal": m.goal, "hand": m.hand, "kind": m.kind}
+                self._insert("movements", place | facts | {"ticks": m.ticks} | joints(m.target))
+                for n, point in enumerate(() if m.waypoints is None else m.waypoints):
+                    self._insert("waypoints", place | {"waypoint": n} | joints(point))
         if run.rewards:
             stored = [FAILED_TRIAL if reward is None else reward for reward in run.rewards]
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
 
-    def _wait_for(self, statement: str) -> None:
-        """Execute it as soon as other programs that have the file open let it."""
-        for tries in itertools.count():
-            try:
-                self._db.execute(statement)
-                return
-            except sqlite3.OperationalError as error:
-                if "locked" not in str(error):
-                    raise
-            if tries == 1:
-                warnings.warn(
-                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
-                    stacklevel=2,
-                )
-
-    def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        names = ", ".join(f'"{name}"' for name in row)
-        marks = ", ".join("?" for _ in row)
-        text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        values = [to_json(v) if isinstance(v, dict | list | tuple) else v for v in row.values()]
-        return int(self._db.execute(text, values).lastrowid or 0)
-
-    def _insert_many(self, table: str, names: Iterable[str], rows: list[tuple[Any, ...]]) -> None:
-        listed = ", ".join(f'"{name}"' for name in names)
-        marks = ", ".join("?" for _ in names)
-        self._db.executemany(f"INSERT INTO {table} ({listed}) VALUES ({marks})", rows)
-
-    def _one(self, query: str, *values: object) -> Any:
-        """The first row of a query, or None."""
-        return self._db.execute(query, values).fetchone()
-
-    def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
-        """Id of the row with these keys, which is inserted where there is none."""
-        condition = " AND ".join(f"{key} = ?" for key in keys)
-        query = f"SELECT id FROM {table} WHERE {condition}"
-        stored = self._one(query, *(row[key] for key in keys))
-        return self._insert(table, row) if stored is None else int(stored["id"])
-
     def _setting(self, setting: Setting) -> int:
+        """Id of the row of a setting, which is inserted where there is none."""
         return self._id_of("settings", setting.to_row(), "asked", "code")
 
     def _environment(self, content: dict[str, Any]) -> int:
+        """Id of the row of an environment, which is inserted where there is none."""
         commit = content.get("commit")
         row = {
             "content": to_json(content, sort_keys=True),
@@ -467,38 +367,56 @@ class Store:
         }
         return self._id_of("environments", row, "content")
 
+    def _id_of(self, table: str, row: Mapping[str, Any], *keys: str) -> int:
+        """Id of the row with these keys, which is inserted where there is none."""
+        condition = " AND ".join(f"{key} = ?" for key in keys)
+        query = f"SELECT id FROM {table} WHERE {condition}"
+        stored = self._one(query, *(row[key] for key in keys))
+        return self._insert(table, row) if stored is None else int(stored["id"])
+
+    def _insert(self, table: str, row: Mapping[str, Any]) -> int:
+        """Insert a row, lists and tables as JSON; its id."""
+        names = ", ".join(f'"{name}"' for name in row)
+        marks = ", ".join("?" for _ in row)
+        values = [to_json(v) if isinstance(v, dict | list | tuple) else v for v in row.values()]
+        text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
+        return int(self._db.execute(text, values).lastrowid or 0)
+
+    def _one(self, query: str, *values: object) -> Any:
+        """The first row of a query, or None."""
+        return self._db.execute(query, values).fetchone()
+
     def _table(self, query: str, *values: object) -> pd.DataFrame:
         """The rows of a query, with nullable types."""
         import pandas as pd
 
         rows = self._db.execute(query, values)
         names = [column[0] for column in rows.description]
-        parts = [to_frame(names, [], {})]
-        texts: dict[str, str] = {}
-        while some := rows.fetchmany(_ROWS):
-            parts.append(to_frame(names, some, texts))
-        return parts[-1] if len(parts) < 3 else pd.concat(parts[1:], ignore_index=True)
+        frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
+        with np.errstate(invalid="ignore"):  # of numbers that are too large, which it refuses
+            return frame.astype({name: _DTYPES.get(name, "float64") for name in names})  # joints
+
+    def _wait_for(self, statement: str) -> None:
+        """Execute it as soon as other programs that have the file open let it."""
+        tries = 0
+        while True:
+            try:
+                self._db.execute(statement)
+                return
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error):
+                    raise
+            tries += 1
+            if tries == 2:
+                warnings.warn(
+                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
+                    stacklevel=2,
+                )
 
 
-def to_frame(names: list[str], rows: list[Any], texts: dict[str, str]) -> pd.DataFrame:
-    """Rows of a query, with nullable types. Equal ``texts`` of all rows are one in memory."""
-    import pandas as pd
-
-    arrays = {}
-    columns = list(zip(*rows, strict=True)) or [() for _ in names]
-    for name, column in zip(names, columns, strict=True):
-        dtype = _DTYPES.get(name, "float64")  # joints
-        content = [texts.setdefault(v, v) if type(v) is str else v for v in column]
-        try:
-            with np.errstate(invalid="ignore"):  # of numbers that are too large, which it refuses
-                arrays[name] = pd.array(content, dtype=dtype)
-        except (ValueError, TypeError, OverflowError) as error:
-            raise ValueError(f"{name}: {error}") from None
-    return pd.DataFrame(arrays)
-
-
-def open_store(folder: Path) -> Store:
-    """The runs of a results folder, to be read.
+@contextmanager
+def open_store(folder: Path) -> Iterator[Store]:
+    """The runs of a results folder, to be read in this block.
 
     Raises CoarticError for what is no results folder of this version, and while a suite is at
     work in it.
@@ -511,15 +429,12 @@ def open_store(folder: Path) -> Store:
         hint = min(inside, default="")
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
     check_files(folder)
-    with (
-        explain_errors(folder),
-        connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S) as connection,
-    ):
-        connection.execute("PRAGMA query_only = ON")
-        if not has_tables(connection, folder):
-            raise CoarticError(f"{folder} is not finished; repeat the `coartic run` command")
-        check_known(connection, folder)
-        with lock(folder, shared=True) as is_ours:
+    with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
+        with explain_errors(folder), lock(folder, shared=True) as is_ours:
+            connection.execute("PRAGMA query_only = ON")
+            if not has_tables(connection, folder):
+                raise CoarticError("it is not finished; repeat the `coartic run` command")
+            check_reading(connection)
             if not is_ours:
                 done = connection.execute(f"SELECT count(*) {_ASKED_FOR}").fetchone()[0]
                 asked = connection.execute("SELECT coalesce(sum(runs), 0) FROM cells").fetchone()[0]
@@ -527,44 +442,16 @@ def open_store(folder: Path) -> Store:
                     f"another `coartic run` is at work in {folder}: {done} of "
                     f"{counted(asked, 'run')} are done; wait for it"
                 )
-    return Store(folder, connection)
+        yield Store(folder, connection)
 
 
-def check_known(connection: sqlite3.Connection, folder: Path) -> None:
-    """Raises CoarticError for results of what version 1 had and this version does not have."""
-    readings = [
-        reading
-        for (texts,) in connection.execute("SELECT readings FROM suite")
-        for reading in json.loads(texts)
-    ]
-    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
-        readings += filter(None, [other_reading(method, *map(json.loads, texts))])
-    if readings:
-        version = "1.0.0" if readings[0].startswith("arrival_tick") else "1.1.0"
-        raise CoarticError(
-            f"{folder} has results of another reading of the paper, {plain(readings[0], 80)}: "
-            f"version {version} of coartic reads them"
-        )
-    asked = connection.execute(
-        "SELECT name, content FROM suite JOIN environments ON id = environment"
-    ).fetchone()
-    if asked is None or not json.loads(asked["content"]).get("coartic", "").startswith("1."):
-        return
-    methods = {name for (name,) in connection.execute("SELECT name FROM methods")}
-    gone = sorted(GONE & {asked["name"], *methods})
-    if connection.execute("SELECT * FROM tasks WHERE definition LIKE '%\"penalty\":%'").fetchone():
-        gone.append("tasks with a penalty")
-    if gone:
-        raise CoarticError(
-            f"{folder} has results of {gone[0]}: version 1.1.0 of coartic reads them"
-        )
-
-
-def open_content(content: bytes, name: str) -> Store:
-    """The runs of a results folder whose file is in memory, to be read; ``name`` stands for it."""
-    with connect(":memory:", WAIT_S) as connection:
+@contextmanager
+def open_content(content: bytes, name: str) -> Iterator[Store]:
+    """The runs of a results folder whose file is in memory, to be read in this block; ``name``
+    stands for it."""
+    with closing(connect(":memory:", WAIT_S)) as connection:
         connection.deserialize(content)
-    return Store(Path(name), connection)
+        yield Store(Path(name), connection)
 
 
 @contextmanager
@@ -592,17 +479,14 @@ def writing(folder: Path) -> Iterator[Store]:
                 "folder"
             )
         check_files(folder)
-        with (
-            explain_errors(folder),
-            connect(str(folder / RUNS_FILE), WAIT_S) as connection,
-        ):
-            has_tables(connection, folder)  # or it is left as it is
-            # No write-ahead log: it is unsafe on network disks, and a second file.
-            connection.execute("PRAGMA journal_mode = DELETE")
-            if not has_tables(connection, folder):
-                connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
-        with Store(folder, connection) as store:
-            yield store
+        with closing(connect(str(folder / RUNS_FILE), WAIT_S)) as connection:
+            with explain_errors(folder):
+                is_there = has_tables(connection, folder)  # or the file is left as it is
+                # No write-ahead log: it is unsafe on network disks, and a second file.
+                connection.execute("PRAGMA journal_mode = DELETE")
+                if not is_there:
+                    connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
+            yield Store(folder, connection)
 
 
 @contextmanager
@@ -635,21 +519,33 @@ def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
         os.close(opened)
 
 
-@contextmanager
-def connect(where: str, timeout_s: float) -> Iterator[sqlite3.Connection]:
-    """A connection to a path or a ``file:`` address, which waits so long for a lock; it stays
-    open, unless something is wrong with it."""
+def connect(where: str, timeout_s: float) -> sqlite3.Connection:
+    """A connection to a path or a ``file:`` address, which waits so long for a lock."""
     connection = sqlite3.connect(
         where, timeout=timeout_s, isolation_level=None, uri=where.startswith("file:")
     )
     connection.row_factory = sqlite3.Row
-    try:
-        connection.execute("PRAGMA trusted_schema = OFF")
-        connection.execute("PRAGMA cell_size_check = ON")
-        yield connection
-    except BaseException:
-        connection.close()
-        raise
+    connection.execute("PRAGMA trusted_schema = OFF")
+    connection.execute("PRAGMA cell_size_check = ON")
+    return connection
+
+
+def check_reading(connection: sqlite3.Connection) -> None:
+    """Raises CoarticError for results of another reading of the paper, which versions 1.0 and 1.1
+    had."""
+    readings = [
+        reading
+        for (texts,) in connection.execute("SELECT readings FROM suite")
+        for reading in json.loads(texts)
+    ]
+    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
+        readings += filter(None, [other_reading(method, *map(json.loads, texts))])
+    if readings:
+        version = "1.0.0" if readings[0].startswith("arrival_tick") else "1.1.0"
+        raise CoarticError(
+            f"it has results of another reading of the paper, {plain(readings[0], 80)}: "
+            f"version {version} of coartic reads them"
+        )
 
 
 def check_files(folder: Path) -> None:
@@ -715,32 +611,41 @@ def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
         connection.execute(statement)
 
 
+UNREADABLE = (
+    *(sqlite3.DatabaseError, zlib.error),
+    *(ValueError, KeyError, TypeError, OverflowError, RecursionError),
+)
+"""Errors where the content of a file is not as coartic writes it."""
+
+
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
     """Raises CoarticError for an error of SQLite, and for content that cannot be read."""
-    path = folder / RUNS_FILE
     try:
         yield
-    except CoarticError as error:
+    except (CoarticError, *UNREADABLE) as error:
+        raise CoarticError(explain(folder / RUNS_FILE, error)) from None
+
+
+def explain(path: Path, error: Exception) -> str:
+    """A sentence on a file that cannot be used, with advice where SQLite cannot read it."""
+    if isinstance(error, CoarticError):
         said = one_line(str(error))
-        raise CoarticError(said if str(folder) in said else f"{path}: {said}") from None
-    except sqlite3.OperationalError as error:
+        return said if str(path.parent) in said else f"{path}: {said}"
+    if isinstance(error, sqlite3.OperationalError):
+        if getattr(error, "sqlite_errorname", "") == "SQLITE_READONLY_DBMOVED":
+            return (
+                f"{path.parent} was removed, renamed or replaced while the suite ran: put it back, "
+                "or repeat the command to begin anew"
+            )
         if "locked" in str(error):
-            raise CoarticError(
-                f"another program has {folder / RUNS_FILE} open; close it there, or wait for it"
-            ) from None
+            return f"another program has {path} open; close it there, or wait for it"
         if "readonly" in str(error):
-            raise CoarticError(
+            return (
                 f"{path} was left in the middle of writing, and cannot be put right, since the "
                 "folder cannot be written. Copy the whole folder, and use the copy."
-            ) from None
-        raise CoarticError(f"cannot use {path}: {error}") from None
-    except UNREADABLE as error:
-        raise CoarticError(damage(path, error)) from None
-
-
-def damage(path: Path, error: Exception) -> str:
-    """A sentence on a file that cannot be used, with advice where SQLite cannot read it."""
+            )
+        return f"cannot use {path}: {error}"
     wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
     wrong = plain(wrong, 200) or type(error).__name__
     if type(error) is sqlite3.DatabaseError:  # malformed, or no database
