@@ -331,9 +331,9 @@ def test_errors():
 @pytest.mark.parametrize(
     ("update", "message"),
     [
-        ({"goals": ((3.0, 1.0),) * 5}, "4 initial hands for 5 goals"),
+        ({"goals": ((3.0, 1.0),) * 5}, "for each of 5 goals"),
         ({"goals": ((3.0, 1.0),) * 3 + ((3.0, np.nan),)}, "not finite"),
-        ({"initial_hands": "L"}, "1 initial hands for 4 goals"),
+        ({"initial_hands": "L"}, "'L' do not fit task"),
         ({"robot": Robot(left_links=(1.0,) * 6, right_links=(1.0,) * 6)}, r"needs \(14,\)"),
         ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needs \(4,\)"),
         ({"radius": np.inf}, "radius is inf"),

@@ -18,36 +18,36 @@ number.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.compiled import (
-    entry,
-    fill_row,
-    generator_at,
-    inlined,
-    inner,
-    record_type,
-)
-from coartic.motion.lanes import LANES, Lanes, lanes_for, runs_for, width_of
-from coartic.motion.reach import LOOK, MOVE, STAY, attempt, correct_missed
+from coartic.motion.compiled import entry, fill_row, generator_at, inlined, inner, record_type
+from coartic.motion.lanes import Lanes, lanes_for, runs_for, width_of
+from coartic.motion.reach import LOOK, MOVE, STAY, Bench, attempt, correct_missed
 from coartic.motion.setup import arm_of
+from coartic.motion.solution import Movement
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS
 from coartic.tasks.task import Task
 
 NO_HAND = 2  # ∅, the previous hand before goal 1
 LEARNED, CORRECTIVE = 0, 1
-_EXPLORATION = {"none": 0, "random": 1, "closest": 2}
+_RANDOM = 1
+_EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 
 
 class Rules(NamedTuple):
-    """An exploration condition on a robot, as the kernel reads it."""
+    """A task and an exploration condition, as the kernel reads them."""
 
+    start: Any  # (dof,)
+    goals: Any  # (G, 2)
+    first_hands: Any  # (G,) of trial 0
+    first_targets: Any  # (G, width) where trial 0 moves to; NaN where **A** acts
     hands: Any  # (1 or 2,) hands available
     follows: Any  # (2, width) for each chosen hand: joint takes its current value
     explored: Any  # (2, width) for each chosen hand: joint is perturbed
@@ -77,24 +77,22 @@ class Kept(NamedTuple):
     best_trial: Any  # (N,), -1 for none
     replayed: Any  # (N,) whether the replay hit every goal
     replay_rewards: Any  # (N,)
-    counts: Any  # (N, counters) what was spent, without the replay
-    corrections: Any  # (N, 1 + TENTHS) made until the end of trial 0, in each tenth of the rest
+    counts: Any  # (N, COUNTED) what was spent, without the replay
+    corrections: Any  # (N, 1 + TENTHS) made in trial 0 and in each tenth of the rest
     first: Log
     best: Log
     replay: Log
 
 
-class Count(NamedTuple):
-    """Indices of the counters."""
-
-    ticks: int = 0
-    evaluations: int = 1
-    iterations: int = 2
-    corrections: int = 3
-    failed: int = 4
-
-
-COUNT = Count()
+COUNTED = (
+    "movement_ticks",
+    "forward_kinematics",
+    "corrective_iterations",
+    "corrections",
+    "failed_trials",
+)
+"""Counters of :class:`~coartic.method.Meter` that the kernel keeps, in this order."""
+_TICKS, _EVALUATIONS, _ITERATIONS, _CORRECTIONS, _FAILED = range(len(COUNTED))
 TENTHS = 10
 """Equal parts of the trials after trial 0, of which corrections are counted apart."""
 
@@ -110,9 +108,13 @@ class Work(NamedTuple):
     ys: Any
 
 
-def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
-    """The rules of a condition on the robot of a task."""
-    follows, explored = np.zeros((2, 2, width_of(task.robot)), dtype=np.bool_)
+def rules_of(bench: Bench, condition: ExplorationCondition, first: Sequence[Movement]) -> Rules:
+    """The rules of a task and a condition, with a movement to each goal for trial 0."""
+    task, width = bench.task, width_of(bench.task.robot)
+    first_targets = np.zeros((len(first), width))
+    for target, movement in zip(first_targets, first, strict=True):
+        target[: task.robot.dof] = np.nan if movement.target is None else movement.target
+    follows, explored = np.zeros((2, 2, width), dtype=np.bool_)
     base = np.array(["x" not in task.locked_base, "y" not in task.locked_base])
     for chosen, hand in enumerate(HANDS):
         of_arm, others = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
@@ -121,6 +123,10 @@ def rules_of(task: Task, condition: ExplorationCondition) -> Rules:
         explored[chosen, others] = condition.modify_other
         follows[chosen, others] = not condition.modify_other
     return Rules(
+        start=bench.starts[0],
+        goals=bench.goals[0],
+        first_hands=np.array([HANDS.index(movement.hand) for movement in first], dtype=np.int64),
+        first_targets=first_targets,
         hands=np.array(sorted(HANDS.index(hand) for hand in condition.hands), dtype=np.int64),
         follows=follows,
         explored=explored,
@@ -161,15 +167,14 @@ _TRIAL = record_type(
     {
         "previous": np.int64,  # hand of the goal before
         "ticks": np.int64,
-        "counts": (np.int64, len(COUNT)),  # of all trials of the run
+        "corrections": np.int64,
+        "counts": (np.int64, len(COUNTED)),  # of all trials of the run
     }
 )
 
 
 def work_for(runs: int, task: Task) -> Work:
-    """Work space of runs, all counters 0. ValueError for more than there are lanes."""
-    if runs > LANES:
-        raise ValueError(f"{runs} runs at once; there are {LANES} lanes")
+    """Work space of runs, as many as there are lanes at most; all counters are 0."""
     return Work(
         runs=runs_for(runs, task.robot),
         lanes=lanes_for(task.robot),
@@ -191,9 +196,27 @@ def distance_to_goal(n: int, hand: int, setup: Any, work: Any) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
-@inner
-def greedy_hand(entries: Any, hands: Any) -> int:
-    """Hand of the highest value; the first of equals."""
+@inlined
+def choose_hand(
+    n: int, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
+) -> int:
+    """The hand of highest value; with probability ε a random one, or the closest to the goal.
+
+    Of equal values the first, of hands that are equally close a random one.
+    """
+    hands = rules.hands
+    if explore and rules.exploration != 0:
+        rng = generator_at(rngs, n)
+        if rng.random() < rules.epsilon:
+            nearest, draws = hands[0], rules.exploration == _RANDOM
+            if not draws:
+                least = distance_to_goal(n, nearest, setup, work)
+                for hand in hands[1:]:
+                    distance = distance_to_goal(n, hand, setup, work)
+                    draws = abs(distance - least) <= _EQUALLY_NEAR
+                    if distance < least:
+                        nearest, least = hand, distance
+            return int(hands[int(rng.random() * len(hands))]) if draws else int(nearest)
     best = hands[0]
     for hand in hands[1:]:
         if entries[hand].value > entries[best].value:
@@ -201,55 +224,11 @@ def greedy_hand(entries: Any, hands: Any) -> int:
     return int(best)
 
 
-@inner
-def random_hand(hands: Any, rng: Any) -> int:
-    """One of the hands, each as likely."""
-    return int(hands[int(rng.random() * len(hands))])
-
-
-@inlined
-def closest_hand(n: int, setup: Any, rules: Any, rng: Any, work: Any) -> int:
-    """The hand closest to the goal, a random one of equally close ones."""
-    nearest = rules.hands[0]
-    nearest_distance = distance_to_goal(n, nearest, setup, work)
-    tie = False
-    for hand in rules.hands[1:]:
-        distance = distance_to_goal(n, hand, setup, work)
-        tie = abs(distance - nearest_distance) <= _EQUALLY_NEAR
-        if distance < nearest_distance:
-            nearest, nearest_distance = hand, distance
-    return int(random_hand(rules.hands, rng)) if tie else int(nearest)
-
-
-@inlined
-def choose_hand(
-    n: int, entries: Any, explore: bool, setup: Any, rules: Any, rngs: Any, work: Any
-) -> int:
-    """The hand of a run: greedy, or with probability ε an explored one."""
-    if explore and rules.exploration != 0:
-        rng = generator_at(rngs, n)
-        if rng.random() < rules.epsilon:
-            if rules.exploration == 1:
-                return random_hand(rules.hands, rng)
-            return closest_hand(n, setup, rules, rng, work)
-    return greedy_hand(entries, rules.hands)
-
-
-@inlined
-def set_target(
-    target: Any, q: Any, stored: Any, hand: int, explore: bool, rules: Any, rng: Any
-) -> None:
-    """q^t = q*(s, a) + η; joints that are not to be modified keep their current values."""
-    for j in range(len(q)):
-        target[j] = q[j] if rules.follows[hand, j] else stored[j]
-        if explore and rules.explored[hand, j]:
-            target[j] += rules.noise_sd * rng.standard_normal()
-
-
 @inlined
 def aim(
     n: int,
     number: int,
+    first: bool,
     explore: bool,
     setup: Any,
     rules: Any,
@@ -257,25 +236,25 @@ def aim(
     rngs: Any,
     work: Any,
 ) -> None:
-    """Choose the hand of a run; where it has a stored target, set it."""
+    """Choose the hand of a run and, where there is a target q*(s, a), set q^t = q*(s, a) + η;
+    joints that are not to be modified keep their current values."""
     run = work.runs[n]
+    if first:
+        run.hand = rules.first_hands[number]
+        if not math.isnan(rules.first_targets[number, 0]):
+            fill_row(run.target, rules.first_targets[number])
+            run.how = MOVE
+        return
     entries = tables[n, number, work.trials[n].previous]
     run.hand = choose_hand(n, entries, explore, setup, rules, rngs, work)
-    learned = entries[run.hand]
-    if learned.value > -math.inf:
+    stored = entries[run.hand]
+    if stored.value > -math.inf:
+        run.how = MOVE
         rng = generator_at(rngs, n)
-        set_target(run.target, run.q, learned.target, run.hand, explore, rules, rng)
-        run.how = MOVE
-
-
-@inlined
-def aim_first(n: int, number: int, first_hands: Any, first_targets: Any, work: Any) -> None:
-    """Set hand and target of a run in trial 0."""
-    run = work.runs[n]
-    run.hand = first_hands[number]
-    if not math.isnan(first_targets[number, 0]):
-        fill_row(run.target, first_targets[number])
-        run.how = MOVE
+        for j in range(len(run.q)):
+            run.target[j] = run.q[j] if rules.follows[run.hand, j] else stored.target[j]
+            if explore and rules.explored[run.hand, j]:
+                run.target[j] += rules.noise_sd * rng.standard_normal()
 
 
 @inlined
@@ -289,61 +268,31 @@ def record_movement(log: Any, n: int, number: int, kind: int, run: Any, trial: A
     fill_row(movement.target, run.target)
     log.count[n] += 1
     trial.ticks += run.ticks
-    trial.counts[COUNT.ticks] += run.ticks
-
-
-@inlined
-def note_goal(n: int, number: int, log: Any, work: Any) -> None:
-    """Log and count corrections of a goal; a trial fails where it was missed."""
-    run, trial = work.runs[n], work.trials[n]
-    trial.counts[COUNT.iterations] += run.iterations
-    trial.counts[COUNT.corrections] += run.converged
-    if run.converged or (run.hit and run.how == LOOK):
-        record_movement(log, n, number, CORRECTIVE, run, trial)
-    run.going = run.hit
-    if run.going:
-        hit = log.hits[n, number]
-        hit.hand = trial.previous = run.hand
-        fill_row(hit.q, run.q)
-    else:
-        trial.counts[COUNT.failed] += 1
+    trial.counts[_TICKS] += run.ticks
 
 
 @inner
 def make_trial(
-    first: bool,
-    explore: bool,
-    first_hands: Any,
-    first_targets: Any,
-    start: Any,
-    goals: Any,
-    setup: Any,
-    rules: Any,
-    tables: Any,
-    log: Any,
-    rngs: Any,
-    work: Any,
+    first: bool, explore: bool, setup: Any, rules: Any, tables: Any, log: Any, rngs: Any, work: Any
 ) -> None:
-    """One trial of every run into ``log``; the ``first`` one with ``first_hands`` and targets."""
+    """One trial of every run into ``log``; ``first``: trial 0. A trial fails at a goal missed."""
     runs = len(work.runs)
     for n in range(runs):
         run, trial = work.runs[n], work.trials[n]
-        fill_row(run.q, start)
+        fill_row(run.q, rules.start)
         run.evaluations = 0
         run.going = True
         trial.previous = NO_HAND
-        trial.ticks = 0
+        trial.ticks = trial.corrections = 0
         log.count[n] = 0
-    for number in range(len(goals)):
+    for number in range(len(rules.goals)):
         for n in range(runs):
             run = work.runs[n]
-            fill_row(run.goal, goals[number])
+            fill_row(run.goal, rules.goals[number])
             fill_row(run.target, run.q)
             run.how, run.hit = LOOK if run.going else STAY, False
-            if run.going and first:
-                aim_first(n, number, first_hands, first_targets, work)
-            elif run.going:
-                aim(n, number, explore, setup, rules, tables, rngs, work)
+            if run.going:
+                aim(n, number, first, explore, setup, rules, tables, rngs, work)
         attempt(runs, setup, work)
         for n in range(runs):
             run = work.runs[n]
@@ -352,10 +301,22 @@ def make_trial(
                 record_movement(log, n, number, LEARNED, run, work.trials[n])
         correct_missed(runs, setup, work)
         for n in range(runs):
-            if work.runs[n].going:
-                note_goal(n, number, log, work)
+            run, trial = work.runs[n], work.trials[n]
+            if run.going:
+                trial.counts[_ITERATIONS] += run.iterations
+                trial.counts[_CORRECTIONS] += run.converged
+                trial.corrections += run.converged
+                if run.converged or (run.hit and run.how == LOOK):
+                    record_movement(log, n, number, CORRECTIVE, run, trial)
+                run.going = run.hit
+                if run.going:
+                    hit = log.hits[n, number]
+                    hit.hand = trial.previous = run.hand
+                    fill_row(hit.q, run.q)
+                else:
+                    trial.counts[_FAILED] += 1
     for n in range(runs):
-        work.trials[n].counts[COUNT.evaluations] += work.runs[n].evaluations
+        work.trials[n].counts[_EVALUATIONS] += work.runs[n].evaluations
 
 
 @inlined
@@ -402,59 +363,42 @@ def copy_movements(n: int, source: Any, destination: Any) -> None:
 
 
 @inner
-def learn_from(earlier: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
-    """Keep the rewards of a trial after so many; where it was completed, update Q and q*."""
+def learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
+    """Keep the rewards of a trial; where it was completed, update Q and q*."""
     others = max(1, kept.rewards.shape[1] - 1)
-    part = 0 if earlier == 0 else 1 + (earlier - 1) * TENTHS // others
+    part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(work.trials)):
         trial = work.trials[n]
-        kept.corrections[n, part] = trial.counts[COUNT.corrections]
+        kept.corrections[n, part] += trial.corrections
         reward = -trial.ticks
-        kept.rewards[n, earlier] = reward
-        kept.completed[n, earlier] = work.runs[n].going
+        kept.rewards[n, number] = reward
+        kept.completed[n, number] = work.runs[n].going
         if not work.runs[n].going:
             continue
-        if earlier == 0:
+        if number == 0:
             copy_movements(n, log, kept.first)
         update_tables(n, float(reward), rules, tables, log)
         best = kept.best_trial[n]
         if best < 0 or reward > kept.rewards[n, best]:
-            kept.best_trial[n] = earlier
+            kept.best_trial[n] = number
             copy_movements(n, log, kept.best)
 
 
 @entry
 def learn_kernel(
-    first_hands: Any,
-    first_targets: Any,
-    start: Any,
-    goals: Any,
-    setup: Any,
-    rules: Any,
-    tables: Any,
-    kept: Any,
-    log: Any,
-    rngs: Any,
-    work: Any,
+    setup: Any, rules: Any, tables: Any, kept: Any, log: Any, rngs: Any, work: Any
 ) -> None:
     """All trials of N runs, each with its own generator, and the replay of what they learned.
 
-    ``first_hands`` (G,) are those of trial 0, ``first_targets`` (G, width) where it moves to, NaN
-    where the corrective process acts. ``tables`` and ``kept`` are filled; ``log``
-    is overwritten by every trial.
+    ``tables`` and ``kept`` are filled; ``log`` is overwritten by every trial.
     """
     trials = kept.rewards.shape[1]
-    for trial in range(trials + 1):
-        replay = trial == trials
-        for n in range(len(work.trials) if replay else 0):  # which is not part of the runs
-            fill_row(kept.counts[n], work.trials[n].counts)
-        first = trial == 0
-        make_trial(
-            first, not replay, first_hands, first_targets, start, goals, setup[0], rules, tables,
-            log, rngs, work,
-        )  # fmt: skip
-        if not replay:
-            learn_from(trial, rules, tables, kept, log, work)
+    for number in range(trials):
+        make_trial(number == 0, True, setup[0], rules, tables, log, rngs, work)
+        learn_from(number, rules, tables, kept, log, work)
+    for n in range(len(work.trials)):  # the replay is not part of the runs
+        fill_row(kept.counts[n], work.trials[n].counts)
+    make_trial(False, False, setup[0], rules, tables, log, rngs, work)
     for n in range(len(work.trials)):
         kept.replayed[n] = work.runs[n].going
         kept.replay_rewards[n] = -work.trials[n].ticks

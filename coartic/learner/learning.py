@@ -14,7 +14,7 @@ from coartic.errors import NotApplicableError
 from coartic.inputs import MOST_TRIALS, brief_value, check_limits
 from coartic.learner.conditions import ExplorationCondition, load_condition
 from coartic.learner.kernel import (
-    COUNT,
+    COUNTED,
     LEARNED,
     TENTHS,
     Kept,
@@ -30,15 +30,15 @@ from coartic.method import Meter
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import addresses
 from coartic.motion.corrective import correct
-from coartic.motion.initial import initial_hands
-from coartic.motion.lanes import LANES, links_for, width_of
+from coartic.motion.initial import corrective_movements, initial_hands
+from coartic.motion.lanes import LANES
 from coartic.motion.movement import move
 from coartic.motion.outside import note_trials
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
 from coartic.motion.trials import make_trials
 from coartic.robot import HANDS
-from coartic.tasks.task import Task, TaskLike, as_task, hands_of, letters_of
+from coartic.tasks.task import Task, TaskLike, as_task, check_hands, letters_of
 from coartic.threads import threads_for
 
 TRIALS = 10_000  # trials of one run (printed)
@@ -185,62 +185,53 @@ def learn_many(
         check_limits("seed", seed, 0, _MOST_SEED)
     check_model(model, radius=task.radius)
     if start:
-        movements_by_goal(task, start)  # or it says what is wrong with them
-        for movement in start:
+        first = [movements[0] for movements in movements_by_goal(task, start)]
+        for movement in first:
             if movement.hand not in condition.hands:
                 raise NotApplicableError(
                     f"{condition.id} uses only the {condition.hands[0]} hand, the first solution "
                     f"uses the {movement.hand} hand"
                 )
+    else:
+        hands = check_hands(task, initial_hands(task, condition.hands, model=model))
+        first = corrective_movements(hands)
     note_trials(trials * len(ordered))
-    first_hands = hands_in(start) if start else initial_hands(task, condition.hands, model=model)
     threads = threads_for(jobs)
     together = max(min(LANES, math.ceil(len(ordered) / threads)), 1)
-    batches = [ordered[first : first + together] for first in range(0, len(ordered), together)]
+    batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
+    learn_together(task, condition, model, first, [0], 0)  # compiles, on no run's time
 
     def perform(batch: Sequence[int]) -> list[LearningRun]:
-        return learn_together(task, condition, model, first_hands, batch, trials, start)
+        return learn_together(task, condition, model, first, batch, trials)
 
-    compile_learner(task, condition, model, first_hands)
     if threads == 1:
         return [run for batch in batches for run in perform(batch)]
     with ThreadPoolExecutor(threads) as pool:
         return [run for runs in pool.map(perform, batches) for run in runs]
 
 
-_compiled_for: set[int] = set()
-"""Numbers of links for which the kernel is compiled: they belong to the type of its lanes."""
-
-
 def learn_together(
     task: Task,
     condition: ExplorationCondition,
     model: MotionModel,
-    first_hands: str,
+    first: Sequence[Movement],
     seeds: Sequence[int],
     trials: int,
-    start: Sequence[Movement] = (),
 ) -> list[LearningRun]:
     """All trials of runs side by side, one a seed, which differ in nothing else.
 
-    Raises ValueError for more runs than there are lanes, and for a first trial that does not fit.
+    Nothing is checked. ``first`` has a movement to each goal for trial 0; there are no more seeds
+    than lanes.
     """
-    runs, dof = len(seeds), task.robot.dof
-    first_targets = np.full((len(task.goals), width_of(task.robot)), np.nan)
-    for g, movements in enumerate(movements_by_goal(task, start) if start else ()):
-        first_targets[g] = 0.0  # beyond the joints of a smaller robot
-        first_targets[g, :dof] = movements[0].target
-    codes = [HANDS.index(hand) for hand in hands_of(first_hands)]
-    if len(codes) != len(task.goals):
-        raise ValueError(f"{len(codes)} initial hands for {len(task.goals)} goals")
-    bench, tables = bench_of(task, model), empty_tables(runs, task)
+    runs, dof, bench = len(seeds), task.robot.dof, bench_of(task, model)
+    tables = empty_tables(runs, task)
     kept = Kept(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
         best_trial=np.full(runs, -1),
         replayed=np.zeros(runs, dtype=np.bool_),
         replay_rewards=np.zeros(runs, dtype=np.int64),
-        counts=np.zeros((runs, len(COUNT)), dtype=np.int64),
+        counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
         first=empty_log(runs, task),
         best=empty_log(runs, task),
@@ -248,12 +239,8 @@ def learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     arguments = (
-        np.array(codes, dtype=np.int64),
-        first_targets,
-        bench.starts[0],
-        bench.goals[0],
         bench.setup,
-        rules_of(task, condition),
+        rules_of(bench, condition, first),
         tables,
         kept,
         empty_log(runs, task),
@@ -263,13 +250,14 @@ def learn_together(
     clock = time.perf_counter()
     learn_kernel(*arguments)
     wall = time.perf_counter() - clock
+    counts = [dict(zip(COUNTED, row, strict=True)) for row in kept.counts.tolist()]
     return [
         LearningRun(
             task=task,
             condition=condition,
             model=model,
             seed=seed,
-            first_hands=first_hands,
+            first_hands=hands_in(first),
             rewards=np.ma.array(kept.rewards[n], mask=~kept.completed[n]),
             best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
             initial=logged_movements(kept.first, n, dof),
@@ -278,15 +266,9 @@ def learn_together(
             replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
-            corrections=np.diff(np.maximum.accumulate(kept.corrections[n]), prepend=0),
+            corrections=kept.corrections[n],
             counters=Meter(
-                trials=trials,
-                movement_ticks=int(kept.counts[n, COUNT.ticks]),
-                forward_kinematics=int(kept.counts[n, COUNT.evaluations]),
-                jacobians=int(kept.counts[n, COUNT.iterations]),
-                corrective_iterations=int(kept.counts[n, COUNT.iterations]),
-                corrections=int(kept.counts[n, COUNT.corrections]),
-                failed_trials=int(kept.counts[n, COUNT.failed]),
+                trials=trials, jacobians=counts[n]["corrective_iterations"], **counts[n]
             ),
             wall_s=wall / runs,
         )
@@ -308,22 +290,12 @@ def warm_up(task: Task, *parts: Part) -> None:
     wanted = parts or get_args(Part)
     if "learner" in wanted:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        compile_learner(task, condition, PAPER, hands)
+        learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
     if "trials" in wanted:
         make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
     if "motion" in wanted:
         move(task.robot, task.q0, task.q0, hand, goal, task.radius)
         correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))
-
-
-def compile_learner(
-    task: Task, condition: ExplorationCondition, model: MotionModel, first_hands: str
-) -> None:
-    """Compile the learner's kernel, unless it is, for the number of links of a task's robot."""
-    links = links_for(task.robot)
-    if links not in _compiled_for:
-        learn_together(task, condition, model, first_hands, [0], 0)
-        _compiled_for.add(links)
 
 
 def logged_movements(log: Log, run: int, dof: int) -> tuple[Movement, ...]:
