@@ -16,10 +16,9 @@ from coartic.baselines.trajectory_problem import held_joints
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
 from coartic.motion.solution import Movement
-from coartic.motion.trials import make_trials
 from coartic.robot import directions
 from coartic.tasks.task import hands_of, letters_of
-from tests.support.strategies import UNEVEN, changed, uneven_task
+from tests.support.strategies import UNEVEN, changed, make_trials, uneven_task
 
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
 

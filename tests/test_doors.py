@@ -24,11 +24,10 @@ from coartic.method import Meter, MethodError, Session
 from coartic.motion.lanes import LANES
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import execute_many, other_arm_travel
-from coartic.motion.trials import make_trials
 from coartic.optimisers import FAILED, TOLD, explored_joints
 from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, sample, tiny_task, uneven_task
+from tests.support.strategies import PAPER_CELLS, make_trials, sample, tiny_task, uneven_task
 
 TASKS = {name: load_task(name) for name in coartic.builtin_tasks()} | {
     "uneven": uneven_task(),
@@ -128,11 +127,6 @@ def by_trials(task, model, cases):
     return found
 
 
-def by_make_trials(task, model, cases):
-    hands, targets = [case.hands for case in cases], np.array([case.targets for case in cases])
-    return [*rows_of(make_trials(task, hands, targets, model=model))]
-
-
 def by_objective(task, model, cases, many=False):
     """For hands with which the corrective process alone completes the task."""
     for number, case in enumerate(cases):
@@ -210,7 +204,6 @@ DOORS = {
     "checker": by_checker,
     # Those above take any solution, those below one movement for each goal.
     "trials": by_trials,
-    "make_trials": by_make_trials,
     "objective": by_objective,
     "many points": functools.partial(by_objective, many=True),
     "first trial": by_first_trial_of_the_learner,

@@ -29,11 +29,10 @@ from coartic.learner import learning
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
 from coartic.motion.lanes import LANES
-from coartic.motion.trials import make_trials
 from coartic.robot import HANDS, Robot
 from coartic.tasks.optima import entries
 from tests.support import reference
-from tests.support.strategies import PAPER_CELLS, tiny_task, uneven_task
+from tests.support.strategies import PAPER_CELLS, make_trials, tiny_task, uneven_task
 
 
 def _tenths(values):

@@ -11,10 +11,9 @@ import pytest
 from coartic import MotionModel, Movement, execute, learn, load_task, trajectory
 from coartic.baselines.cma_es import CMAES
 from coartic.motion.initial import hand_sequences, initial_hands
-from coartic.motion.trials import make_trials
 from coartic.play.page import FOLDER
 from coartic.tasks.optima import entries
-from tests.support.strategies import PAPER_CELLS, sample, solve, uneven_task
+from tests.support.strategies import PAPER_CELLS, make_trials, sample, solve, uneven_task
 
 MODEL = FOLDER / "model.js"
 NODE = shutil.which("node")

@@ -5,9 +5,9 @@ import pytest
 
 from coartic import load_task
 from coartic.method import BudgetError, Information, Session, UndeclaredError
-from coartic.motion.trials import hand_codes, make_trials, movements_of
+from coartic.motion.trials import hand_codes, movements_of
 from coartic.optimisers import TOLD
-from tests.support.strategies import sample
+from tests.support.strategies import make_trials, sample
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
 

@@ -36,7 +36,7 @@ from coartic.motion.movement import move
 from coartic.motion.outside import note_trials
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import Movement, hands_in, movements_by_goal
-from coartic.motion.trials import make_trials
+from coartic.motion.trials import trials_on
 from coartic.robot import HANDS
 from coartic.tasks.task import Task, TaskLike, as_task, check_hands, letters_of
 from coartic.threads import threads_for
@@ -292,7 +292,10 @@ def warm_up(task: Task, *parts: Part) -> None:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
         learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
     if "trials" in wanted:
-        make_trials(task, hands, np.empty((0, len(task.goals), task.robot.dof)))
+        shape = 0, len(task.goals)
+        trials_on(
+            bench_of(task, PAPER), np.empty(shape, np.int64), np.empty((*shape, task.robot.dof))
+        )
     if "motion" in wanted:
         move(task.robot, task.q0, task.q0, hand, goal, task.radius)
         correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))

@@ -23,7 +23,7 @@ from coartic.learner.conditions import (
     ExplorationCondition,
 )
 from coartic.learner.learning import TRIALS, learn_many
-from coartic.learner.run import CORRECTIONS, LearningRun
+from coartic.learner.run import CORRECTIONS
 from coartic.method import (
     Information,
     Meter,
@@ -96,14 +96,14 @@ class DualProcess(Method):
         return max(1, min(LANES, _MOST_TRIALS // trials))
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
-        """Learn in each session; a solution is the best trial's."""
+        """Learn in each session; a solution is the best trial's, or the replay's."""
         parameters: DualProcessParameters = self.parameters
         of_condition = parameters.model_dump(include={f.name for f in fields(ExplorationCondition)})
         condition = replace(self.condition, **of_condition)
         tasks = [session.hand_over(*self.told) for session in sessions]
         task, model = tasks[0], sessions[0].model
         for session in sessions:
-            session.find_initial_hands(condition.hands)
+            session.find_initial_hands(condition.hands)  # counts what that takes
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
         if trials < 1:
@@ -117,37 +117,28 @@ class DualProcess(Method):
             model=model,
             jobs=1,
         )
-        return [_result(*pair) for pair in zip(sessions, runs, strict=True)]
-
-
-def _result(session: Session, run: LearningRun) -> Result | MethodError:
-    session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
-    session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
-    if run.status != "ok":
-        return MethodError("infeasible", run.reason)
-    return Result(
-        run.learned,
-        initial=run.initial,
-        replay=run.replay if run.replay_completed else (),
-        details={CORRECTIONS: run.corrections.tolist()},
-    )
-
-
-def _told(condition: ExplorationCondition) -> frozenset[Information]:
-    """Information that a condition uses: always **A** and the total reward."""
-    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    if condition.hand_exploration == "closest":  # to know where things are
-        told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
-    if condition.credit == "subtask":
-        told |= {Information.REWARD_BY_SUBTASK}
-    return frozenset(told)
+        results: list[Result | MethodError] = []
+        for session, run in zip(sessions, runs, strict=True):
+            session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
+            session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
+            if run.status != "ok":
+                results.append(MethodError("infeasible", run.reason))
+                continue
+            details = {CORRECTIONS: run.corrections.tolist()}
+            replay = run.replay if run.replay_completed else ()
+            results.append(Result(run.learned, details, initial=run.initial, replay=replay))
+        return results
 
 
 def method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """The learner under a condition as a method."""
     parameters: type[DualProcessParameters] = DualProcessParameters
     citation = DualProcess.citation
+    told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
+    if condition.hand_exploration == "closest":  # to know where things are
+        told |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
+        told |= {Information.REWARD_BY_SUBTASK}
         parameters = SubtaskParameters
         citation += (
             " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
@@ -164,7 +155,7 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "name": f"{METHOD_PREFIX}{condition.id}",
             "title": f"Dual-process learner, exploration condition {number}"
             + (f", {variant}" if variant else ""),
-            "told": _told(condition),
+            "told": frozenset(told),
             "citation": citation,
             "Parameters": parameters,
             "condition": condition,

@@ -115,54 +115,6 @@ def correct_missed(count: int, setup: Any, batch: Any) -> None:
     move_acting(count, False, setup, batch)
 
 
-@inner
-def is_empty(target: Any) -> bool:
-    """Whether no joint has a target."""
-    for figure in target:  # noqa: SIM110 (which the compiler does not know)
-        if not math.isnan(figure):
-            return False
-    return True
-
-
-@inlined
-def set_target(run: Any, target: Any, stops: bool, is_first: bool, looks: bool) -> None:
-    """Set how a run acts, and where it moves to; a joint without a target stays where it is."""
-    fill_row(run.target, run.q)
-    run.how = LOOK if is_first and looks and run.going else STAY
-    if run.going and (is_first or not run.hit) and not is_empty(target):
-        run.how = MOVE if stops else REPEAT
-        for j in range(len(target)):
-            if not math.isnan(target[j]):
-                run.target[j] = target[j]
-        fill_row(target, run.target)
-
-
-@inlined
-def clear(n: int, reached: Any) -> None:
-    """Set the results of an arm to those of one that has not moved."""
-    for g in range(reached.hit.shape[1]):
-        reached.hit[n, g] = False
-        reached.ticks[n, g] = reached.corrections[n, g] = 0
-        reached.iterations[n, g] = reached.evaluations[n, g] = 0
-        for m in range(reached.moved.shape[2]):
-            reached.moved[n, g, m] = 0
-        for j in range(reached.q.shape[2]):
-            reached.q[n, g, j] = reached.corrected[n, g, j] = math.nan
-
-
-@inlined
-def note(n: int, g: int, run: Any, reached: Any) -> None:
-    """Copy the result of an arm's goal; the arm goes on where it was hit."""
-    fill_row(reached.q[n, g], run.q)
-    reached.hit[n, g] = run.going = run.hit
-    reached.iterations[n, g] = run.iterations
-    reached.evaluations[n, g] = run.evaluations
-    if run.converged:
-        reached.ticks[n, g] += run.ticks
-        reached.corrections[n, g] = 1
-        fill_row(reached.corrected[n, g], run.target)
-
-
 @inlined
 def row_of(rows: Any, n: int) -> Any:
     """The row of an arm, or the only one."""
@@ -173,20 +125,29 @@ def row_of(rows: Any, n: int) -> Any:
 def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch: Any) -> None:
     """Some of the arms to their goals, as many as there is room for."""
     for i in range(count):
-        clear(first + i, reached)
         fill_row(batch.runs[i].q, row_of(arms.starts, first + i))
         batch.runs[i].going = True
     for g in range(arms.targets.shape[1]):
         for i in range(count):
             run = batch.runs[i]
             fill_row(run.goal, row_of(arms.goals, first + i)[g])
-            run.hand, run.corrects = arms.hands[first + i, g], setup.corrects
+            run.hand, run.corrects = arms.hands[first + i, g], True
             run.hit, run.evaluations = False, 0
         for m in range(arms.targets.shape[2]):
             for i in range(count):
-                n = first + i
-                stops = len(arms.stops) == 0 or arms.stops[n, g, m]
-                set_target(batch.runs[i], arms.targets[n, g, m], stops, m == 0, setup.looks)
+                run, target = batch.runs[i], arms.targets[first + i, g, m]
+                fill_row(run.target, run.q)
+                run.how = LOOK if m == 0 and setup.looks and run.going else STAY
+                if run.going and (m == 0 or not run.hit):
+                    given = 0
+                    for j in range(len(target)):  # a joint without a target stays where it is
+                        if not math.isnan(target[j]):
+                            run.target[j] = target[j]
+                            given += 1
+                    if given > 0:
+                        stops = len(arms.stops) == 0 or arms.stops[first + i, g, m]
+                        run.how = MOVE if stops else REPEAT
+                        fill_row(target, run.target)
             attempt(count, setup, batch)
             for i in range(count):
                 if batch.runs[i].going:
@@ -194,8 +155,16 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
                     reached.ticks[first + i, g] += batch.runs[i].ticks
         correct_missed(count, setup, batch)
         for i in range(count):
-            if batch.runs[i].going:
-                note(first + i, g, batch.runs[i], reached)
+            n, run = first + i, batch.runs[i]
+            if run.going:
+                fill_row(reached.q[n, g], run.q)
+                reached.hit[n, g] = run.going = run.hit
+                reached.iterations[n, g] = run.iterations
+                reached.evaluations[n, g] = run.evaluations
+                if run.converged:
+                    reached.ticks[n, g] += run.ticks
+                    reached.corrections[n, g] = 1
+                    fill_row(reached.corrected[n, g], run.target)
 
 
 @entry
@@ -215,18 +184,18 @@ ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
 
 
 def blank(arms: Requests) -> Reached:
-    """Empty arrays for the results of arms."""
+    """Results of arms that have not moved."""
     count, goals, moves, dof = arms.targets.shape
     shape = count, goals
     return Reached(
-        q=np.empty((count, goals, dof)),
-        hit=np.empty(shape, np.bool_),
-        ticks=np.empty(shape, np.int64),
-        moved=np.empty((count, goals, moves), np.int64),
-        corrected=np.empty((count, goals, dof)),
-        corrections=np.empty(shape, np.int64),
-        iterations=np.empty(shape, np.int64),
-        evaluations=np.empty(shape, np.int64),
+        q=np.full((*shape, dof), np.nan),
+        hit=np.zeros(shape, np.bool_),
+        ticks=np.zeros(shape, np.int64),
+        moved=np.zeros((*shape, moves), np.int64),
+        corrected=np.full((*shape, dof), np.nan),
+        corrections=np.zeros(shape, np.int64),
+        iterations=np.zeros(shape, np.int64),
+        evaluations=np.zeros(shape, np.int64),
     )
 
 
@@ -244,15 +213,15 @@ def reach_with(robot: Robot, arms: Requests, setup: NDArray[np.void]) -> Reached
     count, reached, idle = len(arms.targets), blank(arms), _IDLE[robot.most_links]
 
     def work(part: slice) -> None:
-        some, own = arms, reached
+        some, results = arms, reached
         if part.stop - part.start < count:
             some = Requests._make(each[part] if len(each) == count else each for each in arms)
-            own = Reached._make(each[part] for each in reached)
+            results = Reached._make(each[part] for each in reached)
         try:
             batch = idle.pop()  # no other thread gets it
         except IndexError:
             batch = batch_for(robot)
-        reach_goals(some, setup, own, batch)
+        reach_goals(some, setup, results, batch)
         idle.append(batch)
 
     if count >= 2 * SHARE:

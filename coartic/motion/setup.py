@@ -30,7 +30,6 @@ def setup_type(links: int) -> np.dtype[np.void]:
         "radius": np.float64,  # of the goals, length unit
         "free_x": np.bool_,  # whether the corrective process moves the base in x
         "free_y": np.bool_,
-        "corrects": np.bool_,  # whether the corrective process finishes what is missed
         "looks": np.bool_,  # whether an arm without a target may be in its goal already
     }
     return record_type(fields)
@@ -44,12 +43,8 @@ def setup_for(
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
     looks: bool = True,
-    corrects: bool = True,
 ) -> NDArray[np.void]:
-    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``.
-
-    It is kept for the next call: who changes it takes a copy.
-    """
+    """Robot, constants and options for kernels, a record in an array of shape ``(1,)``."""
     setup = np.zeros(1, setup_type(links_for(robot)))
     for hand, arm in zip(HANDS, setup["arms"][0], strict=True):
         first, links, *shoulder = robot.arm(hand)
@@ -57,7 +52,7 @@ def setup_for(
         arm["shoulder_x"], arm["shoulder_y"] = shoulder
     setup["model"], setup["radius"] = model, radius
     setup["free_x"], setup["free_y"] = "x" not in locked_base, "y" not in locked_base
-    setup["looks"], setup["corrects"] = looks, corrects
+    setup["looks"] = looks
     return setup
 
 

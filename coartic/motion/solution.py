@@ -19,7 +19,8 @@ import numpy as np
 from coartic.errors import SolutionError
 from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel
-from coartic.motion.movement import LARGEST_ENTRY, configuration, follow
+from coartic.motion.corrective import correct
+from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
 from coartic.motion.outside import note_trials
 from coartic.motion.reach import Bench, bench_of, reach_all
 from coartic.robot import HANDS, Array, Hand
@@ -276,7 +277,6 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
             reached.evaluations,
         )
     )
-    looks = bool(bench.setup["looks"][0])
     outcomes = []
     for n, plan in enumerate(plans):
         subtasks = []
@@ -290,8 +290,7 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
             if corrections[n][g]:
                 target, spent = reached.corrected[n, g], ticks[n][g] - sum(ticks_each)
                 movements.append(Movement(goal, hand, "corrective", target, spent))
-            looked = looks and of_goal[0] is None
-            evaluated = evaluations[n][g] - looked
+            evaluated = evaluations[n][g] - (of_goal[0] is None)
             subtasks.append(
                 Subtask(movements, reached.q[n, g], hit[n][g], iterations[n][g], evaluated)
             )
@@ -306,33 +305,32 @@ def make_one_by_one(bench: Bench, plan: ByGoal) -> list[Subtask]:
 
     Returns the results of the goals that were attempted.
     """
-    task, subtasks, q = bench.task, list[Subtask](), bench.starts[0]
-    for g, movements in enumerate(plan):
-        hand, done = movements[0].hand, Subtask([], q, False, 0, 0)
-        for m, movement in enumerate([*movements, Movement(g + 1, hand, "corrective")]):
-            if movement.waypoints is not None:
-                where = movement.waypoints, hand, task.goals[g], task.radius
-                moved = follow(task.robot, done.q, *where, model=bench.model)
-                followed = [replace(movement, ticks=moved.ticks)]
-                part = Subtask(followed, moved.q, moved.hit, 0, moved.evaluations)
+    task, model = bench.task, bench.model
+    subtasks, q = list[Subtask](), bench.starts[0]
+    for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
+        hand, made = movements[0].hand, list[Movement]()
+        where, iterations, evaluations = (hand, goal, task.radius), 0, 0
+        looks = movements[0].kind == "corrective"
+        hit = looks and move(task.robot, q, q, *where, model=model).hit
+        for movement in [] if hit else [*movements, Movement(number, hand, "corrective")]:
+            target, stops = movement.target, movement.kind != "corrective"
+            if target is None:
+                locked = task.locked_base
+                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
+                target, iterations = found.q, found.iterations
+                evaluations += iterations + 1
+                if not found.converged:
+                    break
+            if movement.waypoints is None:
+                moved = move(task.robot, q, target, *where, stop_on_arrival=stops, model=model)
             else:
-                setup = bench.setup.copy()
-                setup["looks"], setup["corrects"] = m == 0, movement.target is None
-                goal = bench.goals[:, g : g + 1]
-                here = bench._replace(starts=done.q[None], goals=goal, setup=setup)
-                ((part,),) = make_straight(here, [[[movement]]])
-            done = Subtask(
-                done.movements + part.movements,
-                part.q,
-                part.hit,
-                done.iterations + part.iterations,
-                done.evaluations + part.evaluations,
-            )
-            if done.hit or movement.target is None:
+                moved = follow(task.robot, q, movement.waypoints, *where, model=model)
+            made.append(replace(movement, target=target, ticks=moved.ticks))
+            q, hit, evaluations = moved.q, moved.hit, evaluations + moved.evaluations
+            if hit or movement.target is None:
                 break
-        subtasks.append(done)
-        q = done.q
-        if not done.hit:
+        subtasks.append(Subtask(made, q, hit, iterations, evaluations))
+        if not hit:
             break
     return subtasks
 

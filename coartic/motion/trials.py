@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.inputs import brief_value, real_array
-from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.outside import note_trials
-from coartic.motion.reach import Bench, bench_of, reach_all
+from coartic.motion.reach import Bench, reach_all
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_misfit, hands_of, letters_of
@@ -70,21 +68,6 @@ def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
         targets=targets,
         reached=reached.q,
     )
-
-
-def make_trials(
-    task: Task, hands: HandSequences, targets: Array, *, model: MotionModel = PAPER
-) -> Trials:
-    """Make N trials, each from the start.
-
-    ``targets`` has shape ``(N, G, dof)``, length unit (base) and rad (joints). A joint
-    whose target is NaN keeps its value; for a goal without any target **A** acts alone.
-    Raises ValueError for a wrong shape, for targets that are infinite or beyond
-    ``LARGEST_ENTRY``, for ones that move a locked base, and for hands the robot does not have.
-    """
-    bench, given = bench_of(task, model), check_targets(task, targets)
-    note_trials(len(given))
-    return trials_on(bench, hand_codes(task, hands, len(given)), given)
 
 
 def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:

@@ -4,8 +4,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from coartic import Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
+from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
+from coartic.optimisers import TOLD
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -80,3 +81,8 @@ def solve(method, task, seed=0, **parameters):
     session = Session(task, seed, method.told, trusted=True)
     result = method(method.Parameters(**parameters)).solve(session)
     return result, execute(task, result.solution), session
+
+
+def make_trials(task, hands, targets, model=PAPER):
+    """Trials in a session of their own."""
+    return Session(task, 0, TOLD, model=model).trials(hands, targets)
