@@ -146,11 +146,12 @@ def interrupt():
 
 def clean():
     with tempfile.TemporaryDirectory(), contextlib.ExitStack() as stack:
-        stack.callback(time.sleep, 0.5)
-        stack.callback(threading.Thread(target=interrupt).start)
+        signals = threading.Thread(target=interrupt)
+        stack.callback(signals.join)
+        stack.callback(signals.start)
         interrupt()
 
-if moment == "cleaning":  # which takes longer than the signals
+if moment == "cleaning":  # which ends after the signals
     import coartic.cli
     coartic.cli.main = clean
 else:  # milliseconds after it has begun

@@ -1,5 +1,7 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
+import contextlib
+
 import pytest
 
 from coartic import CoarticError
@@ -58,11 +60,13 @@ def test_a_scheduler_that_is_lost(tmp_path, monkeypatch):
 
     monkeypatch.setattr(cluster_module, "Local", InProcess)
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
-    with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}), cluster:
+    with contextlib.ExitStack() as stack, cluster:
 
         def watch(progress, what):
             if progress.done == 2:
                 cluster.close()
+                soon = dask.config.set({"distributed.comm.timeouts.connect": "0.5s"})
+                stack.enter_context(soon)
 
         executor = Dask(cluster.scheduler_address)
         with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):

@@ -49,7 +49,7 @@ def ticks(page, who):
 def settled(page):
     """Wait until nothing is to come."""
     page.evaluate(DRAWN)
-    page.wait_for_selector(".play[data-settled]", timeout=120_000)
+    page.wait_for_selector(".play[data-settled]")
     return page
 
 
@@ -182,7 +182,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page.get_by_role("button", name="Base").focus()
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowUp")  # it is on a rail
-    own = re.search(r"own=([^&]+)", page.url)[1]
+    own = re.search(r"own=([^&]+)", settled(page).url)[1]
     rows = [[float(value) for value in row.split(",")] for row in own.split(";")]
     movements = [
         Movement(goal, ("left", "right")[int(row[0])], "learned", np.array(row[1:]))

@@ -1,5 +1,6 @@
 """Methods in worker processes: whatever one does, it harms no other, and its runs are kept."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -227,7 +228,8 @@ def test_what_somebody_kills_is_repeated(tmp_path, whom):
             worker = [pid for pid, (parent, *_) in forked.items() if parent in server]
             killed.extend(server if whom == "server" else worker)
         for pid in killed:
-            os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):  # it has just ended
+                os.kill(pid, signal.SIGKILL)
         (tmp_path / "mine.py.killed").touch()
 
     perform(planned(cells, runs=8), tmp_path / "out", executor=Local(2), watch=kill)

@@ -3,6 +3,7 @@
 import multiprocessing
 import random
 import shutil
+import signal
 import sqlite3
 import sys
 import threading
@@ -156,10 +157,15 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
 MANY = {"runs": 60, "trials": 30}
 
 
-def perform_until_killed(folder, progress):
-    """Perform runs and say how many are kept."""
-    plan = planned(**MANY)
-    perform(plan, folder, executor=InProcess(), watch=lambda p, _: progress.send(p.done))
+def perform_until_killed(folder, most, progress):
+    """Perform so many runs, say how many are kept, and wait for the end."""
+
+    def watch(at, _):
+        progress.send(at.done)
+        while at.done >= most:
+            signal.pause()
+
+    perform(planned(**MANY), folder, executor=InProcess(), watch=watch)
 
 
 @pytest.mark.process
@@ -172,11 +178,11 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     fork = multiprocessing.get_context("fork")
     for _ in range(3):
         receive, send = fork.Pipe(duplex=False)
-        process = fork.Process(target=perform_until_killed, args=(folder, send))
+        enough = chance.randrange(24)
+        process = fork.Process(target=perform_until_killed, args=(folder, enough + 60, send))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of threads, which a fork does not have
             process.start()
-        enough = chance.randrange(24)
         while receive.recv() < enough:
             pass
         time.sleep(chance.uniform(0, 0.05))
