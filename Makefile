@@ -46,7 +46,7 @@ docs: $(VENV)/.docs
 
 # make speed LONG=1 adds suite comparison and 50,000 runs.
 speed: $(READY)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m coartic.benchmarks.speed $(if $(LONG),--long)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
 
 # The wheel and the source distribution of the last commit, each run in an empty environment.
 release-check: $(READY)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, pairwise
 from math import dist
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from coartic import (
     NotApplicableError,
@@ -34,6 +34,7 @@ from coartic.text import counted
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 CHECK_LIMIT_S = 120.0
 BUDGET = 7  # trials of the runs that are to keep to it
+_UNTOLD = ("does not declare", "own compiled", "outside its session")  # words of reasons
 
 
 class Law(NamedTuple):
@@ -63,136 +64,110 @@ def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[
         setting = Setting(task, card.name, card.code, card.told, complete, trial_budget)
         return Job(setting, card, (RunKey("check", 0, 0, seed),), CHECK_LIMIT_S)
 
-    laws = [declaration_law(card), parameters_law(card)]
+    laws = laws_of_declaration(card)
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))
     if not tasks:
         problem = "it applies to none of the shipped tasks, so nothing can be checked"
         return [*laws, Law("solution", False, problem)]
-    hopeless = list(filter(applies, [hopeless_task(tasks[0])]))
     jobs, others = [job(task) for task in tasks], [job(task, seed=2) for task in tasks]
     bounded = [job(task, trial_budget=BUDGET) for task in tasks]
-    last = [job(task) for task in hopeless]
+    last = [job(task) for task in filter(applies, [hopeless_task(tasks[0])])]
     runs = perform_in_order([*jobs, *jobs, *others, *jobs, *bounded, *last])
     names = [task.name for task in tasks]
     first, again, other, after, budget = (dict(zip(names, runs, strict=False)) for _ in range(5))
-    ends = list(runs)
+    hopeless = list(runs)
     elsewhere = dict(zip(names[-1:], perform_in_order(jobs[-1:]), strict=True))
-    seed_matters = card.stochastic
+
+    def changes(later: dict[str, Run], how: str) -> Iterator[str]:
+        for name, run in later.items():
+            yield from (f"{how.format(name)}: {each}" for each in compare_runs(first[name], run))
+
+    of_another_seed = changes(other, "declared not to be stochastic, but another seed on {}")
+    seed = "the same" if card.stochastic else "any"
+    rewards = ", ".join(f"{name} {run.reward}" for name, run in first.items())
+    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
+    used = {name for run in first.values() for name in run.used}
+    unused = {item.value for item in METERED if item.value in card.told} - used
+    ends = [f"gives {run.status}: {run.reason}" for run in hopeless]
     return [
         *laws,
-        solution_law(first, parameters),
+        law(
+            "solution",
+            (f"on {t}: {run.status}: {run.reason}" for t, run in first.items() if run.reason),
+            f"executed and scored on {rewards}" + (f" (checked with {values})" if values else ""),
+        ),
         law(
             "determinism",
             chain(
-                changes(first, again, "same seed on {}, same process"),
-                changes(first, elsewhere, "same seed on {}, another process"),
-                changes(
-                    first,
-                    {} if seed_matters else other,
-                    "declared not to be stochastic, but another seed on {}",
-                ),
+                changes(again, "same seed on {}, same process"),
+                changes(elsewhere, "same seed on {}, another process"),
+                () if card.stochastic else of_another_seed,
             ),
-            f"the same result under {'the same' if seed_matters else 'any'} seed, in one process "
-            "and in another",
+            f"the same result under {seed} seed, in one process and in another",
         ),
         law(
             "no hidden state",
-            changes(first, after, "after other runs, {} with the same seed"),
+            changes(after, "after other runs, {} with the same seed"),
             "other runs in between change nothing",
         ),
-        budget_law(budget),
-        information_law(card, first),
-        failure_law(ends),
+        law(
+            "limits",
+            (
+                f"a budget of {BUDGET} trials on {name}: {run.reason or run.meter}"
+                for name, run in budget.items()
+                if run.status not in ("ok", "infeasible")
+                or (run.meter and run.meter.trials > BUDGET)
+            ),
+            f"keeps to a budget of {BUDGET} trials",
+        ),
+        law(
+            "information",
+            [
+                *(
+                    f"on {name}: {run.reason}"
+                    for name, run in first.items()
+                    if any(words in run.reason for words in _UNTOLD)
+                ),
+                *[f"declared but never used: {', '.join(sorted(unused))}"] * bool(unused),
+            ],
+            f"declared and used: {', '.join(sorted(used)) or 'nothing'}",
+        ),
+        law(
+            "failure",
+            (
+                f"on a task that nobody can complete it gives {run.status} {run.reason}; it should "
+                "give infeasible, with a reason"
+                for run in hopeless
+                if run.status not in ("infeasible", "solver-failed")
+            ),
+            f"a task that nobody can complete {ends[0]}"
+            if ends
+            else "says beforehand that it does not apply to a task without a solution",
+        ),
     ]
 
 
-def changes(before: dict[str, Run], runs: dict[str, Run], how: str) -> Iterator[str]:
-    """Differences of runs from earlier runs of the same task, in words."""
-    for task, run in runs.items():
-        for difference in compare_runs(before[task], run):
-            yield f"{how.format(task)}: {difference}"
-
-
-def declaration_law(card: MethodCard) -> Law:
-    """Title and citation are there."""
+def laws_of_declaration(card: MethodCard) -> list[Law]:
+    """Title and citation are there; the parameters survive JSON, are checked and cannot be
+    changed."""
     empty = [name for name in ("title", "citation") if not getattr(card, name).strip()]
-    finding = f"{card.title}; told: {', '.join(card.told) or 'nothing'}"
-    return law("declaration", (f"{name} is empty" for name in empty), finding)
-
-
-def parameters_law(card: MethodCard) -> Law:
-    """The parameters survive JSON, are checked and cannot be changed."""
-    parameters = card.complete({})
-
-    def problems() -> Iterator[str]:
-        again = card.complete(parameters)
-        if again != parameters:
-            yield f"written as JSON and read back, they change: {parameters} became {again}"
-        config = card.rules()["config"]
-        if config.get("extra") != "forbid":
-            yield "an unknown parameter is accepted; forbid extra keys"
-        if config.get("frozen") is not True:
-            yield "they can be changed after validation; freeze them"
-
-    return law("parameters", problems(), list_values(parameters) or "none")
-
-
-def list_values(parameters: dict[str, Any]) -> str:
-    """Parameters with their values."""
-    return ", ".join(f"{key}={value}" for key, value in parameters.items())
-
-
-def solution_law(runs: dict[str, Run], parameters: dict[str, Any]) -> Law:
-    """Every solution can be executed and hits all goals."""
-    problems = (
-        f"on {task}: {run.status}: {run.reason}" for task, run in runs.items() if run.status != "ok"
-    )
-    rewards = ", ".join(f"{task} {run.reward}" for task, run in runs.items())
-    checked_with = f" (checked with {list_values(parameters)})" if parameters else ""
-    return law("solution", problems, f"executed and scored on {rewards}{checked_with}")
-
-
-def budget_law(runs: dict[str, Run]) -> Law:
-    """The method keeps to its budget of trials."""
-    problems = (
-        f"a budget of {BUDGET} trials on {task}: {run.reason or (run.meter and run.meter.trials)}"
-        for task, run in runs.items()
-        if run.status not in ("ok", "infeasible") or (run.meter and run.meter.trials > BUDGET)
-    )
-    return law("limits", problems, f"keeps to a budget of {BUDGET} trials")
-
-
-def information_law(card: MethodCard, runs: dict[str, Run]) -> Law:
-    """The method uses all that it declares, and nothing else."""
-    declared = {item.value for item in METERED if item.value in card.told}
-    used = {name for run in runs.values() for name in run.used}
-    problems = [
-        f"on {task}: {run.reason}"
-        for task, run in runs.items()
-        if any(
-            words in run.reason
-            for words in ("does not declare", "own compiled", "outside its session")
-        )
+    parameters, config = card.complete({}), card.rules()["config"]
+    again, problems = card.complete(parameters), []
+    if again != parameters:
+        problems.append(f"written as JSON and read back, {parameters} became {again}")
+    if config["extra"] != "forbid":
+        problems.append("an unknown parameter is accepted; forbid extra keys")
+    if config["frozen"] is not True:
+        problems.append("they can be changed after validation; freeze them")
+    values = ", ".join(f"{key}={value}" for key, value in parameters.items())
+    return [
+        law(
+            "declaration",
+            (f"{name} is empty" for name in empty),
+            f"{card.title}; told: {', '.join(card.told) or 'nothing'}",
+        ),
+        law("parameters", problems, values or "none"),
     ]
-    if declared - used:
-        problems.append(f"declared but never used: {', '.join(sorted(declared - used))}")
-    return law(
-        "information", problems, f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
-    )
-
-
-def failure_law(runs: Sequence[Run]) -> Law:
-    """The method gives a reason where a task cannot be completed."""
-    problems = (
-        f"on a task that nobody can complete it gives {run.status} {run.reason}; it should "
-        "give infeasible, with a reason"
-        for run in runs
-        if run.status not in ("infeasible", "solver-failed")
-    )
-    finding = "says beforehand that it does not apply to a task without a solution"
-    for run in runs:
-        finding = f"a task that nobody can complete gives {run.status}: {run.reason}"
-    return law("failure", problems, finding)
 
 
 def hopeless_task(like: Task) -> Task:
@@ -214,7 +189,6 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
         task = load_task(path)
     except TaskError as error:
         return [Law("valid", False, str(error))]
-    goals = counted(len(task.goals), "goal")
     shipped = task.name in builtin_tasks() and load_task(task.name) != task
     near = (
         f"goals {number} and {number + 1} lie within one radius of each other: hitting the first "
@@ -222,39 +196,34 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
         for number, (goal, after) in enumerate(pairwise(task.goals), 1)
         if dist(goal, after) <= task.radius
     )
-    unsourced = [key for key in ("goals", "start") if key not in task.provenance]
+    solved, unsolved = "", []
+    try:
+        hands = initial_hands(check_task(task))
+        execution = corrective_trial(task, hands)
+        solved = f"initial hands {hands} complete it with {execution.reward}"
+        if not execution.completed:
+            unsolved = [f"initial hands {hands}: {execution.reason}"]
+    except (NotApplicableError, TaskError) as error:
+        unsolved = [str(error)]
+    unsourced = " and ".join(key for key in ("goals", "start") if key not in task.provenance)
     methods = [name for name, card in registered.items() if card.why_not(task) is None]
     return [
-        Law("valid", True, f"{task.name}, {goals}, {' and '.join(task.hands)} hand"),
+        Law("valid", True, f"{task.name}, {counted(len(task.goals), 'goal')}"),
         law(
             "name",
             [f"name {task.name!r} belongs to a different, shipped task"] * shipped,
             f"name {task.name!r} is its own",
         ),
         law("distinct goals", near, "successive goals lie apart"),
-        solvable_law(task),
+        law("solvable", unsolved, solved),
         law(
             "provenance",
-            [f"no source and status for {' and '.join(unsourced)} ([provenance])"]
-            * bool(unsourced),
+            [f"no source and status for {unsourced} ([provenance])"] * bool(unsourced),
             "goals and start have a source and a status",
         ),
-        Law(
+        law(
             "methods",
-            bool(methods),
-            f"{counted(len(methods), 'method')} can solve it, such as {', '.join(methods[:2])}"
-            if methods
-            else "no method applies to it",
+            ["no method applies to it"] * (not methods),
+            f"{counted(len(methods), 'method')} can solve it, such as {', '.join(methods[:2])}",
         ),
     ]
-
-
-def solvable_law(task: Task) -> Law:
-    """The corrective process alone completes it."""
-    try:
-        hands = initial_hands(check_task(task))
-    except (NotApplicableError, TaskError) as error:
-        return Law("solvable", False, str(error))
-    execution = corrective_trial(task, hands)
-    reason = [f"initial hands {hands}: {execution.reason}"] * (not execution.completed)
-    return law("solvable", reason, f"initial hands {hands} complete it with {execution.reward}")

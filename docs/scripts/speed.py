@@ -1,6 +1,6 @@
 """How fast trials are, through each public way and in each of the paper's cells; and commands.
 
-    python -m coartic.benchmarks.speed [--long]
+    python docs/scripts/speed.py [--long]
 
 Times depend on the machine; compare ratios, and times of one call. ``--long`` also runs suite
 ``comparison`` and 50,000 runs of a suite, which takes minutes.
