@@ -70,7 +70,7 @@ def runtimes(
         names = [id_named(name, called) for name in wanted]
         for name in names:
             if name not in labels:
-                raise CoarticError(unknown("method", name, labels, called))
+                raise CoarticError(unknown("method", name, labels))
         tasks = [task for task in tasks if all(task in labels[name] for name in names)]
         if not tasks:
             raise CoarticError(f"no task has runs of all of {', '.join(names)}")

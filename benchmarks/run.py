@@ -30,7 +30,6 @@ from coartic.text import counted
 LEAST_BATCH = 8
 """Runs of a cell that are not divided among workers."""
 _SURE = frozenset({"ok", "infeasible"})  # whatever else is in the batch
-_RETRIED = frozenset({"timeout", "crashed"})
 
 
 @dataclass(repr=False)
@@ -154,7 +153,6 @@ def perform(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    retry_failed: bool = False,
     watch: Watcher = lambda progress, what: None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
@@ -169,8 +167,6 @@ def perform(
         Results folder, made where there is none.
     executor : Executor, optional
         Where methods run; by default this machine, in a process for every core.
-    retry_failed : bool
-        Perform anew the runs that timed out or crashed.
     watch : callable
         Called before the first run and after each.
 
@@ -190,7 +186,7 @@ def perform(
     with writing(folder) as store:
         store.replace_plan(plan, current_environment(), command(), now())
         progress = Progress(folder, plan.size, stale=store.stale())
-        missing = missing_jobs(plan, store, progress, retry_failed=retry_failed)
+        missing = missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.setting.method] += len(job.keys)
         progress.workers = executor.workers
@@ -215,13 +211,14 @@ def perform(
         return progress
 
 
-def missing_jobs(plan: Plan, store: Store, progress: Progress, *, retry_failed: bool) -> list[Job]:
-    """The runs to perform, a job for each cell; those that are there are counted. Runs of a
-    method whose code is not here stay as they are."""
+def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
+    """The runs to perform, a job for each cell; those that are there are counted. What crashed is
+    performed again, and what took too long where it may now take longer, unless the code of its
+    method is not here."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         longer = had_s is not None and (plan.time_limit_s is None or plan.time_limit_s > had_s)
-        failed = status in _RETRIED and (retry_failed or (status == "timeout" and longer))
+        failed = status == "crashed" or (status == "timeout" and longer)
         if not (plan.cells[position].method.where and failed):
             there.add((position, number))
             progress.present += 1

@@ -52,7 +52,6 @@ _PLAINER = {
     r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
 }
 """Wordings of pydantic, and what they say to a person."""
-_BRIEF = 80  # characters of a value in a sentence
 
 
 class FileData(BaseModel):
@@ -84,7 +83,7 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
     except OSError as failure:
         raise error(f"{shown}: cannot be read: {failure.strerror or failure}") from None
     except (ValueError, RecursionError) as failure:  # TOMLDecodeError is a ValueError
-        raise error(f"{shown}: is not valid TOML: {brief(str(failure))}") from None
+        raise error(f"{shown}: is not valid TOML: {plain(str(failure), 80)}") from None
 
 
 def check_file(path: str | Path, *, error: type[CoarticError] = CoarticError) -> None:
@@ -129,16 +128,9 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
     return array.astype(np.float64, copy=False)
 
 
-def brief(text: str) -> str:
-    """A text as one short printable line, with its length where it is cut."""
-    if len(text) <= _BRIEF:
-        return plain(text)
-    return f"{plain(text[:60])}... ({len(text)} characters)"
-
-
 def brief_value(value: object) -> str:
-    """A value as it would be written in Python, as :func:`brief` shows it."""
-    return brief(repr(value))
+    """A value as it would be written in Python, as one short printable line."""
+    return plain(repr(value), 80)
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
@@ -146,7 +138,9 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
     ``keys`` are the keys that it may have, wherever they belong.
     """
-    details, shown, keys = causes(error), plain(source), list(keys)
+    details, shown, keys = error.errors(include_url=False), plain(source), list(keys)
+    # A list is counted too short without its bad entries.
+    details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(explain_problem(detail, keys)) for detail in details[:_SHOWN])
     lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
     if len(details) > _SHOWN:
@@ -156,26 +150,9 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
-    return "; ".join(plain(explain_problem(detail, keys)) for detail in causes(error)[:_SHOWN])
-
-
-def causes(error: ValidationError) -> list[ErrorDetails]:
-    """The errors, without a list counted too short because of its bad entries."""
-    details = error.errors(include_url=False)
-
-    def has_bad_entry(place: tuple[int | str, ...]) -> bool:
-        return any(d["loc"] != place and d["loc"][: len(place)] == place for d in details)
-
-    return [d for d in details if d["type"] != "too_short" or not has_bad_entry(d["loc"])]
-
-
-def key_path(location: tuple[int | str, ...]) -> str:
-    """Where in a file: ``goals[1][0]``, ``robot.left_links``."""
-    text = ""
-    for part in location:
-        name = brief(str(part))
-        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
-    return text
+    return "; ".join(
+        plain(explain_problem(detail, keys)) for detail in error.errors(include_url=False)[:_SHOWN]
+    )
 
 
 def error_saying(text: str) -> PydanticCustomError:
@@ -185,7 +162,10 @@ def error_saying(text: str) -> PydanticCustomError:
 
 def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
-    key, message = key_path(detail["loc"]), detail["msg"]
+    key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
+    for part in detail["loc"]:
+        name = plain(str(part), 80)
+        key += f"[{name}]" if isinstance(part, int) else f".{name}" if key else name
     match detail["type"]:
         case "sentence":
             return message

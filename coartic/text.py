@@ -18,14 +18,11 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 LONGEST_LINE = 500
-"""Characters of a title, a description or a citation."""
+"""Characters of a title, a description, a citation or the ``repr`` of an object."""
 LONGEST_REASON = 2000
 """Characters of a reason that is kept."""
-LONGEST_REPR = 500
-"""Characters of the ``repr`` of an object: five lines of 100."""
 _MOST_NAMED = 12  # in a sentence
 _MOST_FIGURES = 12  # of an array in a repr
-_LONGEST_FACT = 80  # characters in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
@@ -66,49 +63,41 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
-def short_repr(thing: object, /, *texts: str, **facts: object) -> str:
-    """The ``repr`` of an object: ``Name(text, fact=value)``, of at most :data:`LONGEST_REPR`
+def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
+    """The ``repr`` of an object: ``Name(text, fact=value)``, of at most :data:`LONGEST_LINE`
     characters.
 
     ``texts`` stand as they are. Of arrays with more than a few figures the shape is shown.
     """
-    parts = [*texts, *(f"{name}={shown_fact(value)}" for name, value in facts.items())]
-    return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_REPR)
-
-
-def shown_fact(value: Any) -> str:
-    """A value as one short line: a NumPy array by its figures or its shape, others by ``repr``."""
-    if hasattr(value, "shape") and hasattr(value, "tolist"):
-        if len(value.shape) == 1 and value.size <= _MOST_FIGURES:
+    parts = list(texts)
+    for name, value in facts.items():
+        if not hasattr(value, "shape"):
+            shown = plain(repr(value), 80)
+        elif len(value.shape) == 1 and value.size <= _MOST_FIGURES:
             figures = (f"{x:.4g}" if isinstance(x, float) else repr(x) for x in value.tolist())
-            return plain(f"[{', '.join(figures)}]", _LONGEST_FACT + 20)
-        return f"<array of shape {value.shape}>"
-    return plain(repr(value), _LONGEST_FACT)
+            shown = plain(f"[{', '.join(figures)}]", 100)
+        else:
+            shown = f"<array of shape {value.shape}>"
+        parts.append(f"{name}={shown}")
+    return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_LINE)
 
 
-def did_you_mean(name: str, names: Iterable[str], called: Mapping[str, str] | None = None) -> str:
+def did_you_mean(name: str, names: Iterable[str]) -> str:
     """``; did you mean 'a'?`` with the name that is nearest; empty where none is near.
 
     Near are names that differ in small letters and punctuation, begin so, are spelt alike or end in
-    the same word, in this order. ``called``: names by which people know some of them; either is
-    near, and both are said, ``; did you mean 'cma-es/bandit' (CMA-ES)?``.
+    the same word, in this order.
     """
-    ids = dict.fromkeys(names, "") | dict(called or {})
-    said = {each: f"{each!r} ({words})" if words else repr(each) for each, words in ids.items()}
-    known = [(_words(text), each) for each, words in ids.items() for text in (words, each) if text]
-    by_words = dict(reversed(known))
-    meant = _words(name)
-    joined, last = "".join(meant), meant[-1:]
-    spelt = {"".join(words): each for words, each in reversed(by_words.items())}
-    hyphened = {"-".join(words): each for words, each in by_words.items()}
-    near = difflib.get_close_matches("-".join(meant), hyphened, 1)
-    hints = [
-        *(each for text, each in spelt.items() if text == joined),
-        *(each for text, each in spelt.items() if joined and text.startswith(joined)),
-        *(hyphened[text] for text in near),
-        *(each for words, each in reversed(by_words.items()) if last and words[-1:] == last),
-    ]
-    return f"; did you mean {said[hints[0]]}?" if hints and joined else ""
+    words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}
+    meant = words.pop(name)
+    if not meant:
+        return ""
+    begin = [each for each in words if "".join(words[each]).startswith("".join(meant))]
+    spelt = {" ".join(words[each]): each for each in reversed(words)}
+    alike = [spelt[each] for each in difflib.get_close_matches(" ".join(meant), spelt, 1)]
+    last = [each for each in words if words[each][-1:] == meant[-1:]]
+    nearest = [*sorted(begin, key=len), *alike, *last]
+    return f"; did you mean {nearest[0]!r}?" if nearest else ""
 
 
 def id_named(name: str, names: Mapping[str, str]) -> str:
@@ -122,33 +111,21 @@ def id_named(name: str, names: Mapping[str, str]) -> str:
     return name if name in names else next(iter(alike + called), name)
 
 
-def _words(name: str) -> tuple[str, ...]:
-    """The words of a name in small letters, without all that is neither letter nor digit."""
-    return tuple(re.findall(r"[^\W_]+", name.lower()))
-
-
-def unknown(
-    kind: str, name: str, names: Iterable[str], called: Mapping[str, str] | None = None
-) -> str:
+def unknown(kind: str, name: str, names: Iterable[str]) -> str:
     """A sentence on a name that is not among some names: the nearest of them, or all."""
     several = list(names)
-    hint = did_you_mean(name, several, called)
     shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
     more = f" and {len(several) - shown} others" if len(several) > shown else ""
-    return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}" + (
-        hint or f". Known: {', '.join(several[:shown])}{more}."
-    )
+    known = f". Known: {', '.join(several[:shown])}{more}."
+    hint = did_you_mean(name, several) or known
+    return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 
 def refuse_unprintable(text: str) -> str:
     """The text itself; a validation error where it is not one printable line."""
-    for c in text:
-        if not prints(c):
-            raise PydanticCustomError(
-                "not_plain",
-                "should be one line of printable text, without {escape}",
-                {"escape": escape(c)},
-            )
+    if wrong := next((c for c in text if not prints(c)), ""):
+        words = f"should be one line of printable text, without {escape(wrong)}"
+        raise PydanticCustomError("not_plain", "{words}", {"words": words})
     return text
 
 

@@ -223,10 +223,11 @@ def test_what_is_like_no_name_has_no_hint(name):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        *((["run", "paper", "--jobs", v], f"--jobs {v}: it must be -1") for v in ("0", "-2", "x")),
-        (["draw", "ascending", "--out", ""], "--out is empty"),
+        (["run", "paper", "--runs", "0"], "runs is 0; it must be a whole number from 1"),
+        (["run", "paper", "--tasks", ""], "unknown task ''"),
+        (["draw", "ascending", "--out", ""], "is empty"),
         (["draw", "ascending", "--out", "a" * 5000], "File name too long"),
-        (["animate", "x", "--out", ""], "--out is empty"),
+        (["animate", "x", "--out", ""], "is empty"),
         (["report", "a" * 5000], "File name too long"),
         (["run", "paper", "--out", "a" * 5000], "File name too long"),
         (["check", "/dev/zero.toml"], "no such file"),
@@ -235,7 +236,7 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["check", "two-armed/v1/i003"], "coartic draw"),
         (["run"], "name a suite: ablations, "),
         (["run", "papr"], "did you mean 'paper'"),
-        (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "a method, with --task TASK"),
+        (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
         (["report", "nowhere"], "nowhere"),
         (["verify", "nowhere"], "nowhere"),
         (["trace", "cells", "--in", "nowhere"], "nowhere"),

@@ -1,7 +1,6 @@
 """The command line as a user meets it."""
 
 import os
-import re
 import signal
 import sqlite3
 import subprocess
@@ -80,16 +79,25 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
     assert "1 failed" in text
 
 
-def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys):
-    monkeypatch.setenv("FORCE_COLOR", "1")
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal):
     monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
     progress = Progress(Path("results"), 63, done=28, timed=Counter(x=28), waiting=Counter(x=35))
     progress.took["x"] = 2800.0
-    with Display("paper") as display:
+    with Display() as display:
         display.update(progress, f"two-armed-1 {'method' * 20}")
-    shown = re.sub("\x1b[^A-Za-z]*[A-Za-z]|\r", "", capsys.readouterr().err)
-    assert re.search("28/63 0 failed about 58 min 20 s left +two-armed-1", shown)
-    assert len(shown.splitlines()[-1]) % 80 == 0  # drawn in its place, each time as wide
+        progress.done = 63
+        display.update(progress, "two-armed-1 x")
+    shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
+    if is_terminal:
+        assert shown[1].startswith("28 of 63 runs, 0 failed, about 58 min 20 s left: two-armed-1 m")
+        assert {*map(len, shown)} == {0, 79}  # drawn in its place, each time as wide
+    assert [line.rstrip() for line in shown[-2:]] == (
+        ["63 of 63 runs, 0 failed: two-armed-1 x", ""]
+        if is_terminal
+        else ["63 of 63 runs, 0 failed", ""]
+    )
 
 
 def test_check(coartic, tmp_path):

@@ -25,7 +25,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
-from coartic.cli.draw import median_run
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
 from tests.support.commands import call
@@ -105,19 +104,6 @@ def delete(path, run_id):
     with closing(sqlite3.connect(path)) as db:
         db.execute("DELETE FROM results WHERE run_id = ?", (run_id,))
         db.commit()
-
-
-def test_the_median_run_goes_by_the_names_of_people(traced, tables_by_name):
-    chosen = median_run(traced.folder, "learner EC4", "Two-armed 1")
-    runs = traced.cells["two-armed-1", "dual-process/EC4"].good.set_index("run_id").reward
-    off = (runs - runs.median()).abs()
-    assert off[chosen] == off.min()
-    shown = tables_by_name["methods"].median_run["two-armed-1 dual-process/EC4"]
-    assert chosen.startswith(shown)
-    assert median_run(traced.folder, "EC4", "two-armed-1") == chosen
-    with pytest.raises(CoarticError, match=r"did you mean 'two-armed-1' \(Two-armed 1\)") as caught:
-        median_run(traced.folder, "learner EC9", "two-armed1")
-    assert len(str(caught.value).splitlines()) == 2
 
 
 HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'

@@ -293,8 +293,7 @@ def test_what_is_performed_again(undisturbed, tmp_path):
     assert counts(time_limit_s=0.5) == (9, 0, 9, 0)
     assert counts(Failing(0), time_limit_s=2.0) == (0, 9, 1, 1)
     assert load(tmp_path).runs.status.tolist() == ["crashed"] + ["ok"] * 8
-    assert counts(time_limit_s=3.0) == (9, 0, 1, 1)
-    assert counts(retry_failed=True) == (8, 1, 0, 0)
+    assert counts(time_limit_s=3.0) == (8, 1, 0, 0)
     assert load(tmp_path).runs.result.tolist() == undisturbed.runs.result.tolist()
 
 

@@ -61,7 +61,7 @@ def row_named(table: str, frame: pd.DataFrame, name: str) -> str:
     called = names_of(frame)
     row = id_named(name, called)
     if row not in called:
-        hint = did_you_mean(name, called, {k: words for k, words in called.items() if words != k})
+        hint = did_you_mean(name, [*called, *called.values()])
         hint = hint or "; without a row, the command lists them"
         raise CoarticError(f"table {table} has no row {name!r}{hint}")
     return row

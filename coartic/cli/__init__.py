@@ -19,7 +19,7 @@ import typer
 
 import coartic
 from coartic.cli import draw, new, play, read, run
-from coartic.cli.terminal import complain, say
+from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
 app = typer.Typer(
@@ -66,14 +66,6 @@ for command, example in COMMANDS:
 app.add_typer(new.group, name="new")
 
 
-class Said(logging.Handler):
-    """Prints the log of the package."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """One record, to standard error."""
-        say(record.getMessage(), stream=sys.stderr)
-
-
 def main() -> None:
     """Run the command line; exit code 2 for errors that the user can put right."""
     gc.set_threshold(100_000, 50, 1_000)  # what is imported stays: do not look through it often
@@ -82,7 +74,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: complain("Warning", str(message))
     logging.getLogger("coartic").setLevel(logging.INFO)
-    logging.getLogger("coartic").addHandler(Said())
+    logging.getLogger("coartic").addHandler(logging.StreamHandler())
     os.environ["MPLBACKEND"] = "agg"  # no window is opened, whatever is set
     if os.path.lexists("matplotlibrc"):  # its settings name programs to run: it may be a stranger's
         with contextlib.chdir(os.path.dirname(__file__)):

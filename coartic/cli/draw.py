@@ -10,7 +10,8 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.text import counted, id_named, unknown
+from coartic.files import folder_named
+from coartic.text import counted
 
 _PICTURED = 12
 """Tasks of a picture, at most."""
@@ -24,9 +25,7 @@ def draw(
     out: Annotated[
         Path,
         typer.Option(
-            parser=given.output_named,
-            metavar="FILE",
-            help="Picture (.png, .svg, .pdf), or a folder.",
+            parser=folder_named, metavar="FILE", help="Picture (.png, .svg, .pdf), or a folder."
         ),
     ] = Path("tasks.svg"),
     replace: given.Replace = False,
@@ -57,31 +56,20 @@ def draw(
 
 
 def animate(
-    run: Annotated[
-        str, typer.Argument(metavar="RUN", help="Id of a run, or with --task a method.")
-    ],
+    run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
     out: Annotated[
         Path,
-        typer.Option(
-            parser=given.output_named, metavar="FILE", help="Film to write: .gif or .mp4."
-        ),
+        typer.Option(parser=folder_named, metavar="FILE", help="Film to write: .gif or .mp4."),
     ] = Path("film.gif"),
     other: Annotated[
-        str | None, typer.Argument(metavar="OTHER", help="Another one to show beside it.")
-    ] = None,
-    task: Annotated[
-        str | None,
-        typer.Option(metavar="TASK", help="Show methods on this task, by their median runs."),
+        str | None, typer.Argument(metavar="OTHER", help="Another run to show beside it.")
     ] = None,
     folder: given.In = Path("results"),
     initial: Annotated[
         bool, typer.Option("--initial", help="Show the initial solution beside it.")
     ] = False,
     width: Annotated[
-        int,
-        typer.Option(
-            parser=given.whole("--width", 200, 3840), metavar="N", help="Width in pixels."
-        ),
+        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
     ] = 800,
     replace: given.Replace = False,
 ) -> None:
@@ -95,8 +83,7 @@ def animate(
     if initial and other is not None:
         raise CoarticError("--initial shows one run beside its initial solution: give one run.")
     movements = []
-    for name in (run,) if other is None else (run, other):
-        run_id = name if task is None else median_run(folder, name, task)
+    for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
         movement, number = trajectory_of(place, found), found.key.number
         title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
@@ -108,35 +95,3 @@ def animate(
     panels = [Panel(title, m.task, m.hands, m.configurations, m.hits) for title, m in movements]
     frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
-
-
-def median_run(folder: Path, method: str, task: str) -> str:
-    """Id of the run of a method on a task whose reward is nearest the median, in a results folder
-    or the one below a folder that has such runs.
-
-    Both may go by people's names. Raises CoarticError where there is none, or more than one folder.
-    """
-    from coartic.analysis.methods import name_of
-    from coartic.analysis.study import load, typical_run
-    from coartic.learner.conditions import METHOD_PREFIX
-    from coartic.runs.store import RUNS_FILE
-
-    found, labels, tasks = dict[Path, str](), dict[str, str](), dict[str, str]()
-    for place in sorted(path.parent for path in folder.rglob(RUNS_FILE)):
-        study = load(place)
-        labels |= {label: name_of(label) for _, label in study.cells}
-        tasks |= {name: each.label for name, each in study.tasks.items()}
-        on, label = id_named(task, tasks), id_named(method, labels)
-        keys = (on, label), (on, f"{METHOD_PREFIX}{label}")
-        cell = next((study.cells[key] for key in keys if key in study.cells), None)
-        if cell is not None and len(cell.good):
-            found[place] = str(cell.good.run_id.iloc[typical_run(cell)])
-    if len(found) > 1:
-        places = ", ".join(map(str, found))
-        raise CoarticError(f"several folders have such runs: name one with --in ({places})")
-    if not found:
-        asked = ("task", task, tasks), ("method", method, labels)
-        wrong = [unknown(*each, each[2]) for each in asked if id_named(*each[1:]) not in each[2]]
-        none = f"there is no solution of {method} on {task} in {folder}"
-        raise CoarticError("\n".join(wrong) or none)
-    return next(iter(found.values()))

@@ -23,10 +23,7 @@ def _group() -> None:
 @group.command("method")
 def new_method(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its id, such as my-search.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(parser=given.output_named, metavar="FILE", help="File to write (.py)."),
-    ] = None,
+    out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
     """Write a method that works, to be changed into one of your own."""

@@ -17,14 +17,7 @@ def play(
         str | None,
         typer.Argument(metavar="TASK", help="Task to begin with, or a task file (.toml)."),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            parser=given.output_named,
-            metavar="FILE",
-            help="File to write; a temporary one if not given.",
-        ),
-    ] = None,
+    out: given.Out = None,
     show: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
     replace: given.Replace = False,
 ) -> None:

@@ -21,19 +21,21 @@ from coartic.text import counted, one_line, unknown
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
 
-_ReportFolder = Annotated[
-    Path | None,
-    typer.Option(
-        parser=folder_named, metavar="FOLDER", help="Where to write; FOLDER/report if not given."
-    ),
-]
-_ForPaper = Annotated[
-    bool,
-    typer.Option("--for-paper", help="Also figures as PDF and tables as LaTeX."),
-]
 
-
-def report(folder: given.Results, out: _ReportFolder = None, for_paper: _ForPaper = False) -> None:
+def report(
+    folder: given.Results,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            parser=folder_named,
+            metavar="FOLDER",
+            help="Folder to write; FOLDER/report if not given.",
+        ),
+    ] = None,
+    for_paper: Annotated[
+        bool, typer.Option("--for-paper", help="Also figures as PDF and tables as LaTeX.")
+    ] = False,
+) -> None:
     """Write the report of a results folder."""
     out = folder / "report" if out is None else out
     from coartic.analysis.report.build import write_report

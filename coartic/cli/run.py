@@ -5,16 +5,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.arguments import split_names
 from coartic.cli.read import answers_in_words
 from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.interruption import interruptible
 from coartic.text import counted, one_line, unknown
+from coartic.threads import MOST_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
@@ -23,25 +25,60 @@ if TYPE_CHECKING:
 
 
 def run(
-    suite: given.SuiteName = None,
-    folder: given.Out = None,
-    runs: given.RunCount = None,
-    trials: given.TrialCount = None,
-    jobs: given.Jobs = -1,
-    tasks: given.Tasks = None,
-    methods: given.Methods = None,
+    suite: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SUITE", help="Suite to run (`coartic list` names them), or a TOML file."
+        ),
+    ] = None,
+    folder: Annotated[
+        str | None,
+        typer.Option(
+            "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
+        ),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each cell.")] = None,
+    trials: Annotated[int | None, typer.Option(metavar="N", help="Trials of each run.")] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, max=MOST_JOBS, metavar="N", help="Processes; by default one a core."),
+    ] = None,
+    tasks: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Only these tasks, such as two-armed-1, or files (TOML)."),
+    ] = None,
+    methods: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="Only these methods, such as EC4, CMA-ES or 'optimum/*'."),
+    ] = None,
     method_file: given.MethodFiles = None,
-    family_file: given.FamilyFiles = None,
-    seed: given.Seed = 0,
-    time_limit: given.TimeLimit = None,
-    trial_budget: given.TrialBudget = None,
-    scheduler: given.Scheduler = None,
-    retry_failed: given.RetryFailed = False,
-    beside: given.Beside = None,
+    family_file: Annotated[
+        list[Path] | None,
+        typer.Option(readable=False, metavar="FILE", help="A family of your own (TOML)."),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the suite.")] = 0,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Most CPU time of a run.")
+    ] = None,
+    trial_budget: Annotated[
+        int | None, typer.Option(metavar="N", help="Most trials that a run may make.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead of this machine."),
+    ] = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Put these results beside: a folder, or 'released' for the shipped ones.",
+        ),
+    ] = None,
 ) -> None:
     """Run the missing part of a suite and say what came out.
 
-    If it is interrupted, repeat the command; it resumes where it stopped.
+    If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
+    crashed.
     """
     from coartic.benchmarks.beside import put_beside
     from coartic.benchmarks.cluster import Dask
@@ -51,12 +88,15 @@ def run(
     from coartic.benchmarks.run import perform
     from coartic.benchmarks.suites import load_suite, suites
 
+    def named(text: str | None) -> list[str]:
+        return [] if text is None else [name.strip() for name in text.split(",")]
+
     if suite is None:
         raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     registered = registry(method_file or ())
-    names = given.methods_meant(split_names(methods, "--methods"), registered)
+    names = given.methods_meant(named(methods), registered)
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
     plan = plan_suite(
@@ -64,14 +104,14 @@ def run(
         runs=runs,
         trials=trials,
         seed=seed,
-        tasks=given.tasks_meant(split_names(tasks, "--tasks")),
+        tasks=given.tasks_meant(named(tasks)),
         methods=names,
         method_files=method_file or (),
         family_files=family_file or (),
         time_limit_s=time_limit,
         trial_budget=trial_budget,
     )
-    display = Display(chosen.name)
+    display = Display()
 
     def saved() -> str:
         done = counted(display.done, "finished run")
@@ -81,10 +121,8 @@ def run(
         if beside:
             display.line(f"Copying {' and '.join(beside)}.")
             plan = put_beside(plan, beside, out)
-        executor = Local(jobs) if scheduler is None else Dask(scheduler, say=display.line)
-        report = perform(
-            plan, out, executor=executor, retry_failed=retry_failed, watch=display.update
-        )
+        executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
+        report = perform(plan, out, executor=executor, watch=display.update)
     say(str(report))
     from coartic.analysis.study import load
 
@@ -94,7 +132,12 @@ def run(
         sys.exit(1)
 
 
-def list_(name: given.Something = None, method_file: given.MethodFiles = None) -> None:
+def list_(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Task, suite, method or family.")
+    ] = None,
+    method_file: given.MethodFiles = None,
+) -> None:
     """List tasks, suites and methods, or describe one of them."""
     from coartic.benchmarks.registry import registry
 
@@ -162,9 +205,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         except CoarticError as error:
             names = dict.fromkeys([*suites(), *builtin_tasks(), *shipped_families()], "")
             names |= given.method_names(registered)
-            raise CoarticError(
-                unknown("task, suite, method or family", name, names, names)
-            ) from error
+            raise CoarticError(unknown("task, suite, method or family", name, names)) from error
         for method in methods:
             yield from describe_method(registered[method])
 
@@ -186,7 +227,7 @@ def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
 
 
 def reproduce(
-    run_id: given.RunId,
+    run_id: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
     folder: given.In = Path("results"),
     method_file: given.MethodFiles = None,
 ) -> None:
@@ -217,7 +258,15 @@ def reproduce(
     say("Performed again: identical.")
 
 
-def check(subject: given.Subject, method_file: given.MethodFiles = None) -> None:
+def check(
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME", help="A method, EC4 or 'optimum/*', or a task file (.toml)."
+        ),
+    ],
+    method_file: given.MethodFiles = None,
+) -> None:
     """Check a method or a task file against the rules."""
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry

@@ -67,11 +67,11 @@ def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial
     )
 
 
-def run_and_write(folder, cells=None, *, executor=None, retry_failed=False, **options):
+def run_and_write(folder, cells=None, *, executor=None, **options):
     """Perform such a plan into a folder; what the folder then says."""
     plan = planned(cells, **options)
     executor = executor or InProcess()
-    perform(plan, folder, executor=executor, retry_failed=retry_failed)
+    perform(plan, folder, executor=executor)
     return load(folder)
 
 
