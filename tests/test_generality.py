@@ -14,7 +14,7 @@ from coartic.analysis.sections import TABLES
 from coartic.analysis.topics.families import instances
 from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
 from coartic.analysis.topics.families.instances import best_of_instances, signs, solved
-from coartic.tasks.families import instances_in
+from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, row, study_of
 
@@ -46,7 +46,7 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
     """Rewards of conditions by label: a number, or a function of the instance's number."""
     rows, tasks, best = [], [], {}
     for family in families:
-        for number, name in enumerate(instances_in(f"{family}/{split}000..{split}{count - 1:03d}")):
+        for number, name in enumerate(named_by(f"{family}/{split}000..{split}{count - 1:03d}")):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from coartic.errors import TaskError
 from coartic.inputs import brief_value
-from coartic.tasks.families import check_instance, instance
+from coartic.tasks.families import instance
 from coartic.tasks.task import Task, read_task, shipped_tasks
 from coartic.text import unknown
 
@@ -51,8 +51,12 @@ def load_task(name_or_path: str | Path) -> Task:
         )
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         task = read_task(Path(name_or_path))
-        if "/" in task.name:
-            check_instance(task, str(name_or_path))
+        if "/" in task.name and task != instance(task.name):
+            raise TaskError(
+                f"{name_or_path}: the task is called {task.name!r}, but it is not the instance of "
+                "that name. Give it another name, or write the instance anew: "
+                f"coartic draw {task.name} --out FOLDER"
+            )
         return task
     if name_or_path in shipped_tasks():
         return shipped_tasks()[name_or_path]

@@ -8,9 +8,9 @@ version and stream and whose counter is the number of the instance. Streams are 
 to tune on), ``i`` (test: to report on) and years (``2027-``: fresh ones).
 
 What is drawn once is the structure: how many goals and links, the base, the kind of start. Places
-and angles are drawn again until no rule of :data:`RULES` is broken, so that rejection leaves the
-shares of structures alone. They are whole thousandths from the start. Geometric rules compare
-integers; the others ask the compiled kernels, which use IEEE arithmetic alone
+and angles are drawn again until :func:`broken_rule` finds none, so that rejection leaves the shares
+of structures alone. They are whole thousandths from the start. Geometric rules compare integers;
+the others ask the compiled kernels, which use IEEE arithmetic alone
 (:mod:`coartic.motion.trigonometry`): no rejection depends on a machine's library.
 """
 
@@ -20,7 +20,7 @@ import itertools
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -59,8 +59,6 @@ LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
 """Base coordinates that cannot move."""
 _PARTS = 1000  # of a unit of length, of a rad, of 1
 _STRUCTURE, _GEOMETRY = 0, 1  # what a block of the generator is for
-_LEAST_LINKS, _MOST_LINKS = 3, 8
-_LEAST_GOALS = 2
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
@@ -75,8 +73,8 @@ Thousandths = Annotated[int, BeforeValidator(in_thousandths)]
 """A length, an angle or a share, as a number of up to three decimals; kept in thousandths."""
 Span = tuple[Thousandths, Thousandths]
 """From, to; every thousandth between as likely."""
-_Count = Annotated[int, Field(strict=True, ge=_LEAST_GOALS, le=MOST_GOALS)]
-_PerArm = Annotated[int, Field(strict=True, ge=_LEAST_LINKS, le=_MOST_LINKS)]
+_Count = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
+_PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
 
@@ -177,9 +175,7 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
     base, postures = structure.one_of(family.base), structure.one_of(family.start)
     vertical = structure.one_of((False, True))
     draws = Draws(key, address.number, attempt, _GEOMETRY)
-    goals = scattered_goals(draws, family.region, count)
-    if family.line is not None:
-        goals = aligned_goals(draws, family.region, family.line, count, vertical)
+    goals = draw_goals(draws, family, count, vertical)
     # Links of one length, where that can be, else the first ones a thousandth longer.
     length, longer = divmod(family.reach, links)
     lengths = [(length + (k < longer)) / _PARTS for k in range(links)]
@@ -200,106 +196,18 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
     return parse_task(content, f"family {family.name}", reach=False)
 
 
-def with_base(task: Task, base: Base) -> Task:
-    """The task with its base free, on a rail or locked, whatever can be reached."""
-    return task.model_copy(update={"locked_base": LOCKED[base]})
-
-
-def places(task: Task) -> list[tuple[int, int]]:
-    """Goals of a draft in thousandths."""
-    return [(in_thousandths(x), in_thousandths(y)) for x, y in task.goals]
-
-
-def goal_outside(family: Family, task: Task) -> bool:
-    """Whether a goal of the line, or off it, is outside the region."""
-    (left, right), (low, high) = family.region.x, family.region.y
-    return not all(left <= x <= right and low <= y <= high for x, y in places(task))
-
-
-def goals_overlap(family: Family, task: Task) -> bool:
-    """Whether two goals are nearer to each other than the family lets them be."""
-    return any(
-        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 < family.apart**2
-        for a, b in itertools.combinations(places(task), 2)
-    )
-
-
-def goal_out_of_reach(family: Family, task: Task) -> bool:
-    """Whether a hand cannot come near enough to a goal, with the base as it is locked."""
-    farthest = family.reach * family.within
-    for locked in (task.locked_base, *(LOCKED[base] for base in family.restrictions)):
-        fixed = ["xy".index(axis) for axis in locked]
-        for hand in family.hands:
-            arm = task.robot.arm(hand)
-            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
-            for goal in places(task):
-                square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in fixed)
-                if square * _PARTS**2 > farthest**2:
-                    return True
-    return False
-
-
-def starts_straight(family: Family, task: Task) -> bool:
-    """Whether an arm is straight at the start, or nearly."""
-    arms = [task.start.left if hand == "left" else task.start.right for hand in family.hands]
-    return any(max(abs(in_thousandths(angle)) for angle in arm[1:]) < family.bent for arm in arms)
-
-
-def starts_in_goal(family: Family, task: Task) -> bool:
-    """Whether a hand is in a goal at the start, or close by."""
-    from coartic.motion.movement import move
-
-    near = (family.radius + family.clear) / _PARTS
-    return any(
-        move(task.robot, task.q0, task.q0, hand, goal, near).hit
-        for hand in task.hands
-        for goal in task.goals
-    )
-
-
-def correction_fails(family: Family, task: Task) -> bool:
-    """Whether the corrective process cannot do the task, or not under some restriction."""
-    from coartic.motion.initial import corrective_trial, initial_hands
-
-    try:
-        hands = initial_hands(task, model=PAPER)
-    except NotApplicableError:
-        return True
-    others = (with_base(task, base) for base in family.restrictions)
-    return not all(corrective_trial(other, hands, model=PAPER).completed for other in others)
-
-
-RULES: dict[str, Callable[[Family, Task], bool]] = {
-    "outside": goal_outside,
-    "overlap": goals_overlap,
-    "reach": goal_out_of_reach,
-    "straight": starts_straight,
-    "start-hit": starts_in_goal,
-    "corrective": correction_fails,
-}
-"""What no instance may be, in the order in which it is asked."""
-
-
-def broken_rule(family: Family, task: Task) -> str | None:
-    """The first rule that a draft breaks; None for a good one."""
-    return next((rule for rule, breaks in RULES.items() if breaks(family, task)), None)
-
-
-def scattered_goals(draws: Draws, region: Region, count: int) -> list[tuple[int, int]]:
-    """Goals in a box of their own within the region, thousandths."""
-    share = draws.integer(*region.scale)
-    sides = []
+def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
+    """Goals in thousandths: in a box of their own within the region, or, of a family that has one,
+    on a line through the region but for one that is neither first nor last."""
+    region, line = family.region, family.line
+    share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
         length = (high - low) * share // _PARTS
         start = draws.integer(low, high - length)
         sides.append((start, start + length))
-    return [(draws.integer(*sides[0]), draws.integer(*sides[1])) for _ in range(count)]
-
-
-def aligned_goals(
-    draws: Draws, region: Region, line: Alignment, count: int, vertical: bool
-) -> list[tuple[int, int]]:
-    """Goals on a line, but for one that is neither first nor last, thousandths."""
+    scattered = [(draws.integer(*sides[0]), draws.integer(*sides[1])) for _ in range(count)]
+    if line is None:
+        return scattered
     along, across = (region.y, region.x) if vertical else (region.x, region.y)
     at, level = draws.integer(*along), draws.integer(*across)
     forward = draws.one_of((-1, 1))
@@ -310,8 +218,52 @@ def aligned_goals(
     if count > 2:
         odd = draws.integer(1, count - 2)
         levels[odd] += draws.one_of((-1, 1)) * draws.integer(*line.off)
-    pairs = zip(levels, places, strict=True) if vertical else zip(places, levels, strict=True)
-    return list(pairs)
+    return [*(zip(levels, places, strict=True) if vertical else zip(places, levels, strict=True))]
+
+
+def broken_rule(family: Family, task: Task) -> str | None:
+    """The first rule that a draft breaks; None for a good one.
+
+    ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
+    ``reach``: a hand cannot come near enough to a goal, under some restriction. ``straight``: an
+    arm is straight at the start, or nearly. ``start-hit``: a hand is in a goal at the start, or
+    close by. ``corrective``: the corrective process cannot do the task, under some restriction.
+    """
+    from coartic.motion.initial import corrective_trial, initial_hands
+    from coartic.motion.movement import move
+
+    goals = [(in_thousandths(x), in_thousandths(y)) for x, y in task.goals]
+    (left, right), (low, high) = family.region.x, family.region.y
+    if not all(left <= x <= right and low <= y <= high for x, y in goals):
+        return "outside"
+    for a, b in itertools.combinations(goals, 2):
+        if (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 < family.apart**2:
+            return "overlap"
+    restricted = [LOCKED[base] for base in family.restrictions]
+    farthest = family.reach * family.within
+    for locked in (task.locked_base, *restricted):
+        for hand, goal in itertools.product(family.hands, goals):
+            arm = task.robot.arm(hand)
+            shoulder = [in_thousandths(arm.shoulder_x), in_thousandths(arm.shoulder_y)]
+            square = sum((goal[axis] - shoulder[axis]) ** 2 for axis in map("xy".index, locked))
+            if square * _PARTS**2 > farthest**2:
+                return "reach"
+    for hand in family.hands:
+        _, *bends = task.start.left if hand == "left" else task.start.right
+        if max(abs(in_thousandths(angle)) for angle in bends) < family.bent:
+            return "straight"
+    near = (family.radius + family.clear) / _PARTS
+    for hand, centre in itertools.product(task.hands, task.goals):
+        if move(task.robot, task.q0, task.q0, hand, centre, near).hit:
+            return "start-hit"
+    try:
+        hands = initial_hands(task, model=PAPER)
+    except NotApplicableError:
+        return "corrective"
+    others = (task.model_copy(update={"locked_base": locked}) for locked in restricted)
+    if all(corrective_trial(other, hands, model=PAPER).completed for other in others):
+        return None
+    return "corrective"
 
 
 def first_good(
@@ -333,12 +285,6 @@ def first_good(
         f"{address}: {most:_} draws of family {family.name!r} broke a rule, {times:_} of "
         f"them {rule!r}"
     )
-
-
-@lru_cache(maxsize=4096)
-def instance_at(address: Address) -> Task:
-    """The instance of a shipped family at an address. Raises TaskError where there is none."""
-    return instance_of(load_family(address.family), address)
 
 
 def instance_of(family: Family, address: Address) -> Task:
@@ -367,32 +313,26 @@ def instance_of(family: Family, address: Address) -> Task:
     return parse_task(content, name)
 
 
+@lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """An instance by its name, ``two-armed/v1/i017``. Raises TaskError for what is none."""
+    """An instance of a shipped family by its name, ``two-armed/v1/i017``. Raises TaskError for what
+    is none."""
     address = address_of(name)
     if address is None:
         raise TaskError(
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return instance_at(address)
+    return instance_of(load_family(address.family), address)
 
 
-def check_instance(task: Task, source: str) -> None:
-    """Raises TaskError for a task with an instance's name that is not that instance."""
-    if task != instance(task.name):
-        raise TaskError(
-            f"{source}: the task is called {task.name!r}, but it is not the instance of that name. "
-            "Give it another name, or write the instance anew: "
-            f"coartic draw {task.name} --out FOLDER"
-        )
+def named_by(text: str) -> list[str]:
+    """Names of the instances of a range, ``two-armed/v1/i000..i039``, or the name itself.
 
-
-def instances_in(text: str) -> list[str]:
-    """Names of the instances from one to another: ``two-armed/v1/i000..i039``.
-
-    Raises TaskError for what is no such range, or one of more than :data:`MOST_CELLS`.
+    Raises TaskError for a range that is none, and for one of more than :data:`MOST_CELLS`.
     """
+    if "/" not in text or ".." not in text or text.endswith(".toml"):
+        return [text]
     written = _RANGE.fullmatch(text)
     ends = [address_of(written[1] + end) for end in written.groups()[1:]] if written else [None]
     first, last = ends[0], ends[-1]
@@ -409,22 +349,10 @@ def instances_in(text: str) -> list[str]:
     return [str(first._replace(number=number)) for number in numbers]
 
 
-def named_by(text: str) -> list[str]:
-    """Names of the instances of a range, or the name itself."""
-    is_range = "/" in text and ".." in text and not text.endswith(".toml")
-    return instances_in(text) if is_range else [text]
-
-
 def shipped_families() -> dict[str, Family]:
     """The shipped families by name with version, such as ``two-armed/v1``."""
-    return {
-        family_name(path): read_family(path) for path in sorted(FAMILY_FOLDER.glob("*.v*.toml"))
-    }
-
-
-def family_name(path: Path) -> str:
-    """Name of the family in a file: ``two-armed/v1`` for ``two-armed.v1.toml``."""
-    return "/".join(path.stem.rsplit(".", 1))
+    families = map(read_family, sorted(FAMILY_FOLDER.glob("*.v*.toml")))
+    return {family.name: family for family in families}
 
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
@@ -451,9 +379,11 @@ def load_family(name: str) -> Family:
 
 @cache
 def read_family(path: Path) -> Family:
-    """A family from its file. Raises TaskError with one line per problem."""
-    content = read_toml(path, error=TaskError)
-    name = family_name(path)
+    """A family from its file, ``two-armed/v1`` from ``two-armed.v1.toml``.
+
+    Raises TaskError with one line per problem.
+    """
+    content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))
     if "name" in content:
         raise TaskError(f"{path}: name: is an unknown key; a family is named by its file")
     try:

@@ -9,19 +9,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import (
-    Field,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from coartic.errors import TaskError
 from coartic.inputs import (
@@ -230,8 +225,36 @@ class Task(FileData):
 
     @model_validator(mode="after")
     def _is_consistent(self, info: ValidationInfo) -> Task:
-        if (problem := next(contradictions(self), None)) is not None:
-            raise error_saying(problem)
+        for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
+            if len(set(values)) < len(values):
+                raise error_saying(f"{key} names the same entry twice: {', '.join(values)}")
+        for hand, angles in (("left", self.start.left), ("right", self.start.right)):
+            joints = len(self.robot.left_links if hand == "left" else self.robot.right_links)
+            if len(angles) != joints:
+                raise error_saying(
+                    f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} "
+                    "joints"
+                )
+        for key in self.provenance:
+            if key not in Task.model_fields:
+                meant = did_you_mean(key, all_keys())
+                raise error_saying(f"provenance.{key} is not a key of a task{meant}")
+        text = self.initial_hands
+        if not self.initial_is_policy:
+            if not text or set(text) - set(LETTERS):
+                raise error_saying(
+                    f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such "
+                    f"as 'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
+                )
+            if len(text) != len(self.goals):
+                raise error_saying(
+                    f"initial_hands {brief_value(text)} names {len(text)} hands for "
+                    f"{counted(len(self.goals), 'goal')}"
+                )
+            for hand in sorted({LETTERS[letter] for letter in text} - set(self.hands)):
+                raise error_saying(
+                    f"initial_hands {text!r} uses the {hand} hand, which is not among hands"
+                )
         # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
             raise error_saying(far)
@@ -286,36 +309,6 @@ def check_hands(task: Task, hands: str) -> str:
     if not fits or not set(hands) <= set(letters_of(task.hands)):
         raise ValueError(hands_misfit(task, hands))
     return hands
-
-
-def contradictions(task: Task) -> Iterator[str]:
-    """What the keys of a task say against each other, a sentence each."""
-    for key, values in (("hands", task.hands), ("locked_base", task.locked_base)):
-        if len(set(values)) < len(values):
-            yield f"{key} names the same entry twice: {', '.join(values)}"
-    for hand, angles in (("left", task.start.left), ("right", task.start.right)):
-        joints = len(task.robot.left_links if hand == "left" else task.robot.right_links)
-        if len(angles) != joints:
-            yield (
-                f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} joints"
-            )
-    for key in task.provenance:
-        if key not in Task.model_fields:
-            yield f"provenance.{key} is not a key of a task{did_you_mean(key, all_keys())}"
-    text = task.initial_hands
-    if task.initial_is_policy:
-        return
-    if not text or set(text) - set(LETTERS):
-        yield (
-            f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such as "
-            f"'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
-        )
-    elif len(text) != len(task.goals):
-        yield f"initial_hands {brief_value(text)} names {len(text)} hands for " + counted(
-            len(task.goals), "goal"
-        )
-    elif absent := sorted({LETTERS[letter] for letter in text} - set(task.hands)):
-        yield f"initial_hands {text!r} uses the {absent[0]} hand, which is not among hands"
 
 
 def out_of_reach(task: Task, tolerance: float) -> str | None:
