@@ -1,4 +1,4 @@
-"""CMA-ES over target configurations, with a bandit that finds the hand sequence.
+"""CMA-ES over target configurations; hand sequences by a bandit, or goal by goal.
 
 Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) over the
 targets of all its explored joints, which sees the total reward of each trial and nothing
@@ -6,8 +6,8 @@ else. Its first mean are the configurations of the corrective process **A** alon
 one trial; its first step size is the learner's noise; where it stops by its own
 criteria it begins anew there with twice the population (IPOP, Auger & Hansen 2005). A
 failed trial ranks last. UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each
-sequence, scaled by the spread of the first rewards, decides which strategy makes the next
-generation of trials.
+sequence, scaled by the spread of the first rewards, decides in ``cma-es/bandit`` which strategy
+makes the next generation of trials.
 
 Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: no
 reward differs by more than 2.4; with the other arm kept still, up to 0.05 can settle on RRRR in
@@ -15,11 +15,20 @@ two-armed-2 (-339 in the mean, where 0.1 and more give -331). Step sizes 0.02, 0
 and 0.2 within one given sequence are within 5 of each other after 2000 trials; after 300
 0.05 leads or is 2 behind. Handing the strategy the configurations in which the goals were hit
 instead of the targets (Lamarckian) cost 6 to 9 after 2000 trials, so it is not done.
+
+``cma-es/bandit`` has tried every hand sequence before it prefers one; of 14 goals there are
+16,384. In ``cma-es/goal-by-goal`` each pair of hands at two goals in a row has a value, the highest
+reward of any trial that used it. Goal by goal the hand of higher value is chosen, with probability
+ε, the learner's, a random one. A sequence that comes for the first time takes one trial by the
+corrective process alone, one that comes again a generation of its own strategy. On six random tasks
+with 14 goals and two arms, mean reward with ε = 0.05 and 0.2: -1439 and -1351; with hands drawn
+around those of the best trial -1404 and -1331; the learner EC4 -1799.
 """
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from typing import Annotated
 
 import numpy as np
@@ -59,7 +68,11 @@ class Strategy:
     def generation(self) -> None:
         """Make one generation of trials, or the trials that are left."""
         if self._restarts < 0 or self._evolution.has_ended():
-            self._restart()
+            self._restarts += 1
+            size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
+            self._evolution = EvolutionStrategy(
+                self._mean, self.sigma, size * 2**self._restarts, self._rng
+            )
         values = self._evolution.ask()[: self._attempts.left]
         rewards = self._attempts.around(self.hands, self._mask, values).rewards
         self.generations += 1
@@ -69,13 +82,6 @@ class Strategy:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
             self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
-
-    def _restart(self) -> None:
-        self._restarts += 1
-        size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
-        self._evolution = EvolutionStrategy(
-            self._mean, self.sigma, size * 2**self._restarts, self._rng
-        )
 
 
 class CMAES(Method):
@@ -101,23 +107,64 @@ class CMAES(Method):
             for hands in sequences_of(session)[: attempts.left]:
                 strategies.append(Strategy(session, attempts, hands, self.parameters.sigma))
             promising = [s for s in strategies if s.reward > -math.inf]
-            if promising:
-                self._allot(promising, attempts)
+            first = [strategy.reward for strategy in promising] or [0.0]
+            width = self.parameters.exploration * max(max(first) - min(first), 1.0)
+            generations = len(promising)
+
+            def bound(strategy: Strategy) -> float:
+                doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
+                return strategy.reward + width * doubt
+
+            while promising and attempts.left > 0:
+                max(promising, key=bound).generation()
+                generations += 1
         return attempts.result(trials={s.hands: s.trials for s in strategies})
 
-    def _allot(self, strategies: list[Strategy], attempts: Attempts) -> None:
-        """Spend the trials that are left, generation by generation."""
-        first = [strategy.reward for strategy in strategies]
-        width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
-        generations = len(strategies)
 
-        def bound(strategy: Strategy) -> float:
-            doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
-            return strategy.reward + width * doubt
+class GoalByGoalParameters(UninformedParameters):
+    """Parameters of CMA-ES that chooses hands goal by goal."""
 
-        while attempts.left > 0:
-            max(strategies, key=bound).generation()
-            generations += 1
+    epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
+    """Probability of a random hand, for each goal."""
 
 
-METHODS: tuple[type[Method], ...] = (CMAES,)
+class GoalByGoal(Method):
+    """CMA-ES for each hand sequence; hands are chosen by the best reward that they had."""
+
+    name = "cma-es/goal-by-goal"
+    title = "CMA-ES, hands chosen goal by goal"
+    citation = (
+        "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. "
+        "A. Auger, N. Hansen (2005). A restart CMA evolution strategy with increasing population "
+        "size. IEEE Congress on Evolutionary Computation."
+    )
+    told = TOLD
+    Parameters = GoalByGoalParameters
+
+    def solve(self, session: Session) -> Result:
+        """Search until the trials are used up; the solution is the best trial's."""
+        attempts = Attempts(session, self.parameters)
+        letters = sorted(hand[0].upper() for hand in session.hands)
+        values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)
+        strategies: dict[str, Strategy] = {}
+        hands = session.find_initial_hands()
+        with session.solving():
+            most = len(letters) ** session.goals_count
+            while attempts.left > 0 and (attempts.hands or len(strategies) < most):
+                if hands not in strategies:
+                    strategies[hands] = Strategy(session, attempts, hands, self.parameters.sigma)
+                elif strategies[hands].reward > -math.inf:
+                    strategies[hands].generation()
+                pairs = [hands[max(goal - 1, 0) : goal + 1] for goal in range(len(hands))]
+                for entry in enumerate(pairs):
+                    values[entry] = max(values[entry], strategies[hands].reward)
+                hands = ""
+                for goal in range(session.goals_count):
+                    pair = {letter: (goal, hands[-1:] + letter) for letter in letters}
+                    best = max(letters, key=lambda letter: values[pair[letter]])
+                    explores = session.rng.random() < self.parameters.epsilon
+                    hands += str(session.rng.choice(letters)) if explores else best
+        return attempts.result(sequences=len(strategies))
+
+
+METHODS: tuple[type[Method], ...] = (CMAES, GoalByGoal)

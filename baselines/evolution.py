@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy import exp
@@ -28,98 +26,6 @@ _APART = 1e8  # variances of coordinates
 _ILL = 1e12  # condition number of the covariance matrix
 _NOTED_EACH = 5  # generations: how often best and median are noted
 _MOST_NOTED = 20_000
-
-
-class Constants(NamedTuple):
-    """What depends on the number of parameters and the size of a generation alone."""
-
-    parents: int
-    """Points that are recombined, μ."""
-    recombined: Array
-    """Their weights, the best first, shape ``(μ,)``; they sum to 1."""
-    learned: Array
-    """Weights of the evolution path and of all points in the covariance matrix, shape
-    ``(λ + 1,)``; those of the worse points are negative."""
-    stalled: Array
-    """These weights while the path is stalled."""
-    selected: float
-    """Variance effective selection mass, μ_eff."""
-    c_1: float
-    """Learning rate of the evolution path in the covariance matrix."""
-    c_path: float
-    """Learning rate of the evolution path itself, c_c."""
-    c_step: float
-    """Learning rate of the path of the step size, c_σ."""
-    damping: float
-    """Damping of the step size, d_σ."""
-    length: float
-    """Expected length of a standard normal vector."""
-    gap: float
-    """Generations from one decomposition of the covariance matrix to the next, at least."""
-    patience: int
-    """Generations in which it may stagnate."""
-    generations: float
-    """Generations, at most."""
-
-
-@cache
-def constants_for(dim: int, size: int) -> Constants:
-    """The constants for points with so many parameters, so many in a generation."""
-    raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]
-    parents = sum(weight > 0 for weight in raw)
-    total = sum(raw[:parents])
-    positive, negative = ([w / total for w in part] for part in (raw[:parents], raw[parents:]))
-    selected = 1 / sum(weight**2 for weight in positive)
-    c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)
-    c_mu = rate_of_points(0.25 + selected - 2 + 1 / selected, selected, dim, c_1)
-    negative = weigh_negative(negative, selected, dim, c_1)
-    c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))
-    c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))
-    narrow = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((selected - 1) / (dim + 1)) ** 0.5 - 1
-    of_points = [c_mu * weight for weight in (*positive, *negative)]
-    while_stalled = c_1 * (1 - c_path * (2 - c_path))
-    return Constants(
-        parents=parents,
-        recombined=np.array(positive),
-        learned=np.array([c_1, *of_points]),
-        stalled=np.array([while_stalled, *of_points]),
-        selected=selected,
-        c_1=c_1,
-        c_path=c_path,
-        c_step=c_step,
-        damping=1 + 2 * max(0, narrow) + c_step,
-        length=expected_length(dim),
-        gap=1 / (c_1 + c_mu) / dim / 10,
-        patience=int(100 + 100 * dim**1.5 / size),
-        generations=100 + 150 * (dim + 3) ** 2 // size**0.5,
-    )
-
-
-def rate_of_points(mass: float, selected: float, dim: int, c_1: float) -> float:
-    """The learning rate of all points in the covariance matrix, c_μ."""
-    return min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))
-
-
-def weigh_negative(weights: list[float], selected: float, dim: int, c_1: float) -> list[float]:
-    """Negative weights that make up for the positive ones, but cannot make a variance negative.
-
-    They are scaled twice, with a rate that differs in its last bit, as in the package.
-    """
-    weights = [weight / -sum(weights) for weight in weights]
-    for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
-        c_mu = rate_of_points(mass, selected, dim, c_1)
-        weights = scale_to(weights, 1 + c_1 / c_mu)
-        rejected = sum(weights) ** 2 / (sum(weight**2 for weight in weights) or 1)
-        for most in ((1 - c_1 - c_mu) / c_mu / dim, 1 + 2 * rejected / (selected + 2)):
-            if sum(weights) < -most:
-                weights = scale_to(weights, most)
-    return weights
-
-
-def scale_to(weights: list[float], total: float) -> list[float]:
-    """Weights whose absolute values sum to this, unless all are 0."""
-    factor = abs(total / (sum(weights) or 1))
-    return [weight * factor for weight in weights]
 
 
 def expected_length(dim: int) -> float:
@@ -138,7 +44,48 @@ class EvolutionStrategy:
         dim = len(mean)
         self.size = size
         """Points in a generation, λ."""
-        self._constants = constants_for(dim, size)
+        raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]
+        self._parents = sum(weight > 0 for weight in raw)  # points that are recombined, μ
+        total = sum(raw[: self._parents])
+        positive = [weight / total for weight in raw[: self._parents]]
+        selected = 1 / sum(weight**2 for weight in positive)
+        c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)
+
+        def c_mu(mass: float) -> float:
+            return min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))
+
+        def scaled(weights: list[float], to: float) -> list[float]:
+            factor = abs(to / (sum(weights) or 1))
+            return [weight * factor for weight in weights]
+
+        # Negative weights make up for the positive ones, but cannot make a variance negative. They
+        # are scaled twice, with a rate that differs in its last bit, as in the package.
+        negative = [weight / total for weight in raw[self._parents :]]
+        negative = [weight / -sum(negative) for weight in negative]
+        for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
+            rate = c_mu(mass)
+            negative = scaled(negative, 1 + c_1 / rate)
+            rejected = sum(negative) ** 2 / (sum(weight**2 for weight in negative) or 1)
+            for most in ((1 - c_1 - rate) / rate / dim, 1 + 2 * rejected / (selected + 2)):
+                if sum(negative) < -most:
+                    negative = scaled(negative, most)
+        self._recombined = np.array(positive)  # weights of the best points, which sum to 1
+        self._selected = selected  # variance effective selection mass, μ_eff
+        self._c_1 = c_1  # learning rates: of the evolution path in the covariance matrix,
+        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # of the path, c_c,
+        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # of the step's path, c_σ
+        # Weights of the evolution path and of all points in the covariance matrix, also while the
+        # path is stalled.
+        of_points = [rate * weight for weight in (*positive, *negative)]
+        self._learned = np.array([c_1, *of_points])
+        self._stalled = np.array([c_1 * (1 - self._c_path * (2 - self._c_path)), *of_points])
+        narrow = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((selected - 1) / (dim + 1)) ** 0.5 - 1
+        self._damping = 1 + 2 * max(0, narrow) + self._c_step  # of the step size, d_σ
+        self._length = expected_length(dim)
+        self._gap = 1 / (c_1 + rate) / dim / 10  # generations between decompositions, at least
+        self._patience = int(100 + 100 * dim**1.5 / size)  # generations that it may stagnate
+        self._most_generations = 100 + 150 * (dim + 3) ** 2 // size**0.5
+
         self._rng = rng
         self._mean = mean.copy()
         self._first_step_size = self._step_size = float(step_size)
@@ -157,60 +104,53 @@ class EvolutionStrategy:
 
     def ask(self) -> Array:
         """The points of the next generation, shape ``(λ, dim)``."""
-        if self._generation >= self._decomposed + self._constants.gap:
-            self._decompose()
+        if self._generation >= self._decomposed + self._gap:
+            self._covariance = (self._covariance + self._covariance.T) / 2
+            variances, axes = np.linalg.eigh(self._covariance)
+            self._axes = np.asfortranarray(axes)
+            self._lengths = variances**0.5
+            self._decomposed = self._generation
         noise = self._rng.standard_normal((self.size, len(self._mean)))
         drawn: Array = np.dot(self._axes, (self._lengths * noise).T).T
         return self._mean + self._step_size * drawn
 
-    def _decompose(self) -> None:
-        self._covariance = (self._covariance + self._covariance.T) / 2
-        variances, axes = np.linalg.eigh(self._covariance)
-        self._axes = np.asfortranarray(axes)
-        self._lengths = variances**0.5
-        self._decomposed = self._generation
-
     def tell(self, points: Array, costs: Array) -> None:
         """Learn from the points of a generation and their costs, shape ``(λ,)``, finite."""
-        k = self._constants
         self._generation += 1
         self._note(costs)
         points = points[np.argsort(costs)]
-        before, self._mean = self._mean, np.dot(k.recombined, points[: k.parents])
+        before, self._mean = self._mean, np.dot(self._recombined, points[: self._parents])
         shift = self._mean - before
 
-        self._step_path *= 1 - k.c_step
-        normalised = self._whiten(shift) * (k.selected**0.5 / self._step_size)
-        self._step_path += math.sqrt(k.c_step * (2 - k.c_step)) * normalised
-        square = np.sum(self._step_path**2) / (1 - (1 - k.c_step) ** (2 * self._generation))
+        # In coordinates in which the points are normal with unit variance.
+        whitened = np.dot(self._axes, np.dot(self._axes.T, shift) / self._lengths)
+        normalised = whitened * (self._selected**0.5 / self._step_size)
+        self._step_path *= 1 - self._c_step
+        self._step_path += math.sqrt(self._c_step * (2 - self._c_step)) * normalised
+        square = np.sum(self._step_path**2) / (1 - (1 - self._c_step) ** (2 * self._generation))
         is_stalled = not square / len(shift) - 1 < 1 + 4 / (len(shift) + 1)
 
-        self._path = (1 - k.c_path) * self._path
-        weights, path = k.stalled, (k.c_1 / k.stalled[0]) ** 0.5 * self._path
+        self._path = (1 - self._c_path) * self._path
+        weights, path = self._stalled, (self._c_1 / self._stalled[0]) ** 0.5 * self._path
         if not is_stalled:
-            factor = (k.c_path * (2 - k.c_path) * k.selected) ** 0.5 / self._step_size
+            factor = (self._c_path * (2 - self._c_path) * self._selected) ** 0.5 / self._step_size
             self._path += factor * shift
-            weights, path = k.learned, self._path
+            weights, path = self._learned, self._path
         self._learn(np.vstack([path, (points - before) / self._step_size]), weights.copy())
 
         length = np.sqrt(np.sum(np.square(self._step_path)))
-        change = (length / k.length - 1) * (k.c_step / k.damping)
+        change = (length / self._length - 1) * (self._c_step / self._damping)
         self._step_size *= float(exp(min(max(change, -1), 1)))
         threshold = 20 + 0.1 * self._generation
         delta = _STILL * max(1, (self._generation - self._still_since) / threshold) ** 0.5
         if np.sum((self._still_at - self._mean) ** 2) ** 0.5 > delta:
             self._still_at, self._still_since = self._mean, self._generation
 
-    def _whiten(self, vector: Array) -> Array:
-        """A vector in coordinates in which the points are normal with unit variance."""
-        whitened: Array = np.dot(self._axes, np.dot(self._axes.T, vector) / self._lengths)
-        return whitened
-
     def _learn(self, vectors: Array, weights: Array) -> None:
         """Update the covariance matrix with rows of vectors; those with negative weights as if
         they had the expected length."""
         self._covariance *= 1 - weights.cumsum()[-1]
-        rejected = slice(1 + self._constants.parents, None)
+        rejected = slice(1 + self._parents, None)
         scaled = np.matmul(self._axes.T, vectors[rejected, :, None])[..., 0] / self._lengths
         squares = (scaled**2).cumsum(axis=1)[:, -1]  # term by term, as the package sums
         weights[rejected] *= [
@@ -237,11 +177,15 @@ class EvolutionStrategy:
             return False
         deviations = self._step_size * np.sqrt(np.diag(self._covariance))
         least, most = deviations.min(), deviations.max()
+        between = max(self._bests) - min(self._bests)
         axis = self._generation % len(self._mean)
         longest = 0.1 * self._step_size * self._lengths[axis] * self._axes[:, axis]
         return bool(
-            self._costs_are_level()
-            or self._stagnates()
+            self._stagnates()
+            # Costs hardly differ within the generation, or the best ones between generations.
+            or self._flat > 1
+            or (self._costs[-1] - self._costs[0] < _LEAST and between < _LEAST)
+            or (len(self._bests) > 9 and between < _LEAST_OVER_TEN)
             or (most < _LEAST and (self._step_size * self._path).max() < _LEAST)
             or self._generation - self._still_since > 20 + 0.1 * self._generation
             or (self._mean == self._mean + 0.2 * deviations).any()
@@ -249,26 +193,17 @@ class EvolutionStrategy:
             or most > self._first_step_size * _WIDER
             or (most / least) ** 2 >= _APART
             or (self._lengths[-1] / self._lengths[0]) ** 2 >= _ILL
-            or self._generation >= self._constants.generations
-        )
-
-    def _costs_are_level(self) -> bool:
-        """Whether costs hardly differ within the generation, or the best ones between them."""
-        between = max(self._bests) - min(self._bests)
-        return bool(
-            self._flat > 1
-            or (self._costs[-1] - self._costs[0] < _LEAST and between < _LEAST)
-            or (len(self._bests) > 9 and between < _LEAST_OVER_TEN)
+            or self._generation >= self._most_generations
         )
 
     def _stagnates(self) -> bool:
         """Whether neither best nor median has improved for long."""
         noted = len(self._noted_bests)
-        recent = int(max(self._constants.patience / 10, noted / 10))
+        recent = int(max(self._patience / 10, noted / 10))
         told = self._generation * self.size
         if (
             self._generation <= len(self._mean) * (5 + 100 / self.size)
-            or (told - self._best_point) / self.size <= self._constants.patience / 2
+            or (told - self._best_point) / self.size <= self._patience / 2
             or noted <= max(100, 2 * recent)
         ):
             return False

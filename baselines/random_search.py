@@ -14,6 +14,10 @@ instances each, for 0.06, 0.12, 0.18, 0.25, 0.5 and 1.0: first movement slower b
 0.06, 0.07, 0.16, 0.24, 0.30 and 0; on four long tasks next goal nearer by 1.6, 1.9 and from 0.18 on
 0. So suites have all of these but the last.
 
+``placebo/guesses`` has the hands with which the corrective process alone does best, so that its
+hands could not come out otherwise. In ``placebo/hands`` every sequence gets as many of the trials,
+the first by the corrective process alone, the others around it. The best of all is the solution.
+
 ``random-search/climbing`` adds Gaussian noise and draws hands as well: a (1+1) hill climber for
 each hand sequence. A sequence has a centre, at first the configurations of the corrective process
 **A** alone, which take the first trial of the sequence. A trial perturbs all explored joints of the
@@ -24,6 +28,7 @@ does, with ε for each goal around the best sequence known. The SD and ε are th
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -31,8 +36,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Method, Result, Session
-from coartic.optimisers import TOLD, Objective, Optimiser, OptimiserParameters
+from coartic.learner.learning import TRIALS
+from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
+from coartic.optimisers import TOLD, Objective, Optimiser, OptimiserParameters, sequences_of
 from coartic.robot import Array
 
 _GUESSES_AT_ONCE = 500
@@ -69,6 +75,44 @@ class Guesses(Optimiser):
             objective.many(rng.uniform(low, high, (_GUESSES_AT_ONCE, objective.dim)))
 
 
+class DrawnHandsParameters(Parameters):
+    """Parameters of the placebo for hands."""
+
+    trials: Annotated[int, Field(gt=0)] = TRIALS
+    half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
+    """Half the width of the box of targets, length unit (base) and rad (joints)."""
+
+
+class DrawnHands(Method):
+    """Guesses in a box for each hand sequence; the task's own alone, where there are too many."""
+
+    name = "placebo/hands"
+    title = "Placebo: best of random guesses with every hand sequence"
+    citation = Guesses.citation
+    told = TOLD
+    Parameters = DrawnHandsParameters
+
+    def solve(self, session: Session) -> Result:
+        """Guess with one sequence after the other; the solution is the best trial's."""
+        sequences = sequences_of(session)
+        left = session.trials_left
+        trials = self.parameters.trials if left is None else min(self.parameters.trials, left)
+        shares = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
+        problems: list[Objective] = []
+        with session.solving():
+            for n, hands in enumerate(sequences):
+                share, width = shares[n + 1] - shares[n], self.parameters.half_width
+                with suppress(BudgetError, MethodError):
+                    problem = Objective(session, hands, half_width=width, trials=share)
+                    problems.append(problem)
+                    low, high = problem.bounds.T
+                    problem.many(session.rng.uniform(low, high, (share - 1, problem.dim)))
+        if not problems:
+            raise MethodError("infeasible", "the corrective process completes no hand sequence")
+        best = min(problems, key=lambda problem: problem.best_cost)
+        return Result(best.solution, {"sequences": len(problems)})
+
+
 class Climbing(Method):
     """A (1+1) hill climber per hand sequence."""
 
@@ -86,7 +130,7 @@ class Climbing(Method):
         return HillClimbers(session, self.parameters).result()
 
 
-METHODS: tuple[type[Method], ...] = (Guesses, Climbing)
+METHODS: tuple[type[Method], ...] = (Guesses, Climbing, DrawnHands)
 
 
 class Centre(NamedTuple):

@@ -13,7 +13,7 @@ from coartic.motion.sources import PACKAGE
 FILES = {name.split(".")[-1]: Path(inspect.getfile(importlib.import_module(name)))
          for name in MODULES}  # fmt: skip
 LEARNER, PLANNERS = "method", {"trajectory_optimisation", "receding_horizon", "optimum"}
-WITH_TRIALS = {LEARNER, "random_search", "drawn_hands", "cma_es", "cma_es_hands"}
+WITH_TRIALS = {LEARNER, "random_search", "cma_es"}
 """Methods that take the number of trials from the learner."""
 
 
@@ -61,7 +61,7 @@ def test_what_plans_stores_reads_and_shows_runs_does_not_count():
         ("cli/__init__.py", set()),
         ("play/page.py", set()),
         ("__init__.py", set()),
-        ("baselines/evolution.py", {"cma_es", "cma_es_hands"}),
+        ("baselines/evolution.py", {"cma_es"}),
         ("baselines/trajectory_problem.py", PLANNERS),
         ("learner/kernel.py", WITH_TRIALS),
         ("motion/reach.py", {*FILES}),

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
-from coartic.baselines.cma_es import CMAES, Strategy
-from coartic.baselines.cma_es_hands import GoalByGoal
-from coartic.baselines.drawn_hands import DrawnHands
-from coartic.baselines.random_search import Climbing, Guesses
+from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
+from coartic.baselines.random_search import Climbing, DrawnHands, Guesses
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import BudgetError, Meter, MethodError, Session
 from coartic.optimisers import TOLD
