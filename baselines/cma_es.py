@@ -64,6 +64,7 @@ class Strategy:
         """Best reward so far; -inf where **A** did not complete the sequence."""
         self._mean: Array = first.reached[0, self._mask]
         self._restarts = -1
+        self._evolution: EvolutionStrategy
 
     def generation(self) -> None:
         """Make one generation of trials, or the trials that are left."""
@@ -108,7 +109,7 @@ class CMAES(Method):
                 strategies.append(Strategy(session, attempts, hands, self.parameters.sigma))
             promising = [s for s in strategies if s.reward > -math.inf]
             first = [strategy.reward for strategy in promising] or [0.0]
-            width = self.parameters.exploration * max(max(first) - min(first), 1.0)
+            width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
             generations = len(promising)
 
             def bound(strategy: Strategy) -> float:

@@ -153,7 +153,13 @@ class Controller:
                 )
             if waypoints:
                 self.sweep(q, aims, postures)
-            q = self.add(q, length * self.next_rates(q, aims[0], postures[0], length))
+            way = (postures[0] - q)[self.moving]
+            steps = max(1.0, float(np.linalg.norm(way)) / length)
+            rows, outside = self.faces(q, aims[0])
+            shrunk = outside.max() * (1.0 - _CLOSING / steps)
+            rates = self.solve(length * rows, outside - shrunk, way / (steps * length))
+            rates /= max(1.0, float(np.linalg.norm(rates)))
+            q = self.add(q, length * rates)
             waypoints.append(q)
         path = np.array(waypoints or [start])
         followed = follow(
@@ -163,13 +169,6 @@ class Controller:
         movement = Movement(goal + 1, hand, "path", path[-1], waypoints=path)
         ahead = dict(zip(aims[1:], postures[1:], strict=True))
         return Leg(movement, followed.ticks, followed.q, ahead)
-
-    def try_leg(self, way: tuple[Leg, ...], aims: tuple[Aim, ...]) -> Leg | StuckError:
-        """The next leg of a way, or the error that says why there is none."""
-        try:
-            return self.leg(way[-1] if way else None, aims)
-        except StuckError as error:
-            return error
 
     def find_postures(
         self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
@@ -227,16 +226,6 @@ class Controller:
             change[bent] += np.resize([1.0, -1.0], bent.sum())
         length = float(np.linalg.norm(change))
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
-
-    def next_rates(self, q: Array, aim: Aim, posture: Array, length: float) -> Array:
-        """Joint rates of one control step of a ``length``, of norm 1 at most."""
-        way = (posture - q)[self.moving]
-        steps = max(1.0, float(np.linalg.norm(way)) / length)
-        rows, outside = self.faces(q, aim)
-        shrunk = outside.max() * (1.0 - _CLOSING / steps)
-        rates = self.solve(length * rows, outside - shrunk, way / (steps * length))
-        rates /= max(1.0, float(np.linalg.norm(rates)))
-        return rates
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Array:
         """The cascade's changes of the joints; the session counts the iterations."""
@@ -305,8 +294,8 @@ class NullspaceQP(Method):
         """Simulate the hand sequences and hand over the best one's paths."""
         task = session.hand_over(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = Controller(session, task, self.parameters.period)
+        ordered = [hand for hand in HANDS if hand in task.hands]
         with session.solving():
-            ordered = [hand for hand in HANDS if hand in task.hands]
             candidates = list(itertools.product(ordered, repeat=len(task.goals)))
             return self.search(controller, candidates)
 
@@ -336,7 +325,10 @@ class NullspaceQP(Method):
                 return Result(tuple(leg.movement for leg in way), details)
             plan = tuple(self.aims(hands, g) for g in range(goal + 1))
             if plan not in legs:
-                legs[plan] = controller.try_leg(way, plan[-1])
+                try:
+                    legs[plan] = controller.leg(way[-1] if way else None, plan[-1])
+                except StuckError as error:
+                    legs[plan] = error
             leg = legs[plan]
             if isinstance(leg, StuckError):
                 stuck.append(leg)

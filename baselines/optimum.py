@@ -85,9 +85,9 @@ class Optimum(Method):
             plans = shortest_plans(session, task, problem, starts, still=still)
             best = fewest_ticks(session, task, problem, plans)
         details = {
-            "path_length": plans.ranked[0][1].cost,
+            "path_length": plans.ranked[0].cost,
             "path_lengths": {
-                letters_of(instance.hands): plan.cost for instance, plan in plans.ranked[:MOST_KEPT]
+                letters_of(plan.instance.hands): plan.cost for plan in plans.ranked[:MOST_KEPT]
             },
             "solves": plans.solves,
             "failed_solves": plans.failed,

@@ -87,7 +87,7 @@ class RecedingHorizon(Method):
                 replace(movement, goal=goal + movement.goal)
                 for movement in best.movements[:followed]
             ]
-            length += float(best.plan.lengths(q)[:followed].sum())
+            length += float(best.plan.lengths()[:followed].sum())
             q = best.execution.configurations[followed - 1]
         details = {
             "path_length": length,

@@ -8,6 +8,7 @@ turn comes because the other hand is already there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -24,15 +25,15 @@ KNOWS_REWARD = MODEL_BASED | {Information.REWARD_FORMULA}
 class ShortestPlans(NamedTuple):
     """The plans that many starts led to."""
 
-    by_hands: dict[HandSequence, tuple[Instance, PathPlan]]
+    by_hands: dict[HandSequence, PathPlan]
     """The shortest plan of each hand sequence that has one."""
     solves: int
     failed: int
 
     @property
-    def ranked(self) -> list[tuple[Instance, PathPlan]]:
+    def ranked(self) -> list[PathPlan]:
         """The plans, the shortest first."""
-        return sorted(self.by_hands.values(), key=lambda entry: entry[1].cost)
+        return sorted(self.by_hands.values(), key=lambda plan: plan.cost)
 
 
 class PlanInTicks(NamedTuple):
@@ -56,7 +57,7 @@ def shortest_plans(
 
     Raises MethodError where no solve finds a path.
     """
-    best: dict[HandSequence, tuple[Instance, PathPlan]] = {}
+    best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
         instance = Instance.of(task, hands, still=still, radius=task.radius)
@@ -64,8 +65,8 @@ def shortest_plans(
         session.spend(**plan.spent)
         solves += 1
         failed += not plan.converged
-        if plan.converged and (hands not in best or plan.cost < best[hands][1].cost):
-            best[hands] = instance, plan
+        if plan.converged and (hands not in best or plan.cost < best[hands].cost):
+            best[hands] = plan
     if not best:
         raise MethodError(
             "infeasible", f"none of {solves} solves found a path that hits every goal"
@@ -82,15 +83,15 @@ def fewest_ticks(
     MethodError where no rounding can be solved.
     """
     fewest: PlanInTicks | None = None
+    least: tuple[float, float] = math.inf, math.inf
 
     def worth(ticks: int) -> bool:
-        return fewest is None or ticks < fewest.execution.ticks
+        return ticks < least[0]
 
-    for instance, plan in plans.ranked:
-        rounding = Rounding(session, problem, instance)
+    for plan in plans.ranked:
+        instance, rounding = plan.instance, Rounding(session, problem, plan.instance)
         # A merger saves one tick a goal and never shortens the path.
-        most = len(instance.hands)
-        if not worth(rounding.least(plan) - most):
+        if not worth(rounding.least(plan) - len(instance.hands)):
             continue
         for merged, shortest in rounding.plans(plan, task, worth):
             if not worth(rounding.least(shortest, merged)):
@@ -101,15 +102,11 @@ def fewest_ticks(
                 planned = movements(session, task, instance, rounded.configurations, rounded.steps)
                 execution = execute(task, planned, model=session.model)
                 session.spend(forward_kinematics=execution.evaluations)
-                if execution.completed and (fewest is None or fewer(execution, fewest.execution)):
-                    fewest = PlanInTicks(planned, execution, shortest)
+                spent = execution.ticks, execution.corrections
+                if execution.completed and spent < least:
+                    least, fewest = spent, PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
                     break  # no other rounding takes fewer
     if fewest is None:
         raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
     return fewest
-
-
-def fewer(one: Execution, other: Execution) -> bool:
-    """Whether one takes fewer ticks than the other, or as many and fewer corrections."""
-    return (one.ticks, one.corrections) < (other.ticks, other.corrections)

@@ -80,6 +80,11 @@ def cheapest_plan(
     return min(converged, key=lambda plan: plan.cost) if converged else plans[-1]
 
 
+def sure_to_hit(session: Session, task: Task) -> float:
+    """A target that is so near to a goal's centre is sure to hit, length unit."""
+    return task.radius - session.model.arrival_tolerance
+
+
 class TrajectoryOptimisation(Method):
     """The cheapest plan by one cost."""
 
@@ -92,42 +97,32 @@ class TrajectoryOptimisation(Method):
         """Plan every sequence, keep the cheapest, hand over its movements."""
         task = session.hand_over(*self.told - {Information.SECONDARY_OBJECTIVES})
         with session.building():
-            self.problem(task)
+            problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
+        radius = task.radius  # rounded to whole control ticks, a plan goes through the rims
+        if self.cost != "path-length":
+            radius = sure_to_hit(session, task)
+        plans, failed = list[PathPlan](), dict[str, str]()
         with session.solving():
-            plans, failed = self.plans(session, task)
+            for hands, starts in self.starts(session, task).items():
+                instance = Instance.of(task, hands, still=False, radius=radius)
+                plan = self.cheapest(session, problem, instance, starts)
+                if plan.converged:
+                    plans.append(plan)
+                else:
+                    failed[letters_of(hands)] = plan.reason
             if not plans:
                 raise MethodError(
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
-            instance, plan = min(plans, key=lambda entry: entry[1].cost)
-            solution = self.movements_of(session, task, instance, plan)
+            plan = min(plans, key=lambda plan: plan.cost)
+            solution = self.movements_of(session, task, problem, plan)
         details = {
             "cost": plan.cost,
-            "path_length": float(plan.lengths(task.q0).sum()),
-            "costs": {letters_of(i.hands): p.cost for i, p in plans},
+            "path_length": float(plan.lengths().sum()),
+            "costs": {letters_of(p.instance.hands): p.cost for p in plans},
             "failed": failed,
         }
         return Result(solution, details)
-
-    def problem(self, task: Task) -> TrajectoryProblem:
-        """The programme of tasks like this one, compiled once."""
-        return trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
-
-    def plans(
-        self, session: Session, task: Task
-    ) -> tuple[list[tuple[Instance, PathPlan]], dict[str, str]]:
-        """The plan of each hand sequence, and the reason of each that has none."""
-        plans, failed = [], {}
-        for hands, starts in self.starts(session, task).items():
-            instance = Instance.of(
-                task, hands, still=False, radius=self.target_radius(session, task)
-            )
-            plan = self.cheapest(session, self.problem(task), instance, starts)
-            if plan.converged:
-                plans.append((instance, plan))
-            else:
-                failed[letters_of(hands)] = plan.reason
-        return plans, failed
 
     def cheapest(
         self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
@@ -163,15 +158,11 @@ class TrajectoryOptimisation(Method):
                 starts_of_hands.append(first + spread * rng.standard_normal(first.shape))
         return starts
 
-    def target_radius(self, session: Session, task: Task) -> float:
-        """Within this of a goal's centre a target is sure to hit."""
-        return task.radius - session.model.arrival_tolerance
-
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: PathPlan
+        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
     ) -> tuple[Movement, ...]:
         """The movements of a plan; the session counts the effort."""
-        return movements(session, task, instance, plan.configurations)
+        return movements(session, task, plan.instance, plan.configurations)
 
 
 class PathLength(TrajectoryOptimisation):
@@ -186,24 +177,19 @@ class PathLength(TrajectoryOptimisation):
     told = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
 
-    def target_radius(self, session: Session, task: Task) -> float:
-        """The goal's: rounded to whole control ticks, the plan goes through the rims."""
-        return task.radius
-
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: PathPlan
+        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
     ) -> tuple[Movement, ...]:
         """The movements of a plan; the session counts the effort."""
-        problem = self.problem(task)
-        rounded = Rounding(session, problem, instance).nearest(plan)
+        rounded = Rounding(session, problem, plan.instance).nearest(plan)
         if rounded is None:  # aimed inside the discs it is a plan all the same
-            inside = replace(instance, radius=super().target_radius(session, task))
+            inside = replace(plan.instance, radius=sure_to_hit(session, task))
             plan = problem.solve(inside, plan.configurations)
             session.spend(**plan.spent)
             if not plan.converged:
                 raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
-            return super().movements_of(session, task, inside, plan)
-        return movements(session, task, instance, rounded.configurations, rounded.steps)
+            return super().movements_of(session, task, problem, plan)
+        return movements(session, task, plan.instance, rounded.configurations, rounded.steps)
 
 
 class SquaredChanges(TrajectoryOptimisation):
@@ -246,10 +232,10 @@ class Acceleration(TrajectoryOptimisation):
         return cheapest_plan(session, problem, instance, starts, stops=True)
 
     def movements_of(
-        self, session: Session, task: Task, instance: Instance, plan: PathPlan
+        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
     ) -> tuple[Movement, ...]:
         """The movements of a plan; the session counts the effort."""
-        return path_movements(session, task, instance, spline(plan, task.q0, SAMPLES))
+        return path_movements(session, task, plan.instance, spline(plan, SAMPLES))
 
 
 class Jerk(Acceleration):

@@ -75,10 +75,6 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-Bounds = tuple[Array, Array, Array]
-"""A start of some variables, with their least and most values."""
-
-
 @dataclass(frozen=True)
 class Instance:
     """The parameters and bounds of one solve: a task, a hand per goal, a restriction."""
@@ -117,6 +113,8 @@ def held_joints(task: Task, hands: Sequence[Hand | None], *, still: bool) -> NDA
 class PathPlan:
     """The outcome of a solve."""
 
+    instance: Instance
+    """That was solved."""
     converged: bool
     reason: str
     """IPOPT's return status."""
@@ -130,9 +128,9 @@ class PathPlan:
     spent: dict[str, int] = field(default_factory=dict)
     """Counters of the solver, ready for ``Session.spend``."""
 
-    def lengths(self, q0: Array) -> Array:
-        """Joint-space distances between successive configurations, shape ``(G,)``."""
-        return segment_lengths(np.vstack([q0, self.configurations]))
+    def lengths(self) -> Array:
+        """Joint-space distances from the start to the goals in turn, shape ``(G,)``."""
+        return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
 class TrajectoryProblem:
@@ -157,7 +155,10 @@ class TrajectoryProblem:
         limits, q = [], q0
         for g in range(goals):
             q = q + steps[:, g]
-            hand = chosen_hand({hand: robot.symbolic_hand(q, hand) for hand in hands}, right[g])
+            place = {hand: robot.symbolic_hand(q, hand) for hand in hands}
+            hand = place[hands[0]]
+            if len(hands) > 1:
+                hand = right[g] * place["right"] + (1 - right[g]) * place["left"]
             limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
@@ -203,22 +204,41 @@ class TrajectoryProblem:
         (0-based) as those lengths allow, instead of short paths. ``stops`` holds all rates at the
         goals at 0 (smoothness costs only). A solve that fails is a plan that has not converged.
         """
+        goals = self.goals
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
-        rates = self.rate_bound(instance, stops)
+        ways = np.sqrt((steps**2).sum(axis=1))
+        at, shortest, longest = np.zeros((3, goals))
+        if self.cost == "path-length":
+            at, longest = ways.copy(), np.full(goals, np.inf)
+            if lengths is not None:
+                given = ~np.isnan(lengths)
+                at[given] = shortest[given] = longest[given] = lengths[given]
+        times, soonest, latest = np.ones((3, goals))
+        if self._order:  # durations vary at a constant total
+            times = np.maximum(ways, 1e-3)
+            times = np.maximum(times * (goals / times.sum()), 0.1)
+            times *= goals / times.sum()
+            soonest, latest = np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
+        # Rates are 0 at rest (start and end, with stops each goal) and for joints held on either
+        # side.
+        still = np.vstack([instance.held[:1] | True, instance.held])
+        still[:-1] |= instance.held
+        still[-1] = True
+        rates = np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
         rim = instance.radius - _RIM
         deepest = 0.0 if deep is None else rim
         # A start, a least and a most value of each variable, in the order of the programme's.
         blocks = [
             (steps.ravel(), -free, free),
-            self.length_bounds(steps, lengths),
-            self.time_bounds(steps),
+            (at, shortest, longest),
+            (times, soonest, latest),
             (np.zeros(1), np.zeros(1), np.full(1, deepest)),
             (np.zeros(rates.size), -rates, rates),
         ]
         first, least, most = (np.concatenate(column) for column in zip(*blocks, strict=True))
-        chosen = np.zeros(self.goals)
+        chosen = np.zeros(goals)
         chosen[[] if deep is None else list(deep)] = 1.0
         right = [float(hand == "right") for hand in instance.hands]
         weights = [1.0, 0.0] if deep is None else [0.0, 1.0]
@@ -232,35 +252,6 @@ class TrajectoryProblem:
         )
         return self.plan_from(instance, solution)
 
-    def rate_bound(self, instance: Instance, stops: bool) -> Array:
-        """Most of every rate: 0 at rest (start and end, with stops each goal) and for joints held
-        on either side."""
-        still = np.vstack([instance.held[:1] | True, instance.held])
-        still[:-1] |= instance.held
-        still[-1] = True
-        return np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
-
-    def length_bounds(self, steps: Array, lengths: Array | None) -> Bounds:
-        """Lengths of the segments."""
-        if self.cost != "path-length":
-            return (np.zeros(self.goals),) * 3
-        at = np.sqrt((steps**2).sum(axis=1))
-        low, high = np.zeros(self.goals), np.full(self.goals, np.inf)
-        if lengths is not None:
-            given = ~np.isnan(lengths)
-            at[given] = low[given] = high[given] = lengths[given]
-        return at, low, high
-
-    def time_bounds(self, steps: Array) -> Bounds:
-        """Durations of the segments, which vary at a constant total (smoothness costs only)."""
-        goals = self.goals
-        if not self._order:
-            return (np.ones(goals),) * 3
-        times = np.maximum(np.sqrt((steps**2).sum(axis=1)), 1e-3)
-        times = np.maximum(times * (goals / times.sum()), 0.1)
-        times *= goals / times.sum()
-        return times, np.full(goals, _SHORTEST[self.cost]), np.full(goals, float(goals))
-
     def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
         """The plan of a solution; it has converged only if every constraint holds as well."""
         goals, dof = self.goals, self.robot.dof
@@ -270,6 +261,7 @@ class TrajectoryProblem:
         end = goals * dof
         violation = float(max((limits - self._upper).max(), (self._lower - limits).max()))
         return PathPlan(
+            instance=instance,
             converged=statistics["return_status"] in _SOLVED
             and bool(np.isfinite(x).all() and violation < 1e-8),
             reason=statistics["return_status"],
@@ -287,13 +279,6 @@ class TrajectoryProblem:
                 "solver_iterations": statistics["iter_count"],
             },
         )
-
-
-def chosen_hand(positions: dict[Hand, Any], right: Any) -> Any:
-    """Position of the hand that a parameter chooses, 1 for the right one."""
-    if len(positions) == 1:
-        return next(iter(positions.values()))
-    return right * positions["right"] + (1 - right) * positions["left"]
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
@@ -332,14 +317,14 @@ def segment_lengths(configurations: Array) -> Array:
     return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
 
 
-def spline(plan: PathPlan, q0: Array, samples: int) -> list[Array]:
+def spline(plan: PathPlan, samples: int) -> list[Array]:
     """Configurations along a smooth plan, one piece ``(samples, dof)`` per goal.
 
     Hermite cubics (one rate) or quintics (two) between start and goals.
     """
     from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
 
-    corners = np.vstack([q0, plan.configurations])
+    corners = np.vstack([plan.instance.q0, plan.configurations])
     times = np.concatenate([[0.0], np.cumsum(plan.durations)])
     curve = BPoly.from_derivatives(times, np.stack([corners, *plan.rates], axis=1))
     share = np.linspace(0.0, 1.0, samples + 1)[1:]

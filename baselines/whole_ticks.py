@@ -59,7 +59,7 @@ class Rounding:
         At a shortest path the total does not change with the division to first order, so
         this is nearly always the least number of ticks. None where a solve fails.
         """
-        exact = plan.lengths(self._instance.q0)[:-1] / self._step
+        exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
@@ -67,7 +67,7 @@ class Rounding:
 
         All of them with up to seven goals, else the nearest ``MOST_ROUNDINGS``.
         """
-        exact = plan.lengths(self._instance.q0)[:-1] / self._step
+        exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
         ranked = sorted(
             itertools.product(*choices),
@@ -80,7 +80,7 @@ class Rounding:
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
         """Least number of ticks of any rounding of a plan as long as this one."""
-        length = float(plan.lengths(self._instance.q0).sum())
+        length = float(plan.lengths().sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
 
@@ -114,7 +114,7 @@ class Rounding:
         shortest = self.solve_around(plan.configurations, lengths, merged)
         if not shortest.converged:
             return None
-        last = shortest.lengths(self._instance.q0)[-1] / self._step
+        last = shortest.lengths()[-1] / self._step
         lengths[-1] = math.ceil(last - _SLACK) * self._step
         # Hands as deep inside the discs as these lengths allow: safe against rounding, and
         # above all those that are to be there before another hand hits.

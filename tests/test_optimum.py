@@ -1,8 +1,6 @@
 """The optimum: what is shipped holds, and can be found again."""
 
-import itertools
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +10,6 @@ import renew_optima
 from coartic import builtin_tasks, execute, load_task, objective
 from coartic.analysis import optima
 from coartic.baselines.optimum import Optimum, with_locks
-from coartic.baselines.shortest_paths import fewer
 from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.baselines.whole_ticks import TickPlan
 from coartic.benchmarks.suites import Cell
@@ -114,11 +111,6 @@ def test_the_base_is_locked_beside_the_task():
         with_locks(load_task("ascending"), "xy")
     assert caught.value.outcome == "infeasible"
 
-
-def test_of_as_many_ticks_fewer_corrections_are_better():
-    ranked = [SimpleNamespace(ticks=t, corrections=c) for t, c in ((5, 2), (6, 0), (6, 1))]
-    for one, other in itertools.product(range(3), repeat=2):
-        assert fewer(ranked[one], ranked[other]) == (one < other)
     assert TickPlan((3, 0, 2), np.empty((3, 10))).ticks == 4 + 0 + 3
 
 

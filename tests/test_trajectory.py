@@ -128,7 +128,7 @@ def test_smooth_plans_are_smooth_and_pass_the_goals(cost):
     assert plan.converged
     assert plan.durations.sum() == pytest.approx(4.0)
     assert not np.allclose(plan.durations, 1.0)
-    pieces = spline(plan, task.q0, 400)
+    pieces = spline(plan, 400)
     for goal, (piece, hand) in enumerate(zip(pieces, hands, strict=True)):
         assert piece[-1] == pytest.approx(plan.configurations[goal], abs=1e-9)
         miss = task.robot.forward_kinematics(piece[-1], hand) - task.goals[goal]
@@ -167,12 +167,12 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost):
     task = small_task(goals=goals, initial_hands="RRRLR")
     plan = planned(cost, task, stop=1)
     factor, power = ONE_SEGMENT[cost]
-    lengths, times = plan.lengths(task.q0), plan.durations
+    lengths, times = plan.lengths(), plan.durations
     assert plan.cost == pytest.approx((factor * lengths**2 / times**power).sum(), rel=1e-9)
     assert plan.cost > 2 * planned(cost, task).cost
     corners = np.vstack([task.q0, plan.configurations])
     for piece, begin, end, length in zip(
-        spline(plan, task.q0, 50), corners[:-1], corners[1:], lengths, strict=True
+        spline(plan, 50), corners[:-1], corners[1:], lengths, strict=True
     ):
         along = (piece - begin) @ (end - begin) / length**2
         np.testing.assert_allclose(piece, begin + along[:, None] * (end - begin), atol=1e-9)
@@ -199,7 +199,7 @@ def test_given_lengths_are_kept():
     lengths = np.array([1.7, math.nan, 0.9])
     given = problem.solve(instance, plan.configurations, lengths=lengths)
     assert given.converged
-    assert np.all(given.lengths(task.q0)[[0, 2]] <= [1.7 + 1e-7, 0.9 + 1e-7])
+    assert np.all(given.lengths()[[0, 2]] <= [1.7 + 1e-7, 0.9 + 1e-7])
     assert given.cost > plan.cost
 
 
@@ -228,7 +228,7 @@ def test_whole_ticks_are_what_is_executed():
         assert execution.ticks <= rounded.ticks
         assert rounding.least(plan) <= rounded.ticks <= rounding.least(plan) + 1
         assert other_arm_travel(task, sequence, execution.configurations) == 0.0
-        exact = plan.lengths(task.q0)[:-1] / PAPER.step
+        exact = plan.lengths()[:-1] / PAPER.step
         choices = itertools.product(*[(math.floor(steps), math.ceil(steps)) for steps in exact])
         every = list(rounding.every(plan))
         assert min(each.ticks for each in every) <= rounded.ticks
@@ -245,7 +245,7 @@ def test_goals_that_one_posture_hits_are_merged_in_every_way():
     plans = dict(rounding.plans(plan, task, lambda ticks: True))
     assert list(plans) == [(), (1,), (2,), (1, 2)]
     for merged, merger in plans.items():
-        np.testing.assert_allclose(merger.lengths(task.q0)[list(merged)], 0.0, atol=1e-9)
+        np.testing.assert_allclose(merger.lengths()[list(merged)], 0.0, atol=1e-9)
 
 
 def test_joints_and_rates_that_are_held():
@@ -257,10 +257,15 @@ def test_joints_and_rates_that_are_held():
     assert still.held.tolist() == [
         [False, True, True, False, False], [False, True, False, True, True],
     ]  # fmt: skip
-    rest, passing = [0.0] * 5, [np.inf, 0.0, np.inf, np.inf, np.inf]
-    assert problem.rate_bound(free, False).tolist() == [*rest, *passing, *rest]
-    assert problem.rate_bound(still, False).tolist() == [*rest, np.inf, *rest[1:], *rest]
-    assert not problem.rate_bound(free, True).any()
+    start = np.array([[0.3, 0.0, 0.2, 0.2, 0.2], [0.1, 0.0, 0.4, 0.3, -0.2]]) + task.q0
+    for instance, stops, passing in (
+        (free, False, [True, False, True, True, True]),
+        (still, False, [True, False, False, False, False]),
+        (free, True, [False] * 5),
+    ):
+        plan = problem.solve(instance, start, stops=stops)
+        assert (plan.converged, plan.rates.shape) == (True, (1, 3, 5))
+        assert (plan.rates[0] != 0.0).tolist() == [[False] * 5, passing, [False] * 5]
     alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
     assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
 
