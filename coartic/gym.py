@@ -7,10 +7,8 @@ Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``T
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -29,8 +27,10 @@ from coartic.inputs import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, Session
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.initial import corrective_trial, initial_hands
-from coartic.motion.reach import reach_unchecked
-from coartic.motion.solution import Execution, execute
+from coartic.motion.lanes import LANES, lanes_for, runs_for
+from coartic.motion.setup import setup_for
+from coartic.motion.solution import execute
+from coartic.motion.steps import Fleet, look, step_robots
 from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
 MOST_ROBOTS = 1_000_000
+Rows = NDArray[np.int64] | slice
+ALL = slice(None)
 
 
 class Robots:
@@ -110,126 +112,107 @@ class Robots:
             self.tasks: list[Task | str] = [*instances]
             goals, links, hands = family.goals[1], family.links[1], family.hands
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
-            self.differ = family.links[0] < links
+            differ = family.links[0] < links
         elif (split, count, year) != (None, None, None):
             raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
         else:
             only = as_task(task)
             self.tasks = [only]
             goals, links, hands = len(only.goals), only.robot.most_links, only.hands
-            locked, self.differ = {*only.locked_base}, False
-        # All configurations have one width: base, left arm, right arm, 0 beyond its links.
-        self.links, width, number = links, BASE_DOF + 2 * links, len(self.tasks)
+            locked, differ = {*only.locked_base}, False
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
-        self.sides = np.array([HANDS.index(hand) for hand in hands])
-        arms = (BASE_DOF + links * self.sides[:, None] + np.arange(links)).ravel()
+        # All robots are taken for the widest, some of whose links have no length.
+        self.links = links
+        self.widest = widest = Robot((1.0,) * links, (1.0,) * links)
+        arms = [np.arange(widest.dof)[widest.joints(hand)] for hand in hands]
         base = [place for place, axis in enumerate("xy") if axis not in locked]
-        self.joints = np.array([*base, *arms])
-        self.starts, self.goals = np.zeros((number, width)), np.zeros((number, goals, 2))
-        self.movable = np.zeros((number, width), np.bool_)
-        self.counts, self.kinds = np.zeros(number, np.int64), np.full(number, -1)
+        joints, number = np.concatenate([base, *arms]).astype(np.int64), len(self.tasks)
+        entries, view = len(hands) - 1 + len(joints), ahead + 1
+        self.starts = np.zeros((number, widest.dof))
         self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
-        self.task, self.goal = np.zeros((2, num_envs), np.int64)
-        self.q, self.view = np.zeros((num_envs, width)), np.arange(ahead + 1)
-        entries = (len(hands) > 1) + len(self.joints)
         self.action_space = Box(-1.0, 1.0, (entries,), np.float32)
-        places, flags = 2 * (ahead + 1) + len(self.joints), len(self.joints) * self.differ
-        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], [ahead + 1, places, flags]).astype(np.float32)
-        low = np.where(high > 1.0, -high, np.float32(0.0))
-        self.observation_space = Box(low, high, dtype=np.float32)
+        sizes = [view, 2 * view + len(joints), len(joints) * differ]
+        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
+        self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
+        self.fleet = Fleet(
+            task=np.zeros(num_envs, np.int64),
+            goal=np.zeros(num_envs, np.int64),
+            q=np.zeros((num_envs, widest.dof)),
+            going=np.zeros(num_envs, np.bool_),
+            actions=np.zeros((num_envs, entries)),
+            rewards=np.zeros(num_envs),
+            seen=np.zeros((num_envs, len(high)), np.float32),
+            setups=setup_for(widest)[:0],
+            kinds=np.full(number, -1),
+            goals=np.zeros((number, goals, 2)),
+            counts=np.zeros(number, np.int64),
+            movable=np.zeros((number, len(joints)), np.bool_),
+            joints=joints,
+            sides=np.array([HANDS.index(hand) for hand in hands]),
+            ahead=ahead,
+            reach=REACH,
+            failed=-float(FAILED),
+            runs=runs_for(len(hands) * LANES, widest).reshape(len(hands), LANES),
+            lanes=lanes_for(widest),
+            members=np.zeros(LANES, np.int64),
+        )
 
     def task_at(self, number: int) -> Task:
         """A task by its number; it is loaded when it is first asked for."""
-        task = as_task(self.tasks[number])
-        if self.kinds[number] < 0:
+        task, fleet = as_task(self.tasks[number]), self.fleet
+        if fleet.kinds[number] < 0:
             check_model(self.model, radius=task.radius)
-            self.tasks[number] = task
-            places = places_of(task.robot, self.links)
-            self.starts[number, places], self.movable[number, places] = task.q0, True
-            self.movable[number, ["xy".index(axis) for axis in task.locked_base]] = False
-            self.goals[number, : len(task.goals)] = task.goal_array
-            self.counts[number] = len(task.goals)
+            self.tasks[number], places = task, self.places_of(task.robot)
+            self.starts[number, places] = task.q0
+            locked = ["xy".index(axis) for axis in task.locked_base]
+            fleet.movable[number] = np.isin(fleet.joints, np.setdiff1d(places, locked))
+            fleet.goals[number, : len(task.goals)] = task.goal_array
+            fleet.counts[number] = len(task.goals)
             kind = task.robot, float(task.radius), task.locked_base
-            self.kinds[number] = self.kind_of.setdefault(kind, len(self.kind_of))
+            if kind not in self.kind_of:
+                self.kind_of[kind] = len(fleet.setups)
+                setup = setup_for(
+                    self.widest, task.radius, locked_base=task.locked_base, model=self.model
+                ).copy()
+                for hand, arm in zip(HANDS, setup["arms"][0], strict=True):
+                    _, links, arm["shoulder_x"], arm["shoulder_y"] = task.robot.arm(hand)
+                    arm["links"] = np.pad(links, (0, len(arm["links"]) - len(links)))
+                self.fleet = fleet._replace(setups=np.concatenate([fleet.setups, setup]))
+            fleet.kinds[number] = self.kind_of[kind]
         return task
 
-    def begin(self, rows: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
+    def places_of(self, robot: Robot) -> NDArray[np.int64]:
+        """Where the entries of a robot's configurations are among those of the widest one."""
+        left, right = (np.arange(len(robot.arm(hand).links)) for hand in HANDS)
+        return np.concatenate([[0, 1], BASE_DOF + left, BASE_DOF + self.links + right])
+
+    def begin(self, rows: Rows, numbers: ArrayLike) -> None:
         """Put robots at the start of the tasks of these numbers."""
-        for number in np.unique(numbers).tolist():
+        fleet = self.fleet
+        fleet.task[rows], fleet.goal[rows], fleet.going[rows] = numbers, 0, True
+        for number in {*fleet.task[rows].tolist()}:
             self.task_at(number)
-        self.task[rows], self.goal[rows] = numbers, 0
-        self.q[rows] = self.starts[numbers]
+        fleet.q[rows] = self.starts[fleet.task[rows]]
+        look(self.fleet)
 
-    def observe(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
-        """What is seen of the next goals, and where the robots are, ``(N, O)``."""
-        task, q = self.task[rows], self.q[rows]
-        goals = self.goal[rows, None] + self.view
-        there = goals < self.counts[task, None]
-        places = self.goals[task[:, None], np.where(there, goals, 0)] - q[:, None, :BASE_DOF]
-        places[~there] = 0.0
-        seen = [there, places.reshape(len(rows), -1), q[:, self.joints]]
-        seen += [self.movable[task[:, None], self.joints]] if self.differ else []
-        return np.concatenate(seen, axis=1, dtype=np.float32)
+    def step(self, actions: ArrayLike, rows: Rows = ALL) -> None:
+        """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
+        of these rows.
 
-    def step(self, actions: ArrayLike, rows: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
-        """Reach for the next goal: rewards ``(N,)``, and whose trials have ended.
-
-        Raises ValueError for actions of another shape than ``(N, A)``, or with NaN.
+        Raises ValueError for actions of another shape, or with NaN.
         """
-        chosen = real_array("actions", actions)
-        if chosen.shape != (shape := (len(rows), *self.action_space.shape)):
+        chosen, shape = real_array("actions", actions), self.fleet.actions[rows].shape
+        if chosen.shape != shape:
             raise ValueError(f"actions have shape {chosen.shape}; it must be {shape}")
-        if math.isnan(chosen.min()):
-            row = int(np.isnan(chosen).any(axis=1).argmax())
-            raise ValueError(f"the action of robot {row} has NaN; it must be numbers")
-        chosen = np.minimum(np.maximum(chosen, -1.0), 1.0)
-        task, goal = self.task[rows], self.goal[rows]
-        away = np.zeros((len(rows), self.q.shape[1]))
-        away[:, self.joints] = REACH * chosen[:, -len(self.joints) :]
-        away[~self.movable[task]] = 0.0
-        other = (chosen[:, 0] > 0.5) & (len(self.sides) > 1)
-        rewards, kinds = np.empty(len(rows)), self.kinds[task]
-        for (robot, radius, locked), kind in self.kind_of.items():
-            of_kind = np.flatnonzero(kinds == kind)
-            if not len(of_kind):
-                continue
-            some, places = rows[of_kind], places_of(robot, self.links)
-            q, goals = self.q[some[:, None], places], self.goals[task[of_kind], goal[of_kind]]
-            reach = partial(
-                reach_unchecked, robot, radius=radius, locked_base=locked, model=self.model
-            )
-            hands = len(self.sides)  # of each robot, which are corrected in one call
-            every = np.concatenate([q] * hands), np.repeat(self.sides, len(some))
-            alone = reach(*every, np.concatenate([goals] * hands), looks=False)
-            corrected = alone.corrected.reshape(hands, *q.shape)
-            ways = np.sqrt(((corrected - q) ** 2).sum(axis=2))
-            ways[np.isnan(ways)] = np.inf
-            hand = ways.argmin(axis=0)
-            hand = np.where(other[of_kind], 1 - hand, hand)
-            middle = corrected[hand, np.arange(len(some))]
-            middle = np.where(np.isnan(middle), q, middle)
-            targets = middle + away[of_kind[:, None], places]
-            reached = reach(q, self.sides[hand], goals, targets=targets)
-            self.q[some[:, None], places] = reached.q
-            self.goal[some] += reached.hit
-            rewards[of_kind] = np.where(reached.hit, -reached.ticks, -FAILED)
-        return rewards, (rewards == -FAILED) | (self.goal[rows] == self.counts[task])
+        self.fleet.actions[rows] = chosen
+        refused = step_robots(self.fleet)
+        if refused >= 0:
+            raise ValueError(f"the action of robot {refused} has NaN; it must be numbers")
 
-    def infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
+    def infos(self) -> dict[str, Any]:
         """Names of tasks, and whether all goals are hit."""
-        task = self.task[rows]
-        return {"task": self.names[task], "is_success": self.goal[rows] == self.counts[task]}
-
-
-@cache
-def places_of(robot: Robot, links: int) -> NDArray[np.int64]:
-    """Where the entries of a robot's configurations are among those of robots with so many links an
-    arm, ``(dof,)``."""
-    left, right = (BASE_DOF + np.arange(len(robot.arm(hand).links)) for hand in HANDS)
-    return np.concatenate([np.arange(BASE_DOF), left, links + right])
-
-
-ONLY = np.zeros(1, np.int64)
+        task = self.fleet.task
+        return {"task": self.names[task], "is_success": self.fleet.goal == self.fleet.counts[task]}
 
 
 class TaskEnv(gymnasium.Env):
@@ -250,7 +233,6 @@ class TaskEnv(gymnasium.Env):
         self.action_space = self.robots.action_space
         self.observation_space = self.robots.observation_space
         self.render_mode = render_mode
-        self._goes_on = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -258,19 +240,18 @@ class TaskEnv(gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=seed)
         check_no_options(options)
-        self.robots.begin(ONLY, self.np_random.integers(len(self.robots.tasks), size=1))
-        self._goes_on = True
-        return self.robots.observe(ONLY)[0], self._info()
+        self.robots.begin(ALL, self.np_random.integers(len(self.robots.tasks), size=1))
+        return self.robots.fleet.seen[0].copy(), self._info()
 
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Reach for the next goal. Raises ResetNeeded where the trial has ended."""
-        if not self._goes_on:
+        fleet = self.robots.fleet
+        if not fleet.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
-        rewards, ended = self.robots.step(np.asarray(action)[None], ONLY)
-        self._goes_on = not ended[0]
-        return self.robots.observe(ONLY)[0], float(rewards[0]), bool(ended[0]), False, self._info()
+        self.robots.step(np.asarray(action)[None])
+        return fleet.seen[0].copy(), fleet.rewards.item(), not fleet.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """The robot and its goals as a picture ``(400, 600, 3)``; goals that are hit are filled."""
@@ -281,20 +262,19 @@ class TaskEnv(gymnasium.Env):
 
         from coartic.drawing import box, draw_goals, draw_robot, fill_goals
 
-        task = self.robots.task_at(int(self.robots.task[0]))
+        robots, fleet = self.robots, self.robots.fleet
+        task = robots.task_at(fleet.task.item())
         (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
         figure = Figure(figsize=(6, 4))
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
-        draw_robot(
-            axes, task, self.robots.q[0, places_of(task.robot, self.robots.links)], weight=1.5
-        )
-        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < self.robots.goal[0])
+        draw_robot(axes, task, fleet.q[0, robots.places_of(task.robot)], weight=1.5)
+        fill_goals(draw_goals(axes, task), np.arange(len(task.goals)) < fleet.goal[0])
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _info(self) -> dict[str, Any]:
-        return {name: values.tolist()[0] for name, values in self.robots.infos(ONLY).items()}
+        return {name: values.item() for name, values in self.robots.infos().items()}
 
 
 class TaskVectorEnv(VectorEnv):
@@ -314,7 +294,6 @@ class TaskVectorEnv(VectorEnv):
         self.single_observation_space = self.robots.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._all = np.arange(num_envs)
         self._rngs: list[Any] = [None] * num_envs
 
     def reset(
@@ -332,36 +311,36 @@ class TaskVectorEnv(VectorEnv):
         for row, each in enumerate(seed):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]
-        self._begin(self._all)
-        return self.robots.observe(self._all), self._infos(self._all)
+        self._begin(np.ones(self.num_envs, np.bool_))
+        return self.robots.fleet.seen.copy(), self._infos()
 
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Reach for the next goal of each trial, and begin anew those that have ended."""
-        if self._rngs[0] is None:
+        fleet = self.robots.fleet
+        if not fleet.going.all():
             raise ResetNeeded("no trial goes on: reset first")
-        rewards, ended = self.robots.step(actions, self._all)
-        final, rows = {}, np.flatnonzero(ended)
-        if len(rows):
+        self.robots.step(actions)
+        final, ended = {}, ~fleet.going
+        if ended.any():
             last = np.full(self.num_envs, None, dtype=object)
-            for row, seen in zip(rows.tolist(), self.robots.observe(rows), strict=True):
-                last[row] = seen
-            final = {"final_obs": last, "final_info": self._infos(rows)}
+            for row in np.flatnonzero(ended).tolist():
+                last[row] = fleet.seen[row].copy()
+            final = {"final_obs": last, "final_info": self._infos(ended)}
             final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
-            self._begin(rows)
-        infos = self._infos(self._all) | final
-        return self.robots.observe(self._all), rewards, ended, np.zeros_like(ended), infos
+            self._begin(ended)
+        infos = self._infos() | final
+        return fleet.seen.copy(), fleet.rewards.copy(), ended, np.zeros_like(ended), infos
 
-    def _begin(self, rows: NDArray[np.int64]) -> None:
-        number = len(self.robots.tasks)
-        drawn = [self._rngs[row].integers(number) if number > 1 else 0 for row in rows.tolist()]
-        self.robots.begin(rows, np.array(drawn))
+    def _begin(self, ended: NDArray[np.bool_]) -> None:
+        number, rows = len(self.robots.tasks), np.flatnonzero(ended)
+        drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
+        self.robots.begin(rows, drawn)
 
-    def _infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
-        there = np.zeros(self.num_envs, np.bool_)
-        there[rows] = True
-        infos = self.robots.infos(self._all)
+    def _infos(self, there: NDArray[np.bool_] | None = None) -> dict[str, Any]:
+        infos = self.robots.infos()
+        there = np.ones(self.num_envs, np.bool_) if there is None else there
         return infos | {f"_{name}": there.copy() for name in infos}
 
 
@@ -475,75 +454,62 @@ def score(
                 f"{name} was trained on observations of shape {learned_on}; "
                 f"those of {env if isinstance(env, str) else 'this environment'} have {shape}"
             )
+        if not (callable(each) or hasattr(each, "predict") or isinstance(each, Method)):
+            raise TypeError(
+                f"policy is {brief_value(each)}; it must be a function of observations, an agent "
+                "with predict, or a Method"
+            )
 
-    def run(act: Callable[[NDArray[np.float32]], ArrayLike], trials: int = 1) -> Array:
+    def run(act: Any, trials: int = 1) -> Array:
         """Rewards of trials on each task, ``(K, trials)``; NaN where one failed."""
-        count = trials * len(tasks)
-        robots, rows, totals = Robots(count, **given), np.arange(count), np.zeros(count)
+        rows = np.arange(trials * len(tasks))
+        robots, totals = Robots(len(rows), **given), np.zeros(len(rows))
         robots.begin(rows, rows // trials)
         while len(rows):
-            rewards, ended = robots.step(act(robots.observe(rows)), rows)
-            totals[rows] += rewards
-            rows = rows[~ended]
+            robots.step(act(robots.fleet.seen[rows]), rows)
+            totals[rows] += robots.fleet.rewards[rows]
+            rows = np.flatnonzero(robots.fleet.going)
         return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
 
-    def solve(method: Method) -> Array:
-        """Rewards of its solutions, ``(K, 1)``; NaN where it has none."""
-        rewards = np.full((len(tasks), 1), np.nan)
-        for number, task in enumerate(tasks):
+    def solve(method: Method, task: Task) -> float | None:
+        """Reward of its solution; None where it has none."""
+        with suppress(MethodError):
             session = Session(task, seed, method.told, model=model, trusted=True)
-            with suppress(MethodError):
-                solution = method.solve(session).solution
-                rewards[number] = reward_of(execute(task, solution, model=model))
-        return rewards
+            return execute(task, method.solve(session).solution, model=model).reward
+        return None
 
-    entries, rng = setting.action_space.shape, np.random.default_rng(seed)
-    alone = [
-        corrective_trial(each, initial_hands(each, model=model), model=model) for each in tasks
-    ]
-    shipped = [best_shipped(each) if model == PAPER else None for each in tasks]
-    best = np.array([[np.nan if each is None else each.reward] for each in shipped])
-    rewards = {
-        **{name: solve(each) if isinstance(each, Method) else run(policy_of(each))
-           for name, each in policies.items()},
-        "random actions": run(lambda seen: rng.uniform(-1, 1, (len(seen), *entries)), episodes),
-        "corrective process": np.array([[reward_of(trial)] for trial in alone]),
-        "best known": best,
-    }  # fmt: skip
-    rows = {name: summarise(each, best) for name, each in rewards.items()}
+    def column(values: Iterable[float | None]) -> Array:
+        return np.array([[np.nan if each is None else each] for each in values])
+
+    rewards = {}
+    for name, each in policies.items():
+        if isinstance(each, Method):
+            rewards[name] = column(solve(each, task) for task in tasks)
+        elif hasattr(each, "predict"):
+            rewards[name] = run(lambda seen, each=each: each.predict(seen, deterministic=True)[0])
+        else:
+            rewards[name] = run(each)
+    shape, rng = setting.action_space.shape, np.random.default_rng(seed)
+    hands = [initial_hands(task, model=model) for task in tasks]
+    alone = [corrective_trial(*each, model=model).reward for each in zip(tasks, hands, strict=True)]
+    shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
+    best = column(None if each is None else each.reward for each in shipped)
+    rewards["random actions"] = run(lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), episodes)
+    rewards |= {"corrective process": column(alone), "best known": best}
+    rows = {}
+    for name, found in rewards.items():
+        gaps = pd.DataFrame(100.0 * (best - found) / np.abs(best))
+        values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
+        half = stdtrit(len(values) - 1, 0.975) * values.sem() if len(values) > 2 else np.nan
+        rows[name] = {
+            "reward": pd.DataFrame(found).mean(axis=1).mean(),
+            "gap": values.mean(),
+            "gap_low": values.mean() - half,
+            "gap_high": values.mean() + half,
+            "completed": float(np.isfinite(found).mean()),
+        }
     rows["best known"]["completed"] = np.nan
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
-
-
-def reward_of(trial: Execution) -> float:
-    """Its reward; NaN where it failed."""
-    return np.nan if trial.reward is None else trial.reward
-
-
-def summarise(rewards: Array, best: Array) -> dict[str, float]:
-    """Means over tasks of rewards ``(K, trials)``, NaN for those that failed."""
-    gaps = pd.DataFrame(100.0 * (best - rewards) / np.abs(best))
-    values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
-    half = stdtrit(len(values) - 1, 0.975) * values.sem() if len(values) > 2 else np.nan
-    return {
-        "reward": pd.DataFrame(rewards).mean(axis=1).mean(),
-        "gap": values.mean(),
-        "gap_low": values.mean() - half,
-        "gap_high": values.mean() + half,
-        "completed": float(np.isfinite(rewards).mean()),
-    }
-
-
-def policy_of(policy: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """A policy as a function. Raises TypeError for what is none."""
-    if hasattr(policy, "predict"):
-        return lambda seen: policy.predict(seen, deterministic=True)[0]
-    if not callable(policy):
-        raise TypeError(
-            f"policy is {brief_value(policy)}; it must be a function of observations, an agent "
-            "with predict, or a Method"
-        )
-    return policy  # type: ignore[no-any-return]
 
 
 IDS: dict[str, dict[str, Any]] = {

@@ -97,9 +97,9 @@ def attempt(count: int, setup: Any, batch: Any) -> None:
             batch.runs[i].ticks = 0
 
 
-@inlined
-def correct_missed(count: int, setup: Any, batch: Any) -> None:
-    """Have **A** finish missed goals; ``target`` and ``ticks`` become those of its movements."""
+@inner
+def find_corrections(count: int, setup: Any, batch: Any) -> None:
+    """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
     at, lane = batch.lanes.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -110,6 +110,12 @@ def correct_missed(count: int, setup: Any, batch: Any) -> None:
             board(at, lane, i, run.q, arm_of(setup, run.hand), run.goal)
             lane += 1
     correct_lanes(batch.lanes, lane, setup, batch.runs)
+
+
+@inlined
+def correct_missed(count: int, setup: Any, batch: Any) -> None:
+    """Have **A** finish missed goals; ``target`` and ``ticks`` become those of its movements."""
+    find_corrections(count, setup, batch)
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     move_acting(count, False, setup, batch)
