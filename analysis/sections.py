@@ -28,8 +28,8 @@ class Section:
     table: Callable[[Study], pd.DataFrame]
     caption: str
     """Caption of the table."""
-    figure: Callable[[Study], Plot] | None = None
-    """It raises CoarticError where the folder's runs do not allow it."""
+    figure: Callable[[Study], Plot | None] | None = None
+    """It returns None where the folder's runs do not allow it."""
     sentence: Callable[[Study], str] | None = None
     """Returns the finding in words, for enough runs and for too few, with the number that failed;
     empty where the runs say nothing."""

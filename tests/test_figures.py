@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from coartic import drawing, load_task
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
-from coartic.analysis.report import build
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.topics.learning import learning_curves
 from coartic.analysis.topics.paper.hands import hand_shares
@@ -39,7 +38,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def figures(study):
     """Every figure that these runs allow."""
-    drawn = {name: build.draw_figure(study, name) for name in FIGURES}
+    drawn = {name: draw(study) for name, draw in FIGURES.items()}
     return {name: plot for name, plot in drawn.items() if plot}
 
 

@@ -14,13 +14,11 @@ from typing import Any
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
 from coartic import CoarticError, Task
 from coartic.analysis.figures.style import (
     BACKGROUND,
     BLUE,
-    CURVE,
     GREY,
     INK,
     RC,
@@ -41,7 +39,7 @@ DPI = 300
 MAGNIFIED = 1.3
 """Enlarges figures on the page, so that their 8 pt are as large as its text."""
 PHONE = 320 / 72
-"""Width in inches that a phone shows: it stacks panels, or scrolls one that is wider."""
+"""Width in inches that a phone shows: it scrolls a figure that is wider."""
 _FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
@@ -76,18 +74,20 @@ Parts = tuple[Figure, pd.DataFrame, str, Iterable[Task]]
 
 def figure(
     title: str, caption: str
-) -> Callable[[Callable[[Study], Parts]], Callable[[Study], Plot]]:
+) -> Callable[[Callable[[Study], Parts | None]], Callable[[Study], Plot | None]]:
     """A decorator: what draws a study becomes a figure with this title and caption.
 
     It is drawn in the style of all figures, and has its id of the function's name. The caption says
-    what a dagger means where one of the tasks is reconstructed.
+    what a dagger means where one of the tasks is reconstructed. None where the runs allow none.
     """
 
-    def as_figure(draw: Callable[[Study], Parts]) -> Callable[[Study], Plot]:
+    def as_figure(draw: Callable[[Study], Parts | None]) -> Callable[[Study], Plot | None]:
         @wraps(draw)
         @styled
-        def plot(study: Study) -> Plot:
-            drawing, data, alt, tasks = draw(study)
+        def plot(study: Study) -> Plot | None:
+            if (parts := draw(study)) is None:
+                return None
+            drawing, data, alt, tasks = parts
             dagger = f" {RECONSTRUCTED}" if any(task.reconstructed for task in tasks) else ""
             return Plot(id_of(draw), title, caption + dagger, alt, drawing, data)
 
@@ -136,64 +136,38 @@ def save(plot: Plot, folder: Path) -> list[Path]:
 def for_page(plot: Plot) -> dict[str, Any]:
     """A figure for the template of the page.
 
-    Keys ``id``, ``title`` and ``caption``; ``svg``, the figure as one ``<svg>`` element;
-    ``pieces``, its panels and legend entries, an ``<svg>`` each, for screens too narrow for panels
-    side by side (empty where none stand so); ``curves``, names of curves and the CSS of their
-    lines; ``width`` in rem; ``wide``, whether it is wider than a phone.
+    Keys ``id``, ``title`` and ``caption``; ``svg``, the figure as one ``<svg>`` element; ``width``
+    in rem; ``wide``, whether it is wider than a phone.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
     one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
-    :func:`~.style.tip` show it, and the marks of a curve have its name as ``data-curve``; the page
-    has a key of the curves in place of a legend. Ids begin with the plot's id, so that several
-    can share a page.
+    :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
     """
-    figure, stream = plot.figure, io.StringIO()
-    has_curves = any((part.get_gid() or "").startswith(CURVE) for part in figure.findobj())
-    dpi = figure.dpi
-    figure.set_dpi(72)  # that of SVG, so that boxes are in its points
-    legends, figure.legends = figure.legends, [] if has_curves else figure.legends
+    stream, inches = io.StringIO(), plot.figure.get_figwidth()
     with rc_context({**RC, "svg.fonttype": "none"}):
-        figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
-        boxes = pieces_of(figure)
-    figure.legends = legends
-    figure.set_dpi(dpi)
-    if not has_curves:
-        figure.set_layout_engine("none")  # its file has the layout that it now has
+        plot.figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
-    styles = re.findall(
-        rf'<g id="{CURVE}([^";]*);[^"]*">\n<path [^>]*style="(fill: none[^"]*)"', text
-    )
-    curves: dict[str, str] = {}
-    for name, own in styles:
-        curves.setdefault(html.unescape(name), coloured(own))
-    text = re.sub(rf'<g id="{CURVE}([^";]*);', r'<g data-curve="\1" id="', text)
-    text = re.sub(rf' id="{TIP}([^"]*)">', r"><title>\1</title>", text).replace(' id="">', ">")
+    text = re.sub(rf' id="{TIP}([^"]*)">', r"><title>\1</title>", text)
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
-    head, body = coloured(text).split(">", 1)
+    # The backend leaves black fills out: they inherit the root's.
+    text = text.replace(INK, "currentColor").replace(BACKGROUND, "var(--paper, none)")
+    for color, name in ((GREY, "grey"), (BLUE, "blue"), (SKY, "sky")):
+        text = text.replace(color, f"var(--{name}, {color})")
+    head, body = text.split(">", 1)
     view = re.search(r'viewBox="[^"]*"', head)
     assert view is not None
     # Styles that the backend gives to all elements would apply to the whole page.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
-    body = body.replace("xlink:href", "href").strip().removesuffix("</svg>")
-    drawn = 'stroke-linejoin="round" stroke-linecap="butt" fill="currentColor" '
-    drawn += f'font-family="{_FONTS}"'
-    whole = (
+    svg = (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
-        f'aria-label="{html.escape(one_line(plot.alt))}">'
-        f'<g id="{plot.id}-all" {drawn}>{body}</g></svg>'
+        f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
+        f'stroke-linecap="butt" fill="currentColor" font-family="{_FONTS}">'
+        f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
-    height = 72 * figure.get_figheight()
-    pieces = tuple(
-        f'<svg viewBox="{box.x0:.0f} {height - box.y1:.0f} {box.width:.0f} {box.height:.0f}" '
-        f'style="width: {MAGNIFIED * box.width / 12:.1f}rem"><use href="#{plot.id}-all"/></svg>'
-        for box in boxes
-    )
-    inches = figure.get_figwidth()
     return {
-        **{"id": plot.id, "title": plot.title, "caption": plot.caption},
-        **{"svg": whole, "pieces": pieces, "curves": tuple(curves.items())},
+        **{"id": plot.id, "title": plot.title, "caption": plot.caption, "svg": svg},
         **{"wide": inches > PHONE, "width": f"{MAGNIFIED * inches * 72 / 12:.0f}"},
     }
 
@@ -203,29 +177,3 @@ def shorten(attribute: re.Match[str]) -> str:
     a path does not need: the page is a seventh smaller."""
     cut = re.sub(r"(\.\d\d)\d+", r"\1", attribute[0])
     return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
-
-
-def coloured(text: str) -> str:
-    """SVG whose colours are the page's, so that they show on dark as well."""
-    # The backend leaves black fills out: they inherit the root's.
-    text = text.replace(INK, "currentColor").replace(BACKGROUND, "var(--paper, none)")
-    for color, name in ((GREY, "grey"), (BLUE, "blue"), (SKY, "sky")):
-        text = text.replace(color, f"var(--{name}, {color})")
-    return text
-
-
-def pieces_of(figure: Figure) -> list[Bbox]:
-    """Boxes of panels and of what legends say, points, where panels stand side by side and can be
-    read alone."""
-    panels = [axes for axes in figure.axes if axes.axison]
-    alone = all(axes.yaxis.get_tick_params().get("labelleft", True) for axes in panels)
-    if not alone or len({round(axes.get_position().x0, 2) for axes in panels}) < 2:
-        return []
-    entries = [
-        Bbox.union([handle.get_window_extent(), text.get_window_extent()])
-        for legend in figure.legends
-        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
-        if handle is not None
-    ]
-    boxes = [axes.get_tightbbox() for axes in panels] + entries
-    return [box.padded(3) for box in boxes if box is not None]

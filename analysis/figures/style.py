@@ -38,8 +38,6 @@ COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
-CURVE = "curve:"
-"""Beginning of the id of marks of a :func:`curve`."""
 _COLORS: Mapping[Color, str] = {
     "blue": "#0072b2",
     "sky": "#56b4e9",
@@ -187,13 +185,7 @@ def means(
 
 def tip(artist: Artist, text: str) -> None:
     """Set the text that a page of HTML shows when the pointer rests on a mark."""
-    artist.set_gid(f"{artist.get_gid() or ''}{TIP}{text}")
-
-
-def curve(name: str, *artists: Artist) -> None:
-    """Make marks a curve that a page of HTML switches on and off by its name."""
-    for artist in artists:
-        artist.set_gid(f"{CURVE}{name};{artist.get_gid() or ''}")
+    artist.set_gid(f"{TIP}{text}")
 
 
 def legend_line(label: str, **line: Any) -> Line2D:

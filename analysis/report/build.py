@@ -1,19 +1,13 @@
-"""A report: one page, its tables and figures, and a summary.
-
-``report.html`` stands alone; ``summary.md`` is its first screen, for code hosts; ``tables/`` has
-every table as CSV and LaTeX, and ``figures/`` every figure as SVG and PDF.
-"""
+"""A report: one page that stands alone, ``report.html``, and its tables and figures as files."""
 
 from __future__ import annotations
 
 import os
-import re
-from functools import cache
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any, get_args
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
@@ -21,12 +15,13 @@ from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, html_table, latex_table
-from coartic.analysis.sections import FIGURES, SECTIONS, TABLES
+from coartic.analysis.sections import SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import NONE, id_of, listed, number
 from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
+HERE = Path(__file__).parent
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 SEARCHED = 12
 """Rows of a table above which it has a field to search them."""
@@ -34,36 +29,10 @@ LONG = 20
 """Rows of a table above which it scrolls in a box of its own."""
 
 
-def report_files(study: Study, *, for_paper: bool = True) -> dict[str, bytes]:
-    """The report's files by their paths within its folder.
-
-    ``for_paper``: also LaTeX tables, figures as PDF, and figures that the page does not show.
-    """
-    files = {"report.html": page(study).encode(), "summary.md": summary(study).encode()}
-    captions = {id_of(section.table): section.caption for section in SECTIONS}
-    for name, table in TABLES.items():
-        frame = table(study)
-        if len(frame):
-            files[f"tables/{name}.csv"] = frame.to_csv(lineterminator="\n").encode()
-            if for_paper:
-                caption = captions.get(name) or name.replace("-", " ").capitalize()
-                notes = about.notes_of(study, frame.columns)
-                files[f"tables/{name}.tex"] = latex_table(frame, name, caption, notes).encode()
-    files["tables/notes.txt"] = about.notes_on_tables(study).encode()
-    for name in FIGURES if for_paper else plots(study):
-        if plot := plots(study).get(name) or draw_figure(study, name):
-            for ending in (".svg", ".pdf") if for_paper else (".svg",):
-                files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
-    return files
-
-
-def write_report(
-    study: Study,
-    folder: Path,
-    *,
-    for_paper: bool = True,
-) -> list[str]:
+def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
     """Write a report into ``folder``, in the place of an earlier one; the paths of its files.
+
+    ``for_paper``: tables as LaTeX beside those as CSV, and figures as SVG and PDF.
 
     Raises CoarticError where the folder holds the results themselves or anything that no report
     wrote.
@@ -76,24 +45,32 @@ def write_report(
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
     make_folder(folder, ["report.html"])
-    files = report_files(study, for_paper=for_paper)
+    files = {
+        "report.html": page(study).encode(),
+        "tables/notes.txt": about.notes_on_tables(study).encode(),
+    }
+    captions = {id_of(section.table): section.caption for section in SECTIONS}
+    for name, table in TABLES.items():
+        frame = table(study)
+        if len(frame):
+            files[f"tables/{name}.csv"] = frame.to_csv(lineterminator="\n").encode()
+            if for_paper:
+                caption = captions.get(name) or name.replace("-", " ").capitalize()
+                notes = about.notes_of(study, frame.columns)
+                files[f"tables/{name}.tex"] = latex_table(frame, name, caption, notes).encode()
+    if for_paper:
+        for name, plot in plots(study).items():
+            for ending in (".svg", ".pdf"):
+                files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
     publish(folder, files)
     return list(files)
-
-
-def draw_figure(study: Study, name: str) -> Plot | None:
-    """A figure by its id; None where the runs do not allow it."""
-    try:
-        return FIGURES[name](study)
-    except CoarticError:
-        return None
 
 
 @cached
 def plots(study: Study) -> dict[str, Plot]:
     """Figures of the page by id, as far as the runs allow them."""
-    ids = [id_of(each.figure) for each in about.visible_sections(study) if each.figure]
-    return {name: plot for name in ids if (plot := draw_figure(study, name)) is not None}
+    drawn = [each.figure(study) for each in about.visible_sections(study) if each.figure]
+    return {plot.id: plot for plot in drawn if plot}
 
 
 def sections(study: Study) -> list[dict[str, Any]]:
@@ -123,36 +100,29 @@ def sections(study: Study) -> list[dict[str, Any]]:
     return allowed
 
 
-@cache
-def template(name: str) -> Template:
-    """A template beside this file; texts that it shows are escaped where it is of HTML."""
+def page(study: Study) -> str:
+    """The page of HTML, which needs no other file and no network."""
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
-        autoescape=name.endswith(".html.jinja"),
+        autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
         finalize=lambda value: about.shown(value) if type(value) is str else value,
     )
-    environment.filters |= {"number": number, "listed": listed, "inert": inert}
-    return environment.get_template(name)
-
-
-def page(study: Study) -> str:
-    """The page of HTML, which needs no other file and no network."""
-    here = Path(__file__).parent
-    scripts = [(here / name).read_text("utf-8") for name in ("page.js", "address.js")]
+    environment.filters |= {"number": number, "listed": listed}
     try:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
         links = []
-    return template("page.html.jinja").render(
-        description=" ".join(text for _, text in about.answers(study)),
-        styles=(here / "page.css").read_text("utf-8") + text_of("play.css"),
+    answers = about.answers(study)
+    return environment.get_template("page.html.jinja").render(
+        description=" ".join(text for _, text in answers),
+        styles=(HERE / "page.css").read_text("utf-8") + text_of("play.css"),
         player=player(study),
-        script="\n".join(f"{{\n{script}}}" for script in scripts),
-        answers=about.answers(study),
+        script=(HERE / "page.js").read_text("utf-8"),
+        answers=answers,
         sections=sections(study),
         claims=claims_for_page(study),
         verdicts=get_args(Verdict),
@@ -161,20 +131,6 @@ def page(study: Study) -> str:
         paper_link=PAPER_LINK,
         links=dict(link.split(", ", 1) for link in links),
     )
-
-
-def summary(study: Study) -> str:
-    """The first screen as Markdown, with pictures, for where code hosts show it."""
-    return template("summary.md.jinja").render(
-        answers=about.answers(study),
-        provenance=about.provenance(study),
-        figures=[name for name in ("postures", "ranking", "runtimes") if name in plots(study)],
-    )
-
-
-def inert(text: str) -> str:
-    """Text for Markdown in which names from elsewhere make no tags, links and pictures."""
-    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", text).replace("](", "]\\(")
 
 
 def claims_for_page(study: Study) -> list[dict[str, str]]:

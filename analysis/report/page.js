@@ -37,21 +37,6 @@
     });
   });
 
-  /* The key of a figure switches its curves on and off. */
-  document.querySelectorAll(".key li").forEach((entry) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.ariaPressed = "true";
-    button.append(...entry.childNodes);
-    entry.append(button);
-    const figure = document.getElementById(`figure-${entry.parentElement.dataset.figure}`);
-    const marks = [...figure.querySelectorAll("g[data-curve]")].filter((mark) => mark.dataset.curve === entry.dataset.curve);
-    button.addEventListener("click", () => {
-      button.ariaPressed = String(button.ariaPressed === "false");
-      marks.forEach((mark) => { mark.style.display = button.ariaPressed === "true" ? "" : "none"; });
-    });
-  });
-
   document.querySelectorAll(".tools").forEach((tools) => {
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("input");

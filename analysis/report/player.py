@@ -19,8 +19,6 @@ from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS
 
-CONTROL = "play-link"
-"""Hidden control of the figure that holds its state for the address of the page."""
 NO_SCRIPTS = "<p>The movements are played by a script, and scripts are switched off here.</p>"
 
 
@@ -49,7 +47,7 @@ def player(study: Study) -> str:
     return figure(
         presets,
         still=NO_SCRIPTS,
-        control=CONTROL,
+        page=None,
         first={"who": first if first in ids else ids[0]},
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic import CoarticError
 from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
@@ -141,12 +140,12 @@ def runtimes(study: Study) -> Rows:
     "optimum; a run counts for each target that it has reached. a: trials; planners make none and "
     "are lines. b: forward-kinematics evaluations, spread evenly over a run's trials.",
 )
-def draw_runtimes(study: Study) -> Parts:
+def draw_runtimes(study: Study) -> Parts | None:
     """Share of targets reached, against trials and kinematics."""
     data = ecdf_curves(study)
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
-        raise CoarticError("no method that reaches a target on a task with a known optimum")
+        return None
     looks = looks_in(study, data.method.unique())
     size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
     drawing, panels = style.panels((1, len(spends)), size)
@@ -199,7 +198,6 @@ def draw_shares(
         (drawn,) = axes.step(x, y, where="post", **line)
         name = name_in(study, str(label))
         style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
-        style.curve(name, drawn)
     axes.set_xlim(edge, most)
     axes.set_ylim(-2, 102)
 

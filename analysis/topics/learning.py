@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic import CoarticError, Task
+from coartic import Task
 from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
@@ -76,11 +76,11 @@ def learning(study: Study) -> Rows:
     "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
     "far below the initial solution are cut off.",
 )
-def draw_learning_curves(study: Study) -> Parts:
+def draw_learning_curves(study: Study) -> Parts | None:
     """Reward of the learner, hill climbing, CMA-ES and methods of others, a panel a task."""
     data = learning_curves(study)
     if not len(data):
-        raise CoarticError("no run that learns by trial")
+        return None
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = methods.in_order(data.method.unique())
     rows, columns = style.grid(len(tasks))
@@ -163,19 +163,17 @@ def draw_curves(
     for label, rows in data.groupby("method", sort=False):
         look = look_of[str(label)]
         band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
-        middle_half = axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
-        best = axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
-        trials = axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
-        style.curve(name_in(study, str(label)), middle_half, *best, *trials)
+        axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
+        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
+        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
     floor, top = data.best.min(), data.best_high.max()
     initial = initial_reward(task)
     if not math.isnan(initial):
-        style.curve("initial solution", axes.axhline(initial, **style.INITIAL))
+        axes.axhline(initial, **style.INITIAL)
         floor, top = initial, max(top, initial)
     optimum = study.optima.get(task.name)
     if optimum is not None:
-        name = optimum_in_words(study)
-        style.curve(name, axes.axhline(optimum.reward, **style.OPTIMUM))
+        axes.axhline(optimum.reward, **style.OPTIMUM)
         top = max(top, optimum.reward)
     reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
     lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from coartic import CoarticError
 from coartic.analysis import frames, methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
@@ -159,11 +158,11 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     f"there are several), with its {style.COVERAGE} bootstrap interval over runs. Methods that "
     "are run once have no interval. Diamonds and bold names: the paper's learner.",
 )
-def draw_ranking(study: Study) -> Parts:
+def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap to the optimum of every method, a mean over tasks."""
     rows = main_gaps(study)
     if not len(rows):
-        raise CoarticError("no method with a solution to every run and a known optimum")
+        return None
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
     groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
     groups = [(group, of_group) for group, of_group in groups if len(of_group)]

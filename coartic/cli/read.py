@@ -33,7 +33,7 @@ def report(
         ),
     ] = None,
     for_paper: Annotated[
-        bool, typer.Option("--for-paper", help="Also figures as PDF and tables as LaTeX.")
+        bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
     ] = False,
 ) -> None:
     """Write the report of a results folder."""
@@ -46,15 +46,17 @@ def report(
     with interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")):
         files = write_report(study, out, for_paper=for_paper)
     tables = sum(name.endswith(".csv") for name in files)
-    figures = len({Path(name).stem for name in files if name.startswith("figures/")})
-    what = "CSV and LaTeX" if for_paper else "CSV"
+    figures = sum(name.endswith(".svg") for name in files)
+    what = f"CSV and LaTeX) and {counted(figures, 'figure')} (SVG and PDF" if for_paper else "CSV"
     say(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(tables, 'table')} ({what}) and {counted(figures, 'figure')}."
+        f"{counted(tables, 'table')} ({what})."
     )
     say_pairs([*answers_in_words(study)])
     if not for_paper:
-        say_pairs([("More", "coartic report --for-paper adds figures as PDF and tables as LaTeX")])
+        say_pairs(
+            [("More", "coartic report --for-paper adds figures as SVG and PDF and tables as LaTeX")]
+        )
 
 
 def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:

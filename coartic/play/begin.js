@@ -1,28 +1,21 @@
 "use strict";
-/* Begins the figure. Its state is in the address of its own page; elsewhere in that of the `page` that
-   the data name, or in a `control` whose value the page keeps in its address. */
+/* Begins the figure. Its state is in the address of its own page. Elsewhere the data name the `page`
+   that links lead to, or null: then there are none. */
 {
   const source = document.getElementById("play-model").textContent;
   const data = JSON.parse(document.getElementById("play-data").textContent);
   const root = document.getElementById("play");
-  const control = document.getElementById(data.control);
+  const own = data.page === undefined;
   const here = () => window.location.hash.slice(1);
   const address = (link) => {
     const found = new URL(data.page || "", window.location.href);
-    if (control) found.searchParams.set(control.id, link);
-    else found.hash = link;
+    found.hash = link;
     return found.href;
   };
-  const keep = (link) => {
-    if (control) {
-      control.value = link;
-      control.dispatchEvent(new Event("change", { bubbles: true }));
-    } else if (!data.page) window.history.replaceState(null, "", address(link));
-  };
-  const saved = control || data.page ? "" : here();
-  const figure = new Play(root, { first: {}, ...data, source, keep, address }, saved);
-  if (control) control.addEventListener("input", () => figure.restore(control.value));
-  else if (!data.page) window.addEventListener("hashchange", () => { if (figure.link !== here()) figure.restore(here()); });
+  const keep = (link) => { if (own) window.history.replaceState(null, "", address(link)); };
+  const figure = new Play(root, { first: {}, ...data, source, keep, address }, own ? here() : "");
+  root.querySelector("[data-is=link]").hidden = data.page === null;
+  if (own) window.addEventListener("hashchange", () => { if (figure.link !== here()) figure.restore(here()); });
   /* Cells of the ranking, which stands below, show their films. */
   document.addEventListener("DOMContentLoaded", () => (data.cells || []).forEach(([row, column, choice]) => {
     const head = document.querySelector(`#table-ranking [data-column="${column}"]`);

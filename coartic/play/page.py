@@ -42,9 +42,9 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
     that these name.
 
     ``presets`` are what it offers (:func:`preset_of`); ``still`` stands where scripts are switched
-    off. ``more`` is for the scripts: the ``page`` to which links lead, or the ``control`` that
-    holds the link; ``first``, what is chosen at first;
-    ``cells`` of the table ``ranking`` that show films: row, column and what to choose.
+    off. ``more`` is for the scripts: the ``page`` to which links lead, None for none; ``first``,
+    what is chosen at first; ``cells`` of the table ``ranking`` that show films: row, column and
+    what to choose.
     """
     return (
         templates()

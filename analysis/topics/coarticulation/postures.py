@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from coartic import CoarticError
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import is_variant, name_of
@@ -33,11 +32,11 @@ _OUTLINE = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
     "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
-def draw_postures(study: Study) -> Parts:
+def draw_postures(study: Study) -> Parts | None:
     """Draw postures at one goal before two others: thin every run, thick their means."""
     shared = shared_goal(study)
     if shared is None:
-        raise CoarticError("no method has solved runs on two tasks that share their first goals")
+        return None
     drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
     draw_both(axes, shared)
     parts = []

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from coartic import CoarticError, Task
+from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import main_methods, name_of
@@ -65,12 +65,12 @@ def hand_shares(study: Study) -> pd.DataFrame:
     "Share of runs by hand sequence (L left, R right, goal by goal); numbers are runs. Hatched: "
     "published. Rare sequences are grey.",
 )
-def draw_recruitment(study: Study) -> Parts:
+def draw_recruitment(study: Study) -> Parts | None:
     """Shares of hand sequences of each main method, one panel for each task with two hands."""
     data = hand_shares(study)
     data = data[data.task.isin(one_by_one(study)) & data.method.isin(main_methods(data.method))]
     if not len(data):
-        raise CoarticError("no solved run on a task with two hands")
+        return None
     # Methods stand in one order on all tasks.
     order_of = {label: place for place, label in enumerate(main_methods(data.method))}
     data = data.sort_values(
