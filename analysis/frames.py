@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.estimates import Estimate, mean
 from coartic.analysis.statistics.instances import task_mean
@@ -51,9 +52,11 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     [0.038, 0.0]
     """
     check_columns(frame, "reward", "best_known")
-    reward, best = (frame[name].astype("Float64") for name in ("reward", "best_known"))
-    share = (best - reward) / best.abs()
-    return pd.Series(share.to_numpy(np.float64, na_value=np.nan), frame.index, name="gap")
+    reward, best = (
+        frame[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        for name in ("reward", "best_known")
+    )
+    return pd.Series(gap_share(reward, best), frame.index, name="gap")
 
 
 def means(frame: pd.DataFrame, by: Sequence[str], columns: Sequence[str]) -> pd.DataFrame:

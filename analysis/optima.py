@@ -81,9 +81,9 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def gap_share(rewards: ArrayLike, optimum: float) -> Array:
+def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """(optimum − reward) / |optimum|: 0 at the optimum; 0.01 is 1 % more ticks than it."""
-    return (optimum - np.asarray(rewards, dtype=np.float64)) / abs(optimum)
+    return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))
 
 
 def initial_reward(task: Task) -> float:

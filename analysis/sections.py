@@ -7,13 +7,21 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from coartic.analysis.claims import verdicts
 from coartic.analysis.figures.plot import Plot
 from coartic.analysis.study import Study
-from coartic.analysis.topics import costs, learning, ranking, scores, settings, tasks
-from coartic.analysis.topics.coarticulation import postures
-from coartic.analysis.topics.coarticulation import tables as coarticulation
-from coartic.analysis.topics.families import random_tasks
-from coartic.analysis.topics.paper import hands, rewards, verdicts
+from coartic.analysis.topics import (
+    coarticulation,
+    costs,
+    hands,
+    learning,
+    random_tasks,
+    ranking,
+    rewards,
+    scores,
+    settings,
+    tasks,
+)
 from coartic.analysis.words import id_of
 
 
@@ -61,8 +69,8 @@ SECTIONS = (
         "Does the next goal change the movement?",
         table=coarticulation.contexts,
         caption="Postures at a goal that two tasks share",
-        figure=postures.draw_postures,
-        sentence=postures.next_goal,
+        figure=coarticulation.draw_postures,
+        sentence=coarticulation.next_goal,
         answer="Coarticulation",
         note="Postures are compared in length units and rad. Random guesses are a placebo: they "
         "learn nothing, and the best of many is selected.",
@@ -149,7 +157,7 @@ SECTIONS = (
         "Which signatures of coarticulation does each method show?",
         table=coarticulation.signatures,
         caption="Signatures of coarticulation, means over goals and runs",
-        sentence=postures.joints_or_hand,
+        sentence=coarticulation.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
         "hand nearer: share of the way to its next goal that a hand covers while waiting. The CSV "

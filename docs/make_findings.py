@@ -116,7 +116,7 @@ def filled_pages() -> dict[str, str]:
 
     A page that has the name of a suite waits until something of that suite is stored.
     """
-    published = ANALYSIS / "topics" / "paper" / "published.toml"
+    published = ANALYSIS / "topics" / "published.toml"
     values = {
         "table": table, "row": row, "claim": claim, "verdicts": verdicts, "seen": seen,
         "name_of": name_of, "p_of_shares": p_of_shares, "p_above": p_above,

@@ -157,8 +157,8 @@ def parameters() -> Iterator[str]:
 
 def claims() -> Iterator[str]:
     """The paper's claims; each has its id for an anchor."""
+    from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
     from coartic.analysis.claims.judgements import CLAIMS
-    from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
 
     def goals(claim: Any) -> str:
         if claim in CLAIMS_ON_FAMILIES:

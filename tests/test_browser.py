@@ -7,7 +7,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from coartic.analysis.study import typical_run
-from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
+from coartic.analysis.topics.coarticulation import shared_goal
 
 pytestmark = pytest.mark.browser
 

@@ -11,19 +11,18 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task
+from coartic.analysis.claims import verdicts
 from coartic.analysis.claims.claim import Claim
 from coartic.analysis.claims.comparisons import Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
+from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, some_of
 from coartic.analysis.claims.reader import Measurement, MissingError
 from coartic.analysis.sections import TABLES
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
-from coartic.analysis.topics.paper import verdicts
-from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER, some_of
-from coartic.analysis.topics.paper.shortest import shortest_reach
 from coartic.benchmarks.suites import Cell
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import AS_RELEASED

@@ -10,8 +10,8 @@ from coartic import drawing, load_task
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.sections import FIGURES
+from coartic.analysis.topics.hands import hand_shares
 from coartic.analysis.topics.learning import learning_curves
-from coartic.analysis.topics.paper.hands import hand_shares
 from coartic.analysis.topics.tasks import picture_of_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write

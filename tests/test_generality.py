@@ -8,12 +8,12 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.claims import reader
+from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.sections import TABLES
-from coartic.analysis.topics.families import instances
-from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
-from coartic.analysis.topics.families.instances import best_of_instances, signs, solved
+from coartic.analysis.topics import instances
+from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, row, study_of

@@ -17,7 +17,7 @@ from coartic import (
     load_task,
 )
 from coartic.analysis.study import load
-from coartic.analysis.topics.paper.rewards import beside_paper
+from coartic.analysis.topics.rewards import beside_paper
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import perform, plan_suite

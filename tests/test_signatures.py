@@ -12,14 +12,18 @@ from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.methods import EC1, PLACEBO
-from coartic.analysis.signatures import context_tests, subtasks
+from coartic.analysis.signatures import context_tests, signs
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
-from coartic.analysis.signatures.manifold import motor_equivalence, movable
 from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
-from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.signatures.two_contexts import (
+    TwoContexts,
+    context_pairs,
+    motor_equivalence,
+    movable,
+)
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import hypotheses
-from coartic.analysis.topics.coarticulation import placebo, postures, tables
+from coartic.analysis.topics import coarticulation, placebo
 from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -194,16 +198,14 @@ def test_parts_of_two_contexts():
     assert contexts.parts[0] == pytest.approx(0.02 / 2, rel=1e-3)  # of four dimensions
     assert contexts.parts[1] < 5e-4
     assert contexts.n == 12
-    assert contexts.hands_apart < 1e-3 < contexts.apart == pytest.approx(0.02)
+    assert contexts.apart == pytest.approx(0.02)
 
 
 # Subtasks and hands
 
 
 def isolated_ticks(task, q, goal, hand):
-    return subtasks.isolated_reaches(
-        task, q[None], np.array([goal]), np.array([HANDS.index(hand)])
-    )[0]
+    return signs.isolated_reaches(task, q[None], np.array([goal]), np.array([HANDS.index(hand)]))[0]
 
 
 def test_isolated_reaches_are_the_corrective_process():
@@ -215,25 +217,25 @@ def test_isolated_reaches_are_the_corrective_process():
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
     stays = posed(unreachable, "", [unreachable.q0])
-    assert subtasks.ticks_slower(stays)[0, 2] == math.inf
+    assert signs.ticks_slower(stays)[0, 2] == math.inf
     task = tiny_task(goals=[[2.0, 1.0], [4.4, 0.5]], locked_base=["x", "y"],
                      start={"left": [0.5] * 4, "right": [0.5] * 4})  # fmt: skip
     right = Solutions(task, "", (corrective_trial(task, "RR"),))
-    assert subtasks.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
+    assert signs.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
 
 
 def test_what_a_posture_serves():
     """The corrective process itself gains nothing; half the way ahead, half the way is left."""
     task = AS_RELEASED
     initial = corrective_trial(task, "RRRR")
-    assert subtasks.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
+    assert signs.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
     alone = initial.configurations
     q = alone.copy()
     q[:-1] += 0.5 * np.diff(alone, axis=0)
 
     def gain_of(q):
         run = SimpleNamespace(configurations=q, hands="RRRR")
-        return subtasks.gain_at_next(Solutions(task, "", (run,)))[0, 0]
+        return signs.gain_at_next(Solutions(task, "", (run,)))[0, 0]
 
     left = isolated_ticks(task, q[0], 2, "right")[0]
     gain = isolated_ticks(task, alone[0], 2, "right")[0] - left
@@ -254,9 +256,9 @@ def test_signs_are_one_number_a_run():
     first, whole = SIGNS["first"].of(cell), SIGNS["whole"].of(cell)
     assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
-    nearer = [subtasks.preshaping(task, run, corrective_trial(task, "RRRR")) for run in cell.runs]
+    nearer = [signs.preshaping(task, run, corrective_trial(task, "RRRR")) for run in cell.runs]
     assert SIGNS["other arm"].of(cell) == pytest.approx([np.nanmean(run) for run in nearer])
-    gains = subtasks.gain_at_next(cell)
+    gains = signs.gain_at_next(cell)
     assert SIGNS["arm"].of(cell) == pytest.approx(gains.mean(axis=1))
     assert not any(sign.of(Solutions(task, "", ())).size for sign in SIGNS.values())
     one = load_task("ascending")
@@ -296,8 +298,8 @@ def test_preshaping_by_the_arm_alone():
         np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
         for of in (run, initial)
     )
-    assert 0.2 < subtasks.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
-    assert np.isnan(subtasks.preshaping(task, run, initial)[1])
+    assert 0.2 < signs.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
+    assert np.isnan(signs.preshaping(task, run, initial)[1])
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -305,7 +307,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
     run = corrective_trial(task, "LRLR")
-    np.testing.assert_array_equal(subtasks.preshaping(task, run, initial)[:3], [0, 0, 0])
+    np.testing.assert_array_equal(signs.preshaping(task, run, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
     goals = [robot.forward_kinematics(q, hand).tolist()
@@ -324,7 +326,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
         np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
         for q in (configurations[1], held, still.configurations[1])
     )
-    assert subtasks.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
+    assert signs.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
     assert abs(without - now) > 0.05
 
 
@@ -357,29 +359,29 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_t
 
 
 @pytest.mark.parametrize(
-    ("made_up", "seen", "answer"),
+    ("made_up", "answer"),
     [
-        ({"apart": 2.0}, True, "Yes. Depending on the next goal"),
-        ({"apart": 0.5}, False, "Not shown:"),
-        ({"apart": 0.5, "of_placebo": 2.0}, False, "Not shown:"),
-        ({"apart": 0.0}, False, "No significant difference:"),
-        ({"apart": 2.0, "runs": 2}, False, "Too few runs"),
-        ({"apart": 2.0, "placebo_runs": 0}, False, "Undecided:"),
-        ({"apart": 2.0, "placebo_trials": 9}, False, "Undecided:"),  # fewer than the learner's
+        ({"apart": 2.0}, "Yes. Depending on the next goal"),
+        ({"apart": 0.5}, "Not shown:"),
+        ({"apart": 0.5, "of_placebo": 2.0}, "Not shown:"),
+        ({"apart": 0.0}, "No significant difference:"),
+        ({"apart": 2.0, "runs": 2}, "Too few runs"),
+        ({"apart": 2.0, "placebo_runs": 0}, "Undecided:"),
+        ({"apart": 2.0, "placebo_trials": 9}, "Undecided:"),  # fewer than the learner's
     ],
 )
-def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, seen, answer):
+def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, answer):
     study = beside_placebo(**made_up)
-    found = placebo.difference(study)
-    assert found.contexts.method == EC1
-    assert found.contexts.apart == pytest.approx(made_up["apart"])
-    assert found.seen == seen
-    assert postures.next_goal(study).startswith(answer)
-    if found.placebo is not None:
-        assert found.placebo.apart == pytest.approx(made_up.get("of_placebo", 0.5))
-        assert (found.beyond_p < 0.05) == (made_up["apart"] == 2.0)
-        assert placebo.context_beyond_p(study, found.contexts) == found.beyond_p
-        assert math.isnan(placebo.context_beyond_p(study, found.placebo))  # it is not tested itself
+    contexts = coarticulation.shared_goal(study)
+    assert contexts.method == EC1
+    assert contexts.apart == pytest.approx(made_up["apart"])
+    assert coarticulation.next_goal(study).startswith(answer)
+    guesses = placebo.placebo_of(study, contexts)
+    if guesses is not None:
+        assert guesses.apart == pytest.approx(made_up.get("of_placebo", 0.5))
+        beyond = placebo.context_beyond_p(study, contexts)
+        assert (beyond < 0.05) == (made_up["apart"] == 2.0)
+        assert math.isnan(placebo.context_beyond_p(study, guesses))  # it is not tested itself
 
 
 def test_the_placebo_that_shows_most_of_a_sign_counts():
@@ -392,7 +394,7 @@ def test_the_placebo_that_shows_most_of_a_sign_counts():
         for number, task in enumerate(tasks)
     ))  # fmt: skip
     assert placebo.placebos(study, "ascending") == [PLACEBO, drawn]
-    assert placebo.difference(study).placebo.method == PLACEBO
+    assert placebo.placebo_of(study, coarticulation.shared_goal(study)).method == PLACEBO
     assert list(placebo.of_placebo(study, "ascending", "first")) == [2, 2, 2]
     assert not placebo.selects(study, drawn)
 
@@ -406,8 +408,9 @@ def test_a_method_that_draws_nothing_needs_no_test(apart):
     ]
     study = study_with(*cells)
     study.runs["trials"] = 0
-    found = placebo.difference(study)
-    assert (found.selects, found.differ, found.seen) == (False, apart > 0, apart > 0)
+    assert not placebo.selects(study, cells[0].label)
+    answer = "Yes. Depending on the next goal" if apart else "No significant difference:"
+    assert coarticulation.next_goal(study).startswith(answer)
 
 
 def test_signs_beside_the_placebo():
@@ -425,6 +428,6 @@ def test_signs_beside_the_placebo():
     assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
     assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
     assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))
-    shown = tables.signatures(study).loc[f"ascending {EC1}"]
+    shown = coarticulation.signatures(study).loc[f"ascending {EC1}"]
     assert (shown.first_p, shown["first"]) == (p, np.mean(slower[EC1]))
     assert math.isnan(shown.preshaping_p)  # there is no other arm

@@ -13,9 +13,7 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.sections import TABLES
-from coartic.analysis.topics import costs, ranking
-from coartic.analysis.topics.coarticulation import placebo
-from coartic.analysis.topics.coarticulation import tables as coarticulation
+from coartic.analysis.topics import coarticulation, costs, placebo, ranking
 from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -168,13 +166,17 @@ def test_contexts(study, monkeypatch):
     }
     tasks = study.tasks[ONE], study.tasks[TWO]
     shared = [
-        SimpleNamespace(tasks=tasks, row=name, goal=1, p=p, method=method, n=n, apart=apart,
-                        spreads=spreads, parts=parts)
+        SimpleNamespace(tasks=tasks, goal=int(name.split()[-2]), hand="right", p=p,
+                        method=method, n=n, apart=apart, spreads=spreads, parts=parts)
         for (name, (method, n, apart, spreads, _, _, *parts)), p in zip(
             cells.items(), (0.01, 0.04, 0.04), strict=True
         )
     ]  # fmt: skip
-    monkeypatch.setattr(coarticulation, "shared_goals", lambda study: shared)
+    monkeypatch.setattr(
+        coarticulation,
+        "shared_goals",
+        lambda _, label: [each for each in shared if each.method == label],
+    )
     beyond = {CMA: 0.5, PLAN: NONE}
     monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
     frame = coarticulation.contexts(study)

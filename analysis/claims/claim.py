@@ -1,4 +1,4 @@
-"""A claim. The paper's are lists in ``claims.py`` of topics ``paper`` and ``families``."""
+"""A claim. The paper's are lists in ``paper.py``, ``coarticulation.py`` and ``families.py``."""
 
 from __future__ import annotations
 

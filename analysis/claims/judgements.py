@@ -26,11 +26,11 @@ from typing import get_args
 import pandas as pd
 
 from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judging import Finding, Verdict, judge
+from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER
 from coartic.analysis.claims.reader import MissingError, Reader
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.families.claims import CLAIMS_ON_FAMILIES
-from coartic.analysis.topics.paper.claims import CLAIMS_OF_THE_PAPER
 
 CLAIMS = {claim.id: claim for claim in (*CLAIMS_OF_THE_PAPER, *CLAIMS_ON_FAMILIES)}
 """Every claim by its id."""

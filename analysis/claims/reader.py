@@ -15,9 +15,9 @@ from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
-from coartic.analysis.topics.coarticulation.placebo import of_placebo, placebos
-from coartic.analysis.topics.families.instances import signs
-from coartic.analysis.topics.paper.published import (
+from coartic.analysis.topics.instances import signs
+from coartic.analysis.topics.placebo import of_placebo, placebos
+from coartic.analysis.topics.published import (
     Summary,
     published_alone,
     published_cell,

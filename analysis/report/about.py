@@ -10,7 +10,7 @@ from typing import Any
 from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
-from coartic.analysis.topics.paper.published import RUNS
+from coartic.analysis.topics.published import RUNS
 from coartic.analysis.words import NO_BREAK, RECONSTRUCTED, listed, marked
 from coartic.learner.learning import TRIALS
 from coartic.text import one_line

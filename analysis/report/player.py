@@ -14,7 +14,7 @@ import numpy as np
 from coartic import Execution, Movement, Task, execute
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
-from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
+from coartic.analysis.topics.coarticulation import shared_goal
 from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS

@@ -8,7 +8,7 @@ distribution; they take runs as exchangeable if the context did nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -89,36 +89,22 @@ def permutation_p(
     """
     if min(len(first), len(second)) < 2:
         return math.nan
+    runs = len(first) + len(second)
+    exact = math.comb(runs, len(first)) <= resamples
+    every = np.array(list(combinations(range(runs), len(first))), np.intp) if exact else None
     pool = centred(np.concatenate([first, second]))
-    weights, exact = divisions(len(first), len(second), rng, resamples)
-    observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)])
-    null = np.concatenate([np.linalg.norm(rows @ pool, axis=1) for rows in weights])
+    null = []
+    for rows in slices(resamples if every is None else len(every), IN_MEMORY):
+        size = rows.stop - rows.start
+        chosen = drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
+        # Weights that give the first group's mean less the second's.
+        weights = np.full((size, runs), -1 / len(second))
+        np.put_along_axis(weights, chosen, 1 / len(first), axis=1)
+        null.append(np.linalg.norm(weights @ pool, axis=1))
+    observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)]) @ pool
+    reached = float((np.concatenate(null) >= np.linalg.norm(observed) * (1 - 1e-9)).sum())
     # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
-    reached = float((null >= float(np.linalg.norm(observed @ pool)) * (1 - 1e-9)).sum())
-    return reached / len(null) if exact else (1 + reached) / (1 + len(null))
-
-
-def divisions(
-    first: int, second: int, rng: np.random.Generator, resamples: int = RESAMPLES
-) -> tuple[Iterator[Array], bool]:
-    """Ways to divide runs into two groups, and whether these are all there are.
-
-    Blocks of shape ``(m, first + second)``: weights that give the first group's mean less the
-    second's. All where they are no more than ``resamples``, else as many drawn at random.
-    """
-    runs = first + second
-    exact = math.comb(runs, first) <= resamples
-    every = np.array(list(combinations(range(runs), first)), np.intp) if exact else None
-
-    def blocks() -> Iterator[Array]:
-        for rows in slices(resamples if every is None else len(every), IN_MEMORY):
-            size = rows.stop - rows.start
-            chosen = drawn_rows(runs, first, size, rng) if every is None else every[rows]
-            weights = np.full((size, runs), -1 / second)
-            np.put_along_axis(weights, chosen, 1 / first, axis=1)
-            yield weights
-
-    return blocks(), exact
+    return reached / len(every) if every is not None else (1 + reached) / (1 + resamples)
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:

@@ -6,6 +6,7 @@ before (Shah, Barto & Fagg 2013, tasks ascending and descending, which share goa
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from functools import cached_property
 from itertools import combinations, takewhile
 
 import numpy as np
+from scipy import linalg
 
 from coartic import Hand, Task
 from coartic.analysis.signatures.context_tests import (
@@ -21,7 +23,6 @@ from coartic.analysis.signatures.context_tests import (
     distance_of_means,
     permutation_p,
 )
-from coartic.analysis.signatures.manifold import motor_equivalence, movable
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED
 from coartic.robot import Array
@@ -37,6 +38,31 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
             same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
             pairs.append((a, b, len(list(takewhile(bool, same)))))
     return [pair for pair in pairs if pair[2]]
+
+
+def movable(task: Task, hand: Hand) -> Array:
+    """Indices of the joints that can move a hand: unlocked base coordinates, its arm."""
+    base = [k for k, name in enumerate("xy") if name not in task.locked_base]
+    return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
+
+
+def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
+    """The motor-equivalent and the other part of a difference between configurations.
+
+    ``difference`` has shape ``(k,)``, length unit and rad mixed; ``jacobian`` ``(2, k)``, of the
+    joints that can move. Each part, ≥ 0, is its length
+    over the root of the dimension of its space, so that a difference in a random direction has
+    equal parts. A difference between contexts is motor-equivalent where the first exceeds the
+    second: the same subgoal reached by another posture. Caveat: hits of one disc bound the
+    second part, and nothing bounds the first. NaN for a space of dimension 0. Source: Mattos,
+    Latash and colleagues, Experimental Brain Research (doi:10.1007/s00221-015-4327-4,
+    10.1007/s00221-018-5215-5).
+    """
+    equivalent, other = (
+        float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
+        for basis in (linalg.null_space(jacobian), linalg.orth(jacobian.T))
+    )
+    return equivalent, other
 
 
 @dataclass(frozen=True)
@@ -73,11 +99,6 @@ class TwoContexts:
         """Label of the method."""
         return self.first.label
 
-    @property
-    def row(self) -> str:
-        """Name of the contexts' row in table *contexts*."""
-        return f"{self.first.task.name} {self.method} goal {self.goal} {self.hand}"
-
     @cached_property
     def postures(self) -> tuple[Array, Array]:
         """Configurations of the runs that hit the goal with the hand, in either context.
@@ -106,13 +127,6 @@ class TwoContexts:
     def spreads(self) -> float:
         """Distance of the mean postures in pooled SDs of the runs; NaN without a spread."""
         return context_dependence(*self.postures)
-
-    @property
-    def hands_apart(self) -> float:
-        """Distance of the hand in the mean postures, length unit."""
-        robot = self.first.task.robot
-        ends = [robot.forward_kinematics(q.mean(axis=0), self.hand) for q in self.postures]
-        return float(np.linalg.norm(ends[0] - ends[1]))
 
     @cached_property
     def parts(self) -> tuple[float, float]:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from coartic.analysis import frames, methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import LEVEL, Estimate
-from coartic.analysis.statistics.hypotheses import bootstrap_test, sign_flip_test
+from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
-from coartic.analysis.topics.coarticulation.tables import adjust_p
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import capital, interval, listed, marked, number, p_value
 from coartic.text import counted
@@ -55,33 +52,38 @@ def main_gaps(study: Study) -> pd.DataFrame:
 def against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
-    Of methods that solved every run. A method that draws nothing has one reward, which is exact.
-    The test takes samples as independent, though runs have the same seeds
-    (:func:`paired_difference` pairs them): where the learner has 100 runs and the other method 20,
-    pairs would leave out 80.
+    Of methods that solved every run; p is corrected over the tasks of a method (Holm). A method
+    that draws nothing has one reward, which is exact. The test takes samples as independent, though
+    runs have the same seeds (:func:`paired_difference` pairs them): where the learner has 100 runs
+    and the other method 20, pairs would leave out 80.
     """
-    rows: list[tuple[str, Row]] = []
-    for (task, label), cell in study.cells.items():
-        learner = study.cells.get((task, methods.most_exploring(study.tasks[task])))
-        if learner is None or learner is cell or task not in one_by_one(study):
-            continue
-        both_solved = len(cell.good) == len(cell.runs) and len(learner.good) == len(learner.runs)
-        if not scores.is_compared(study, label) or not both_solved:
-            continue
-        drawn = study.plan.methods[cell.method].stochastic
-        rewards = cell.rewards if drawn else float(cell.rewards[0])
-        test = bootstrap_test(learner.rewards, rewards, "two-sided")
-        row: Row = {
-            "task": marked(study.tasks[task]),
-            "method": label,
-            "runs": len(cell.runs),
-            "reward": cell.rewards.mean(),
-            "learner": learner.rewards.mean(),
-            "p_holm": test.p,
-            "least_p": test.least_p,
-        }
-        rows.append((f"{task} {label}", row | runs_of(cell, learner)))
-    yield from adjust_p(rows)
+    for label in dict.fromkeys(label for _, label in study.cells):
+        cells, tests = [], []
+        for task in (task for task in study.tasks if task in one_by_one(study)):
+            cell, learner = (
+                study.cells.get((task, name))
+                for name in (label, methods.most_exploring(study.tasks[task]))
+            )
+            if cell is None or learner is None or cell is learner:
+                continue
+            solved = all(len(each.good) == len(each.runs) for each in (cell, learner))
+            if solved and scores.is_compared(study, label):
+                drawn = study.plan.methods[cell.method].stochastic
+                rewards = cell.rewards if drawn else float(cell.rewards[0])
+                tests.append(bootstrap_test(learner.rewards, rewards, "two-sided"))
+                cells.append((cell, learner))
+        p = holm([test.p for test in tests])
+        for (cell, learner), test, adjusted in zip(cells, tests, p, strict=True):
+            row: Row = {
+                "task": marked(study.tasks[cell.task]),
+                "method": label,
+                "runs": len(cell.runs),
+                "reward": cell.rewards.mean(),
+                "learner": learner.rewards.mean(),
+                "p_holm": adjusted,
+                "least_p": test.least_p,
+            }
+            yield f"{cell.task} {label}", row | runs_of(cell, learner)
 
 
 @table("method, knows, gap[], better, worse, on *, runs")
@@ -169,8 +171,27 @@ def draw_ranking(study: Study) -> Parts | None:
     heights = [len(of_group) + 0.8 for _, of_group in groups]
     size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
     drawing, panels = style.panels((len(groups), 1), size, sharex=True, height_ratios=heights)
+    looks = looks_in(study, rows.method)
     for axes, (group, of_group) in zip(panels, groups, strict=True):
-        draw_group(axes, study, group, of_group, looks_in(study, rows.method))
+        axes.set_title(capital(group.removeprefix("using the ")))
+        names = {label: name_in(study, label) for label in of_group.method}
+        style.name_rows(axes, list(names.values()))
+        for place, row in enumerate(of_group.to_dict("records")):
+            color, learner = looks[row["method"]]["color"], methods.is_learner(row["method"])
+            mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
+            end = row["gap"]
+            if not math.isnan(row["gap_low"]):
+                end = max(row["gap"], row["gap_high"])
+                ends = [row["gap_low"], row["gap_high"]]
+                axes.plot(ends, [-place, -place], color=color, linewidth=1.4)
+            (dot,) = axes.plot(row["gap"], -place, "D" if learner else "o", **mark)
+            words = interval(row, "gap", unit=" %")
+            style.tip(dot, f"{names[row['method']]}: {words}, {row['runs']} runs")
+            beside: Any = {"textcoords": "offset points", "va": "center"}
+            axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
+            if learner:
+                axes.get_yticklabels()[place].set_fontweight("bold")
+        axes.axvline(0, **style.OPTIMUM)
     farthest = float(np.nanmax(percent[["gap", "gap_high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     first, *more = scores.common_tasks(study)
@@ -186,83 +207,51 @@ def optimum_in_words(study: Study) -> str:
     return "optimum" if proven else "best known reward"
 
 
-def draw_group(
-    axes: Axes, study: Study, group: str, rows: pd.DataFrame, looks: Mapping[str, style.Look]
-) -> None:
-    """Methods that know as much of the reward, nearest first."""
-    axes.set_title(capital(group.removeprefix("using the ")))
-    for place, row in enumerate(rows.to_dict("records")):
-        color = looks[row["method"]]["color"]
-        mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
-        end = row["gap"]
-        if not math.isnan(row["gap_low"]):
-            end = max(row["gap"], row["gap_high"])
-            ends = [row["gap_low"], row["gap_high"]]
-            axes.plot(ends, [-place, -place], color=color, linewidth=1.4)
-        shape = "D" if methods.is_learner(row["method"]) else "o"
-        (dot,) = axes.plot(row["gap"], -place, shape, **mark)
-        words = interval(row, "gap", unit=" %")
-        style.tip(dot, f"{name_in(study, row['method'])}: {words}, {row['runs']} runs")
-        beside: Any = {"textcoords": "offset points", "va": "center"}
-        axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
-    style.name_rows(axes, [name_in(study, method) for method in rows.method])
-    for name, method in zip(axes.get_yticklabels(), rows.method, strict=True):
-        if methods.is_learner(method):
-            name.set_fontweight("bold")
-    axes.axvline(0, **style.OPTIMUM)
-
-
 def nearest(study: Study) -> str:
-    """The method nearest to the optimum, and the place of the learner."""
+    """The method nearest to the optimum and whether surely so, the learner's place, the best
+    planner, methods from files, and failed runs: a sentence for each that there is."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
     learn = by_trial[~by_trial.method.isin(TRIES)].reset_index(drop=True)
     rows = next((rows for rows in (learn, by_formula, others, by_trial) if len(rows)), learn)
     if not len(rows):
         return ""
-    best, who = rows.iloc[0], name_in(study, rows.method[0])
-    things = "settings" if compares_settings(study) else "algorithms"
+    by_settings = compares_settings(study)
+
+    def gap(row: Any) -> str:
+        return interval(row, "gap", scale=100, unit=" %")
+
+    def declared(method: str) -> str:
+        built_in = methods.is_built_in(method)
+        return "" if built_in else "; what it is told is as its author declares"
+
+    who, *following = (name_in(study, method) for method in rows.method)
+    beside = ""
+    if following:
+        test = paired_difference(study, *rows.method[:2])
+        surely = "significantly" if test.p < LEVEL else "not significantly"
+        beside = f", {surely} nearer than {following[0]} ({p_value(test.p)})"
+        if not test.least_p <= LEVEL:
+            beside = f" (too few runs to tell it from {following[0]})"
+    things = "settings" if by_settings else "algorithms"
     among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
     text = (
         f"{among if len(learn) > 1 else capital(who)} comes nearest to the optimum: "
-        f"{gap_in_words(best)} away{beside(study, rows)}{as_declared(best.method)}."
+        f"{gap(rows.iloc[0])} away{beside}{declared(rows.method[0])}."
     )
     rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
-    if rank and not compares_settings(study):
+    if rank and not by_settings:
         place = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
         guesses = by_trial.gap[by_trial.method == methods.PLACEBO]
-        text += f" The paper's learner is {place}, at {gap_in_words(learn.iloc[rank])}"
+        text += f" The paper's learner is {place}, at {gap(learn.iloc[rank])}"
         text += "".join(f"; random guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
     if len(learn) and len(by_formula):
-        row = by_formula.iloc[0]
-        text += (
-            f" The best planner that knows the reward as a formula ends {gap_in_words(row)} away"
-        )
-        text += f"{as_declared(row.method)}."
-    text += from_files(study)
+        best = by_formula.iloc[0]
+        text += f" The best planner that knows the reward as a formula ends {gap(best)} away"
+        text += f"{declared(best.method)}."
     cells = [(task, cell.label) for cells in scores.compared(study).values()
              for task, cell in cells.items()]  # fmt: skip
-    return text + failed_runs(study, cells, ", which bars a method from the ranking")
-
-
-def gap_in_words(row: Any) -> str:
-    """A gap in per cent with its interval, ``7.3 % [6.9, 7.8]``."""
-    return interval(row, "gap", scale=100, unit=" %")
-
-
-def beside(study: Study, rows: pd.DataFrame) -> str:
-    """Whether the first method is surely nearer than the second; empty where it is alone."""
-    if len(rows) < 2:
-        return ""
-    second, test = name_in(study, rows.method[1]), paired_difference(study, *rows.method[:2])
-    if not test.least_p <= LEVEL:
-        return f" (too few runs to tell it from {second})"
-    surely = "significantly" if test.p < LEVEL else "not significantly"
-    return f", {surely} nearer than {second} ({p_value(test.p)})"
-
-
-def as_declared(method: str) -> str:
-    """Remark on a method that is not built in: its author declares what it is told."""
-    return "" if methods.is_built_in(method) else "; what it is told is as its author declares"
+    failed = failed_runs(study, cells, ", which bars a method from the ranking")
+    return text + from_files(study) + failed
 
 
 def from_files(study: Study) -> str:

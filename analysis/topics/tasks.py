@@ -16,7 +16,7 @@ from coartic.analysis.methods import LEARNER
 from coartic.analysis.statistics.estimates import mean
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.paper.published import published_cell
+from coartic.analysis.topics.published import published_cell
 from coartic.analysis.topics.scores import best_condition
 from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals

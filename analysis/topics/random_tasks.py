@@ -31,7 +31,7 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import other_tasks, value
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.families.instances import (
+from coartic.analysis.topics.instances import (
     THERE,
     best_by_hands,
     best_of_instances,

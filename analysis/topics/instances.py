@@ -9,11 +9,10 @@ import pandas as pd
 
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.optima import gap_share, locks_base
-from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.signatures.subtasks import ROUNDING
+from coartic.analysis.signatures.signs import ROUNDING, SIGNS
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.coarticulation.placebo import placebos
+from coartic.analysis.topics.placebo import placebos
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum

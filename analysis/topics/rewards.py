@@ -16,7 +16,7 @@ from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printe
 from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.paper.published import (
+from coartic.analysis.topics.published import (
     RUNS,
     PublishedCell,
     published_alone,

@@ -13,7 +13,7 @@ from coartic.analysis.claims.judging import Finding, tests_over_tasks
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.statistics.estimates import FEWEST, mean
-from coartic.analysis.topics.families.instances import best_of_instances
+from coartic.analysis.topics.instances import best_of_instances
 from coartic.analysis.words import estimate
 from coartic.tasks.optima import KnownOptimum
 

@@ -10,18 +10,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, stats
 
-from coartic import Execution
+from coartic import Execution, Hand, Task
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim
-from coartic.analysis.claims.comparisons import Higher, all_higher, all_positive, no_trial_fails
-from coartic.analysis.claims.judging import Finding, all_of
-from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4
-from coartic.analysis.statistics.estimates import Estimate
-from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
-from coartic.analysis.topics.paper.coarticulation import (
+from coartic.analysis.claims.coarticulation import (
     CLAIMS_OF_COARTICULATION,
     ONE_ARMED,
     TASK_1,
@@ -29,8 +23,14 @@ from coartic.analysis.topics.paper.coarticulation import (
     TEST_OF_MEANS,
     TWO_ARMED,
 )
-from coartic.analysis.topics.paper.published import published_cell
-from coartic.analysis.topics.paper.shortest import shortest_reach
+from coartic.analysis.claims.comparisons import Higher, all_higher, all_positive, no_trial_fails
+from coartic.analysis.claims.judging import Finding, all_of
+from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
+from coartic.analysis.methods import EC1, EC2, EC3, EC4
+from coartic.analysis.signatures.two_contexts import movable
+from coartic.analysis.statistics.estimates import SEED, Estimate
+from coartic.analysis.statistics.hypotheses import bootstrap_test, share_test
+from coartic.analysis.topics.published import published_cell
 from coartic.analysis.words import tally
 from coartic.learner.kernel import TENTHS
 from coartic.robot import Array
@@ -86,6 +86,50 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
         most <= margins.CLOSE,
         f"By so much each subtask is longer than the shortest path: {'; '.join(parts)}",
     )
+
+
+def shortest_reach(task: Task, q: Array, hand: Hand, goal: int, guess: Array) -> float:
+    """Least joint-space distance from ``q`` to a configuration that hits a goal.
+
+    ``goal`` counts from 1; ``guess`` is a configuration near one that hits it, shape
+    ``(dof,)``. Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints
+    that can move the hand, from ``guess`` and eight random starts about it: the best local minimum,
+    so at least as long as the global one. Infinite where none is found. Length unit and rad
+    mixed.
+    """
+    joints, centre = movable(task, hand), np.array(task.goals[goal - 1])
+
+    def moved(change: Array) -> Array:
+        result = q.copy()
+        result[joints] += change
+        return result
+
+    def miss(change: Array) -> Array:
+        return np.asarray(task.robot.forward_kinematics(moved(change), hand) - centre)
+
+    def inside(change: Array) -> float:
+        off = miss(change)
+        return float(task.radius**2 - off @ off)
+
+    def inside_gradient(change: Array) -> Array:
+        jacobian = task.robot.jacobian(moved(change), hand)[:, joints]
+        return np.asarray(-2 * miss(change) @ jacobian)
+
+    first = (guess - q)[joints]
+    rng = np.random.default_rng(SEED)
+    best = math.inf
+    for start in (first, *(first + rng.normal(0, 0.3, (8, len(joints))))):
+        reach = optimize.minimize(
+            lambda change: (change @ change, 2 * change),
+            start,
+            jac=True,
+            method="SLSQP",
+            constraints=[{"type": "ineq", "fun": inside, "jac": inside_gradient}],
+            options={"ftol": 1e-12, "maxiter": 300},
+        )
+        if inside(reach.x) >= -1e-8:
+            best = min(best, float(np.linalg.norm(reach.x)))
+    return best
 
 
 def corrected_less_later(read: Reader, cells: Cells) -> Finding:

@@ -14,8 +14,8 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import main_methods, name_of
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Rows, table
-from coartic.analysis.topics.paper.published import RUNS
-from coartic.analysis.topics.paper.rewards import beside_paper, published_of, task_and_condition
+from coartic.analysis.topics.published import RUNS
+from coartic.analysis.topics.rewards import beside_paper, published_of, task_and_condition
 from coartic.analysis.topics.scores import best_condition
 from coartic.analysis.words import listed, marked
 

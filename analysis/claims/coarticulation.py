@@ -17,7 +17,7 @@ from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
 from coartic.analysis.signatures.context_tests import dependence_below
-from coartic.analysis.signatures.subtasks import ticks_slower
+from coartic.analysis.signatures.signs import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means

@@ -8,18 +8,14 @@ draws hands. On each task, or in each family, the one that shows most of a sign 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from coartic.analysis.methods import PLACEBOS
-from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import bootstrap_test
-from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.coarticulation.shared_goals import shared_goal
+from coartic.analysis.study import Study
 from coartic.analysis.topics.scores import BY_TRIAL, groups
 from coartic.robot import Array
 
@@ -81,38 +77,3 @@ def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
     ours, guesses = SIGNS[sign].of(study.executed(task, label)), of_placebo(study, task, sign)
     several = min(len(ours), len(guesses)) > 1
     return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan
-
-
-class Difference(NamedTuple):
-    """Postures at the shared goal before two successors, beside those of the placebo."""
-
-    contexts: TwoContexts
-    placebo: TwoContexts | None
-    selects: bool
-    """Whether the placebo is needed."""
-    beyond_p: float
-    """P of the test that they lie further apart than the placebo's; NaN without it."""
-    differ: bool
-    """Whether the postures differ, more than by chance."""
-    seen: bool
-    """Whether they also differ by more than the placebo's, where that is needed."""
-    too_few: bool
-    """Whether so few runs could not show a difference."""
-
-
-@cached
-def difference(study: Study) -> Difference | None:
-    """Postures at the first shared goal before two next goals; None without two tasks."""
-    contexts = shared_goal(study)
-    if contexts is None:
-        return None
-    cell = study.cells[contexts.tasks[0].name, contexts.method]
-    # A method whose runs differ by chance takes a test.
-    tested = study.plan.methods[cell.method].stochastic
-    differ = contexts.p < LEVEL if tested else contexts.apart > 0
-    needed = selects(study, contexts.method)
-    placebo = placebo_of(study, contexts) if needed else None
-    beyond = math.nan if placebo is None else contexts.p_beyond(placebo)
-    seen = differ and (not needed or beyond < LEVEL)
-    too_few = tested and not smallest_p(*map(len, contexts.postures)) < LEVEL
-    return Difference(contexts, placebo, needed, beyond, differ, seen, too_few)

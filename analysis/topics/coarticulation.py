@@ -1,0 +1,231 @@
+"""Coarticulation: one goal is hit in different postures before different goals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import Parts, figure
+from coartic.analysis.methods import (
+    LEARNERS,
+    in_order,
+    is_search,
+    is_variant,
+    main_methods,
+    name_of,
+)
+from coartic.analysis.settings import shown_methods
+from coartic.analysis.signatures.context_tests import smallest_p
+from coartic.analysis.signatures.signs import SIGNS, as_in_isolation, preshaping_of_the_other_arm
+from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
+from coartic.analysis.statistics.estimates import LEVEL
+from coartic.analysis.statistics.hypotheses import holm
+from coartic.analysis.study import Study, cached, one_by_one
+from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.topics import placebo
+from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.words import marked, number, p_value
+from coartic.drawing import MARKERS
+from coartic.robot import HANDS, Array
+from coartic.text import counted
+
+
+def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
+    """Every goal that two tasks share before they differ, for every hand with which a method hit it
+    in both."""
+    for first, second, shared in context_pairs(study.tasks):
+        keys = (first, label), (second, label)
+        if {first, second} <= one_by_one(study) and study.cells.keys() >= {*keys}:
+            runs = study.executed(first, label), study.executed(second, label)
+            for goal in range(1, shared + 1):
+                for hand in HANDS:
+                    contexts = TwoContexts(*runs, goal, hand)
+                    if contexts.in_both:
+                        yield contexts
+
+
+@cached
+def shared_goal(study: Study) -> TwoContexts | None:
+    """The first goal that two tasks share, by the paper's learner if it ran.
+
+    None where no method has solved runs on two such tasks.
+    """
+    labels = [label for _, label in study.cells]
+    order = dict.fromkeys([*LEARNERS, *main_methods(labels), *labels])
+    return next((contexts for label in order for contexts in shared_goals(study, label)), None)
+
+
+@table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other")
+def contexts(study: Study) -> Rows:
+    """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
+    for label in dict.fromkeys(label for _, label in study.cells):
+        every = list(shared_goals(study, label))
+        p = holm([math.nan if math.isnan(shared.spreads) else shared.p for shared in every])
+        for shared, adjusted in zip(every, p, strict=True):
+            first, second = shared.tasks
+            row: Row = {
+                "method": label,
+                "place": f"goal {shared.goal} of {first.label} and {second.label}",
+                "runs": shared.n,
+                "distance": shared.apart,
+                "dependence": shared.spreads,
+                "p_holm": adjusted,
+                "p_placebo": placebo.context_beyond_p(study, shared),
+                "equivalent": shared.parts[0],
+                "other": shared.parts[1],
+                **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
+            }
+            yield f"{first.name} {label} goal {shared.goal} {shared.hand}", row
+
+
+@table("task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p")
+def signatures(study: Study) -> Rows:
+    """The main signatures of every main method on every task, means over runs and goals.
+
+    ``first_p`` and ``preshaping_p`` are of the tests against the placebo.
+    """
+    for task in (name for name in study.tasks if name in one_by_one(study)):
+        labels = [label for name, label in study.cells if name == task]
+        for label in in_order(shown_methods(study, labels)):
+            cell, runs = study.cells[task, label], study.executed(task, label)
+            if runs.runs and not is_search(label):
+                row: Row = {
+                    "task": marked(study.tasks[task]),
+                    "method": label,
+                    "runs": len(cell.good),
+                    "first": mean_of_goals(SIGNS["first"].each(runs)[:, None]),
+                    "first_p": placebo.sign_beyond_p(study, task, label, "first"),
+                    "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
+                    "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
+                    "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
+                    "preshaping_p": placebo.sign_beyond_p(study, task, label, "other arm"),
+                }
+                yield f"{task} {label}", row | runs_of(cell)
+
+
+def mean_of_goals(values: Array) -> float:
+    """Mean over goals of the means over runs that have a value, ``(n, G)``; NaN without any."""
+    there = [of_goal[np.isfinite(of_goal)] for of_goal in values.T]
+    means = [of_goal.mean() for of_goal in there if len(of_goal)]
+    return fmean(means) if means else math.nan
+
+
+@figure(
+    "One goal, two postures",
+    "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
+    "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
+)
+def draw_postures(study: Study) -> Parts | None:
+    """Draw postures at one goal before two others: thin every run, thick their means."""
+    shared = shared_goal(study)
+    if shared is None:
+        return None
+    drawing, (axes,) = style.panels((1, 1), (style.ONE, 2.0))
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    robot, radius = shared.tasks[0].robot, shared.tasks[0].radius
+    means = [runs.mean(axis=0) for runs in shared.postures]
+    goals = np.array([task.goals[shared.goal] for task in shared.tasks])
+    joints = [robot.joint_positions(q, shared.hand) for q in means]
+    outlines = [robot.base_outline(q) for q in means]
+    drawn = np.vstack([*outlines, goals, *joints])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    axes.set_xlim(low[0] - 0.2, high[0] + 1.2)
+    axes.set_ylim(low[1] - 0.7, high[1] + 0.35)
+    at = shared.tasks[0].goals[shared.goal - 1]
+    words: Any = {"textcoords": "offset points"}
+    parts = []
+    for place, (task, runs) in enumerate(zip(shared.tasks, shared.postures, strict=True)):
+        color, following = (style.BLUE, style.VERMILLION)[place], goals[place].tolist()
+        faint: Any = {"linewidth": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
+        for q in runs:
+            axes.plot(*robot.joint_positions(q, shared.hand).T, color=color, **faint, zorder=1)
+        base: Any = {"facecolor": color, "alpha": 0.12, "edgecolor": color, "linewidth": 0.8}
+        axes.fill(*outlines[place].T, **base)
+        around = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
+        thick: Any = {"linewidth": 1.6, "zorder": 3, "path_effects": around, **MARKERS[shared.hand]}
+        axes.plot(*joints[place].T, color=color, **thick)
+        arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
+        axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
+        axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
+        then = f"then goal {shared.goal + 1}\n({task.label})"
+        axes.annotate(then, following, (5, 0), va="center", ha="left", **words)
+        # The base's name stands on the side of the next goal.
+        x, y = outlines[place].T
+        end, off, side = (y.max(), 3, "bottom") if following[1] >= at[1] else (y.min(), -3, "top")
+        name = f"base,\n{task.label}"
+        axes.annotate(name, (x.mean(), end), (0, off), ha="center", va=side, **words)
+        angles = dict(zip(robot.joint_names, runs.T, strict=True))
+        named = {"task": task.name, "method": shared.method, "goal": shared.goal}
+        parts.append(pd.DataFrame({**named, "hand": shared.hand, **angles}))
+    axes.add_artist(Circle(at, radius, fill=False, edgecolor=style.INK, linewidth=1.1))
+    x, y = low - 0.2
+    axes.plot([x, x + 1], [y, y], color=style.INK, linewidth=1.5)
+    axes.annotate("1 length unit", (x, y), (0, -2), va="top", **words)
+    here = f"goal {shared.goal},\nthe same"
+    axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)
+    first, second = (task.label for task in shared.tasks)
+    hands = [robot.forward_kinematics(q, shared.hand) for q in means]
+    alt = (
+        f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share "
+        f"({name_of(shared.method)}): {shared.apart:.2f} apart in joint space, while the hand is "
+        f"at almost the same place ({np.linalg.norm(hands[0] - hands[1]):.2f} apart)."
+    )
+    return drawing, pd.concat(parts, ignore_index=True), alt, shared.tasks
+
+
+def next_goal(study: Study) -> str:
+    """Whether the posture at the goal that two tasks share depends on the next goal."""
+    shared = shared_goal(study)
+    if shared is None:
+        return ""
+    # A method whose runs differ by chance takes a test, and one that selects needs a placebo.
+    cells = [(task.name, shared.method) for task in shared.tasks]
+    drawn = study.plan.methods[study.cells[cells[0]].method].stochastic
+    needed = placebo.selects(study, shared.method)
+    guesses = placebo.placebo_of(study, shared) if needed else None
+    beyond = math.nan if guesses is None else shared.p_beyond(guesses)
+    runs = counted(shared.n, "run")
+    spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
+    p = ", ".join(filter(None, (runs, p_value(shared.p))))
+    who = f"{name_of(shared.method)} hits goal {shared.goal} in postures"
+    apart = f"{spreads}{number(shared.apart, 2)} (length units, rad) apart ({p})"
+    beside = ""
+    if guesses is not None:
+        beside = f"; random guesses lie {number(guesses.apart, 2)} apart ({p_value(beyond)})"
+    if drawn and not smallest_p(*map(len, shared.postures)) < LEVEL:
+        text = (
+            f"Too few runs to tell whether the next goal changes postures at goal {shared.goal} "
+            f"({runs})."
+        )
+    elif not (shared.p < LEVEL if drawn else shared.apart > 0):
+        text = f"No significant difference: before different goals, the {who} {apart}."
+    elif not needed or beyond < LEVEL:
+        text = f"Yes. Depending on the next goal, the {who} that clearly differ: {apart}{beside}."
+    elif guesses is not None:
+        text = f"Not shown: the {who} {apart}{beside}."
+    else:
+        text = (
+            f"Undecided: the {who} {apart}, and no placebo with as many trials ran. Add the method "
+            "placebo/guesses."
+        )
+    return text + failed_runs(study, cells, " and are not counted")
+
+
+def joints_or_hand(study: Study) -> str:
+    """Number of methods in which the next goal moves the joints more than the hand."""
+    rows = contexts(study)
+    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
+    if not len(rows):
+        return ""
+    larger = int((rows.equivalent > rows.other).sum())
+    which = f"all {len(rows)}" if larger == len(rows) else f"{larger} of {len(rows)}"
+    return f"In {which} methods the next goal moves the joints more than the hand."

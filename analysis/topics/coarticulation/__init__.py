@@ -1,1 +1,0 @@
-"""Coarticulation: contexts and signatures."""

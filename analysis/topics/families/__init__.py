@@ -1,1 +1,0 @@
-"""Results on families of random tasks."""

@@ -1,1 +1,0 @@
-"""Printed rewards and claims of the paper beside these runs."""
