@@ -186,13 +186,35 @@ class ProofSearch:
 
     def branch(self, node: Node) -> None:
         """Split a subproblem into others that together hold every solution in it."""
-        problem = node.problem
+        problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._ticks
-        goal = self.goal_to_decide(node, bounded)
-        if goal is not None:
-            self.decide(node, goal)
+        # How far the nearer hand is from its goal, where the hand is undecided.
+        far = {
+            g: min(
+                math.dist(self._task.robot.forward_kinematics(q[g], hand), self._task.goals[g])
+                for hand in self._robot_hands
+            )
+            for g, decided in enumerate(problem.hands)
+            if decided is None
+        }
+        goal = max(far, key=lambda g: far[g], default=None)
+        wrong = node.relaxed.wrong.max(initial=0.0)
+        if goal is not None and (
+            bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
+        ):
+            # One subproblem for each hand, the new angles anywhere on a path of interest.
+            for hand in self._robot_hands:
+                hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
+                root = self.relaxation(hands, problem.merged)
+                of_goal = root.goal_of == goal
+                box = np.empty((len(of_goal), 2))
+                box[~of_goal] = problem.box
+                box[of_goal] = root.first_box(self.longest(problem.moves))[of_goal]
+                able = set(mergeable(self._task, hands))
+                still_open = tuple(g for g in problem.open if g in able)
+                self.add(Subproblem(hands, problem.merged, still_open, box), node.length)
         elif bounded:
             for i, first in enumerate(problem.open):
                 merged = (*problem.merged, first)
@@ -202,39 +224,6 @@ class ProofSearch:
                 # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
-
-    def goal_to_decide(self, node: Node, bounded: bool) -> int | None:
-        """The goal whose undecided hand is farthest off; None if an angle is to be split first."""
-        unknown = [g for g, hand in enumerate(node.problem.hands) if hand is None]
-        if not unknown:
-            return None
-        q = node.relaxed.q
-        far = {
-            g: min(
-                math.dist(self._task.robot.forward_kinematics(q[g], hand), self._task.goals[g])
-                for hand in self._robot_hands
-            )
-            for g in unknown
-        }
-        goal = max(unknown, key=lambda g: far[g])
-        wrong = node.relaxed.wrong.max(initial=0.0)
-        if bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3):
-            return goal
-        return None
-
-    def decide(self, node: Node, goal: int) -> None:
-        """One subproblem for each hand, the new angles anywhere on a path of interest."""
-        problem = node.problem
-        for hand in self._robot_hands:
-            hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
-            root = self.relaxation(hands, problem.merged)
-            of_goal = root.goal_of == goal
-            box = np.empty((len(of_goal), 2))
-            box[~of_goal] = problem.box
-            box[of_goal] = root.first_box(self.longest(problem.moves))[of_goal]
-            able = set(mergeable(self._task, hands))
-            still_open = tuple(g for g in problem.open if g in able)
-            self.add(Subproblem(hands, problem.merged, still_open, box), node.length)
 
     def add(self, problem: Subproblem, parent: float) -> None:
         """Bound a subproblem; add it to the open ones if its bound is too low."""

@@ -170,10 +170,21 @@ class PosturePlanner:
         movements, ticks = [], []
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
-            retrieved = self.retrieve(ahead)
-            seeds = self.seeds(retrieved, ahead)
+            retrieved, seeds = self.retrieve(ahead), list[Neighbourhood]()
+            for hands in itertools.product(self.session.hands, repeat=len(ahead)):
+                layers = [retrieved[key] for key in zip(ahead, hands, strict=True)]
+                if all(len(layer) for layer in layers):
+                    shape = self.rounds, PER_ROUND, len(ahead), self.session.dof
+                    noise = self.session.rng.standard_normal(shape)
+                    seeds.append(Neighbourhood(hands, self.most_promising(hands, layers), noise))
             if not seeds:
-                raise self.out_of_reach(retrieved)
+                able = {goal for (goal, _), postures in retrieved.items() if len(postures)}
+                raise MethodError(
+                    "infeasible",
+                    f"goal {min({*ahead} - able) + 1}: no correction of any of {len(self.store)} "
+                    f"stored postures puts the {' or '.join(self.session.hands)} hand within "
+                    f"{self.tolerance:g} of it",
+                )
             _, (hand, *_), postures = min(self.generate(seeds, ahead), key=lambda chain: chain[0])
             self.store = np.vstack([self.store, postures])
             movements.append(Movement(goal + 1, hand, "planned", postures[0]))
@@ -192,29 +203,6 @@ class PosturePlanner:
             postures[:, :BASE_DOF] += miss * self.movable[:BASE_DOF]
             retrieved[goal, hand] = postures[self.correct(postures, goal, hand, _RETRIEVED)]
         return retrieved
-
-    def seeds(self, retrieved: Layers, goals: range) -> list[Neighbourhood]:
-        """A neighbourhood for each choice of hands that all have a posture."""
-        seeds = []
-        for hands in itertools.product(self.session.hands, repeat=len(goals)):
-            layers = [retrieved[key] for key in zip(goals, hands, strict=True)]
-            if all(len(layer) for layer in layers):
-                shape = self.rounds, PER_ROUND, len(goals), self.session.dof
-                noise = self.session.rng.standard_normal(shape)
-                seeds.append(Neighbourhood(hands, self.most_promising(hands, layers), noise))
-        return seeds
-
-    def out_of_reach(self, retrieved: Layers) -> MethodError:
-        """The error that says why the plan cannot go on."""
-        hands = self.session.hands
-        for goal in sorted({goal for goal, _ in retrieved}):
-            if not any(len(retrieved[goal, hand]) for hand in hands):
-                break
-        return MethodError(
-            "infeasible",
-            f"goal {goal + 1}: no correction of any of {len(self.store)} stored postures "
-            f"puts the {' or '.join(hands)} hand within {self.tolerance:g} of it",
-        )
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
         """Second aspect: the cheapest of the retrieved postures, one for each goal."""

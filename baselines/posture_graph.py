@@ -128,16 +128,6 @@ class PostureGraph:
             kept = [longer[i] for i in sorted(ranked[:most])]
         return [self.chain_of(complete) for complete in kept]
 
-    def why_none(self) -> str:
-        """The reason why there is no chain, a goal without a posture; empty if there is a chain."""
-        for goal in range(len(self.task.goals)):
-            if not any(len(self.layers[goal, hand]) for hand in self.task.hands):
-                return (
-                    f"goal {goal + 1}: no posture was found that puts the "
-                    f"{' or the '.join(self.task.hands)} hand inside its disc"
-                )
-        return ""
-
     def longer(self, begun: Beginning) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
         hands, nodes, cost = begun.hands, begun.nodes, begun.cost
@@ -206,9 +196,13 @@ def cheapest_chains(
     for number in itertools.count(1):
         graph = PostureGraph.sample(task, nodes, rng)
         session.spend(**graph.spent)
-        missing = graph.why_none()
-        if missing:
-            raise MethodError("infeasible", missing)
+        able = {goal for (goal, _), postures in graph.layers.items() if len(postures)}
+        if missing := {*range(len(task.goals))} - able:
+            raise MethodError(
+                "infeasible",
+                f"goal {min(missing) + 1}: no posture was found that puts the "
+                f"{' or the '.join(task.hands)} hand inside its disc",
+            )
         for hands, configurations in graph.chains(most):
             yielded += 1
             yield hands, configurations

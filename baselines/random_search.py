@@ -29,7 +29,7 @@ does, with ε for each goal around the best sequence known. The SD and ε are th
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from coartic.learner.learning import TRIALS
 from coartic.method import BudgetError, Method, MethodError, Parameters, Result, Session
 from coartic.optimisers import TOLD, Objective, Optimiser, OptimiserParameters, sequences_of
 from coartic.robot import Array
+from coartic.tasks.task import letters_of
 
 _GUESSES_AT_ONCE = 500
 _EPSILON = 0.2  # probability of a random hand, for each goal
@@ -126,110 +127,57 @@ class Climbing(Method):
     Parameters = UninformedParameters
 
     def solve(self, session: Session) -> Result:
-        """Hands are drawn around the best sequence known."""
-        return HillClimbers(session, self.parameters).result()
+        """Draw hands around the best sequence known, make a trial around its centre, draw again."""
+        first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
+        attempts = Attempts(session, self.parameters)
+        most, ahead = len(letters) ** session.goals_count, 1
+        masks: dict[str, NDArray[np.bool_]] = {}  # explored joints, (G, dof)
+        centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints
+        rewards: dict[str, float] = {}  # a trial with more moves the centre
+        hopeless: set[str] = set()  # A alone does not complete them, ever
+
+        def draw() -> str:
+            """Hands around the best; uniformly random where none has succeeded."""
+            while True:
+                chosen = list(attempts.hands or letters[0] * session.goals_count)
+                for goal in range(len(chosen)):
+                    if not attempts.hands or rng.random() < _EPSILON:
+                        chosen[goal] = letters[rng.integers(len(letters))]
+                if (hands := "".join(chosen)) not in hopeless:
+                    return hands
+
+        with session.solving():
+            while attempts.left > 0 and len(hopeless) < most:
+                # The next draws are known until a centre moves, which is rare: they are tried
+                # together, and what was drawn beyond the trial that moves one is drawn again.
+                drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
+                while len(drawn) < min(ahead, attempts.left):
+                    hands = draw() if attempts.trials_made else first
+                    if hands not in centres:
+                        break
+                    drawn.append(hands)
+                    noise.append(rng.standard_normal(masks[hands].sum()))
+                    states.append(rng.bit_generator.state)
+                if drawn:
+                    than = np.array([rewards[hands] for hands in drawn])
+                    targets = np.array([centres[hands] for hands in drawn])
+                    explored = np.array([masks[hands] for hands in drawn])
+                    targets[explored] += self.parameters.sigma * np.concatenate(noise)
+                    attempt = attempts.by_targets(drawn, targets, until=than)
+                    tried = len(attempt.rewards)
+                    rng.bit_generator.state = states[tried]
+                    hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
+                    if attempt.rewards[-1] > rewards[hands]:
+                        ahead = tried
+                else:
+                    masks[hands], rewards[hands] = attempts.explored(hands), -np.inf
+                    attempt = attempts.by_correction(hands)
+                    if attempt.rewards[-1] == -np.inf:
+                        hopeless.add(hands)
+                if attempt.rewards[-1] > rewards[hands]:
+                    centres[hands] = np.where(masks[hands], attempt.reached[-1], np.nan)
+                    rewards[hands] = float(attempt.rewards[-1])
+        return attempts.result(sequences=len(centres))
 
 
 METHODS: tuple[type[Method], ...] = (Guesses, Climbing, DrawnHands)
-
-
-class Centre(NamedTuple):
-    """The point around which trials of one hand sequence are made."""
-
-    mask: NDArray[np.bool_]  # explored joints, (G, dof)
-    size: int  # how many they are
-    targets: Array  # their values, (G, dof); NaN for the other joints
-    reward: float  # a trial with more moves the centre
-
-
-class HillClimbers:
-    """The centres, and the next trials around them."""
-
-    def __init__(self, session: Session, parameters: UninformedParameters) -> None:
-        self._session, self._rng = session, session.rng
-        self._first_hands = session.find_initial_hands()
-        self._attempts = Attempts(session, parameters)
-        self._letters = [hand[0].upper() for hand in session.hands]
-        self._sigma = parameters.sigma
-        self.centres: dict[str, Centre] = {}
-        self._hopeless: set[str] = set()  # A alone does not complete them, ever
-
-    def result(self) -> Result:
-        """The best of all trials, after making them until none is left or none can succeed."""
-        with self._session.solving():
-            self._run()
-        return self._attempts.result(sequences=len(self.centres))
-
-    def _run(self) -> None:
-        most, ahead = len(self._letters) ** self._session.goals_count, 1
-        following: str | None = self._first_hands
-        while self._attempts.left > 0 and len(self._hopeless) < most:
-            best = self._attempts.hands
-            hands = self._draw(best) if following is None else following
-            following = None
-            if hands not in self.centres:
-                self._begin(hands)
-                continue
-            # The next draws are known until a centre moves, which is rare.
-            state = self._rng.bit_generator.state
-            drawn, following = self._ahead(hands, best, min(ahead, self._attempts.left))
-            tried, moved = self._around(drawn)
-            ahead = min(2 * ahead, _MOST_DRAWN)
-            if moved:  # then the draws beyond that one are not valid
-                self._rng.bit_generator.state = state
-                self._ahead(hands, best, tried)
-                following, ahead = None, tried
-
-    def _begin(self, hands: str) -> None:
-        """The first trial of a hand sequence."""
-        mask = self._attempts.explored(hands)
-        attempt = self._attempts.by_correction(hands)
-        if attempt.rewards[0] > -np.inf:
-            self.centres[hands] = centre_at(attempt.reached[0], mask, attempt.rewards[0])
-        else:
-            self._hopeless.add(hands)
-
-    def _ahead(
-        self, hands: str, best: str, count: int
-    ) -> tuple[list[tuple[str, Array]], str | None]:
-        """Hands and normal noise of at most ``count`` trials; the hands after them, where drawn."""
-        drawn: list[tuple[str, Array]] = []
-        while hands in self.centres:
-            drawn.append((hands, self._rng.standard_normal(self.centres[hands].size)))
-            if len(drawn) == count:
-                return drawn, None
-            hands = self._draw(best)
-        return drawn, hands
-
-    def _around(self, drawn: list[tuple[str, Array]]) -> tuple[int, bool]:
-        """Make trials up to the first that moves its centre: their number, and whether one did."""
-        centres = [self.centres[hands] for hands, _ in drawn]
-        than = np.array([centre.reward for centre in centres])
-        targets = np.array([centre.targets for centre in centres])
-        explored = np.array([centre.mask for centre in centres])
-        targets[explored] += self._sigma * np.concatenate([noise for _, noise in drawn])
-        attempt = self._attempts.by_targets([hands for hands, _ in drawn], targets, than)
-        last = len(attempt.rewards) - 1
-        moves = bool(attempt.rewards[last] > than[last])
-        if moves:
-            reached, reward = attempt.reached[last], attempt.rewards[last]
-            self.centres[drawn[last][0]] = centre_at(reached, centres[last].mask, reward)
-        return last + 1, moves
-
-    def _draw(self, best: str) -> str:
-        """A hand sequence around the best; uniformly random where none has succeeded."""
-        random, integers, letters = self._rng.random, self._rng.integers, self._letters
-        count = len(letters)
-        while True:
-            chosen = list(best or letters[:1] * self._session.goals_count)
-            for goal in range(len(chosen)):
-                if not best or random() < _EPSILON:
-                    chosen[goal] = letters[integers(count)]
-            hands = "".join(chosen)
-            if hands not in self._hopeless:
-                return hands
-
-
-def centre_at(reached: Array, mask: NDArray[np.bool_], reward: float) -> Centre:
-    """A centre where the goals were hit, shape ``(G, dof)``."""
-    return Centre(mask, int(mask.sum()), np.where(mask, reached, np.nan), reward)

@@ -25,11 +25,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from coartic import Movement, Task
-from coartic.baselines.posture_graph import Chain, cheapest_chains
+from coartic import Movement
+from coartic.baselines.posture_graph import cheapest_chains
 from coartic.baselines.shortest_paths import (
     KNOWS_REWARD,
-    PlanInTicks,
     ShortestPlans,
     fewest_ticks,
     shortest_plans,
@@ -56,6 +55,11 @@ class RecedingHorizonParameters(Parameters):
     other arm spread out, are ranked by length."""
 
 
+def length_of(q0: Array, configurations: Array) -> float:
+    """Joint-space distance from a start ``(dof,)`` through configurations ``(G, dof)``."""
+    return float(segment_lengths(np.vstack([q0, configurations])).sum())
+
+
 class RecedingHorizon(Method):
     """The shortest movements through the next goals, of which it makes the first."""
 
@@ -79,10 +83,28 @@ class RecedingHorizon(Method):
         solution: list[Movement] = []
         length, q = 0.0, np.array(task.q0)
         while (goal := len(solution)) < len(task.goals):
-            end = min(goal + parameters.horizon + 1, len(task.goals))
-            plans, best = plan_window(session, remaining(task, q, goal, end), parameters, rng)
+            ahead = task.goals[goal : goal + parameters.horizon + 1]
+            angles = {hand: tuple(q[task.robot.joints(hand)].tolist()) for hand in HANDS}
+            start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
+            window = task.model_copy(update={"goals": ahead, "start": start})
+            with session.building():
+                problem = trajectory_problem(task.robot, task.hands, len(ahead), "path-length")
+            with session.solving():
+                chains = cheapest_chains(
+                    session,
+                    window,
+                    rng,
+                    nodes=parameters.nodes // len(task.hands),
+                    graphs=parameters.graphs,
+                    chains=parameters.chains,
+                    spread=len(ahead) > 1,  # with one goal it is the chain itself
+                )
+                ranked = sorted(chains, key=lambda chain: length_of(window.q0, chain[1]))
+                starts = ranked[: parameters.starts]
+                plans = shortest_plans(session, window, problem, starts, still=False)
+                best = fewest_ticks(session, window, problem, plans)
             windows.append(plans)
-            followed = 1 if end < len(task.goals) else end - goal
+            followed = 1 if goal + len(ahead) < len(task.goals) else len(ahead)
             solution += [
                 replace(movement, goal=goal + movement.goal)
                 for movement in best.movements[:followed]
@@ -99,36 +121,3 @@ class RecedingHorizon(Method):
 
 
 METHODS = (RecedingHorizon,)
-
-
-def plan_window(
-    session: Session, task: Task, parameters: RecedingHorizonParameters, rng: np.random.Generator
-) -> tuple[ShortestPlans, PlanInTicks]:
-    """The shortest plans through all goals of a task, or those that remain, and the best one."""
-    with session.building():
-        problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
-    with session.solving():
-        starts = cheapest_chains(
-            session,
-            task,
-            rng,
-            nodes=parameters.nodes // len(task.hands),
-            graphs=parameters.graphs,
-            chains=parameters.chains,
-            spread=len(task.goals) > 1,  # with one goal it is the chain itself
-        )
-
-        def length(start: Chain) -> float:
-            return float(segment_lengths(np.vstack([task.q0, start[1]])).sum())
-
-        ranked = sorted(starts, key=length)[: parameters.starts]
-        plans = shortest_plans(session, task, problem, ranked, still=False)
-        return plans, fewest_ticks(session, task, problem, plans)
-
-
-def remaining(task: Task, q: Array, first: int, end: int) -> Task:
-    """The goals from ``first`` (0-based) up to ``end``, from a configuration ``q``, ``(dof,)``."""
-    angles = {hand: tuple(q[task.robot.joints(hand)].tolist()) for hand in HANDS}
-    start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
-    goals = task.goals[first:end]
-    return task.model_copy(update={"goals": goals, "start": start})

@@ -275,30 +275,25 @@ def found(variable: Any) -> Array:
 def half_spaces(box: Array) -> Array:
     """Coefficients of c, s and φ, and the most of their sum, ``(4, HALF_SPACES, links)``.
 
-    They hold (c, s, φ) of every link in its interval.
+    They hold (c, s, φ) of every link in its interval: its ends; the chord; tangents to cosine and
+    sine; the chord of the sine. Any normal is valid: the offsets make it so. More of them bound no
+    better in the same time.
     """
     middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
     # In the interval's own frame, where its middle is the angle zero, and from there.
-    along, across, turn = normals = half_space_normals(half)
-    cosine, sine = directions(middle).T
-    most = support_of(normals, half) + turn * middle
-    return np.array([along * cosine - across * sine, along * sine + across * cosine, turn, most])
-
-
-def half_space_normals(half: Array) -> Array:
-    """Normals of the half-spaces for (cos δ, sin δ, δ), |δ| <= half; ``(3, HALF_SPACES, links)``.
-
-    The interval's ends; the chord; tangents to cosine and sine; the chord of the sine. Any
-    normal is valid: the offsets make it so. More of them bound no better in the same time.
-    """
     zero, one = np.zeros_like(half), np.ones_like(half)
-    normals = [(zero, zero, one), (zero, zero, -one), (-one, zero, zero)]
     cosine, sine = directions(np.minimum(0.5 * half, math.pi / 2)).T
     end = directions(np.minimum(half, math.pi))
-    normals += [(zero, one, -cosine), (zero, -one, cosine), (one, zero, sine), (one, zero, -sine)]
     slope = end[:, 1] / np.maximum(half, 1e-12)
-    normals += [(zero, one, -slope), (zero, -one, slope)]
-    return np.array(normals).swapaxes(0, 1)
+    rows = [
+        (zero, zero, one), (zero, zero, -one), (-one, zero, zero),
+        (zero, one, -cosine), (zero, -one, cosine), (one, zero, sine), (one, zero, -sine),
+        (zero, one, -slope), (zero, -one, slope),
+    ]  # fmt: skip
+    along, across, turn = normals = np.array(rows).swapaxes(0, 1)
+    most = support_of(normals, half) + turn * middle
+    cosine, sine = directions(middle).T
+    return np.array([along * cosine - across * sine, along * sine + across * cosine, turn, most])
 
 
 def support_of(normals: Array, half: Array) -> Array:

@@ -12,10 +12,9 @@ from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
 from coartic.runs.plan import RunKey, Setting
-from coartic.tasks.optima import entries
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
-from tests.support.strategies import tiny_task
+from tests.support.strategies import shipped_optima, tiny_task
 from tests.support.suites import BROKEN, InProcess
 from tests.support.suites import KNOWN as BUILT_IN
 
@@ -23,7 +22,7 @@ pytestmark = pytest.mark.process
 
 OPTIMUM = {
     entry.task: entry.reward
-    for entry in entries()
+    for entry in shipped_optima()
     if (entry.other_arm, entry.base) == ("free", "task")
 }
 LAWS = [

@@ -22,7 +22,7 @@ def assert_same(a, b):
     assert a.seed == b.seed
     assert a.counters == b.counters
     assert a.best_trial == b.best_trial
-    assert a.replay_completed == b.replay_completed
+    assert a.replay_reward == b.replay_reward
     npt.assert_array_equal(a.rewards.data, b.rewards.data)
     for name in ("completed", "values", "targets"):
         npt.assert_array_equal(getattr(a, name), getattr(b, name))

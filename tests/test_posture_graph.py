@@ -11,7 +11,7 @@ from coartic.baselines.posture_graph import (
     cheapest_chains,
     move_other_arm,
 )
-from coartic.method import Information, Session
+from coartic.method import Information, MethodError, Session
 from tests.support.strategies import changed
 
 TASKS = {
@@ -90,9 +90,10 @@ def test_graphs_are_sampled_until_there_are_as_many_and_chains(name, graphs, cha
 
 def test_a_goal_without_a_posture_is_named():
     task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
-    graph = PostureGraph.sample(task, 20, np.random.default_rng(7))
-    assert graph.why_none().startswith("goal 2: no posture was found that puts the left or")
-    assert list(graph.chains()) == []
+    assert list(PostureGraph.sample(task, 20, np.random.default_rng(7)).chains()) == []
+    options = {"nodes": 20, "graphs": 1, "chains": 1}
+    with pytest.raises(MethodError, match="^goal 2: no posture was found that puts the left or"):
+        [*cheapest_chains(Session(task, 0, ()), task, np.random.default_rng(7), **options)]
 
 
 def test_a_beam_keeps_the_cheapest_beginnings():

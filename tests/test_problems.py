@@ -8,7 +8,7 @@ from coartic import BudgetError, CoarticError, UndeclaredError, execute, load_ta
 from coartic.method import Session
 from coartic.motion.trials import movements_of
 from coartic.optimisers import TOLD, Objective
-from coartic.tasks.optima import entries
+from tests.support.strategies import shipped_optima
 
 FOUR = load_task("two-armed-2")
 
@@ -35,7 +35,7 @@ def test_hands_may_come_with_points():
 
 
 def test_what_is_known_of_a_task():
-    for entry in entries():
+    for entry in shipped_optima():
         if (entry.base, entry.other_arm) != ("task", "free"):
             continue
         problem = coartic.objective(entry.task)

@@ -31,12 +31,8 @@ METHOD_PREFIX = "dual-process/"
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
-HandExploration = Literal["none", "closest", "random"]
-Learned = Literal["best", "replay"]
-Credit = Literal["overall", "subtask"]
 Counted = Literal["later", "all"]
 Share = Annotated[float, Field(ge=0, le=1)]
-Noise = Annotated[float, Field(ge=0, le=MOST_NOISE)]
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -55,19 +51,19 @@ class ExplorationCondition:
     """AModChosen: whether noise moves the targets of the base and of the arm that is to hit."""
     modify_other: bool
     """AModOther: whether noise moves the targets of the other arm."""
-    hand_exploration: HandExploration
+    hand_exploration: Literal["none", "closest", "random"]
     """How the hand for a goal is explored: not at all (``"none"``), by taking the one that is
     closest to the goal (``"closest"``), or at random (``"random"``, DASel)."""
     epsilon: Share = 0.2
     """ε: the probability with which the hand for a goal is explored (printed)."""
-    noise_sd: Noise = 0.05
+    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE)] = 0.05
     """Standard deviation of the noise η, length unit (base) and rad (joints) (printed)."""
     corrects: bool = True
     """Whether **A** finishes what a stored target misses. If not, such a trial fails;
     **A** is left for pairs (s, a) without a stored target, such as those of trial 0."""
-    learned: Learned = "best"
+    learned: Literal["best", "replay"] = "best"
     """What is learned in the end: the best trial, or the noiseless replay after the last."""
-    credit: Credit = "overall"
+    credit: Literal["overall", "subtask"] = "overall"
     """What Q(s, a) of a goal stands for: the reward R of the whole trial, or the return of that
     goal, the reward of its own subtask first."""
     discount: Share = 0.0

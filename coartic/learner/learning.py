@@ -262,7 +262,7 @@ def learn_together(
             best_trial=int(kept.best_trial[n]) if kept.best_trial[n] >= 0 else None,
             initial=logged_movements(kept.first, n, dof),
             solution=logged_movements(kept.best, n, dof),
-            replay=logged_movements(kept.replay, n, dof),
+            replay=logged_movements(kept.replay, n, dof) if kept.replayed[n] else (),
             replay_reward=int(kept.replay_rewards[n]) if kept.replayed[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),

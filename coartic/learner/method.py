@@ -121,12 +121,11 @@ class DualProcess(Method):
         for session, run in zip(sessions, runs, strict=True):
             session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
             session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
-            if run.status != "ok":
+            if not run.learned:
                 results.append(MethodError("infeasible", run.reason))
                 continue
             details = {CORRECTIONS: run.corrections.tolist()}
-            replay = run.replay if run.replay_completed else ()
-            results.append(Result(run.learned, details, initial=run.initial, replay=replay))
+            results.append(Result(run.learned, details, initial=run.initial, replay=run.replay))
         return results
 
 

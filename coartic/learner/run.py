@@ -45,7 +45,7 @@ class LearningRun:
     solution: tuple[Movement, ...]
     """Movements of the best trial."""
     replay: tuple[Movement, ...]
-    """Movements of one noiseless greedy trial with the final tables."""
+    """Movements of one noiseless greedy trial with the final tables; none where it failed."""
     replay_reward: int | None
     """Its reward; None where it did not hit every goal."""
     values: Array
@@ -89,17 +89,12 @@ class LearningRun:
         condition says so; none where there is no such trial."""
         if self.condition.learned == "best":
             return self.solution
-        return self.replay if self.replay_completed else ()
-
-    @property
-    def status(self) -> str:
-        """``"ok"``, or ``"infeasible"`` where nothing was learned."""
-        return "ok" if self.learned else "infeasible"
+        return self.replay
 
     @property
     def reason(self) -> str:
         """Why the run has no solution; empty where it has one."""
-        if self.status == "ok":
+        if self.learned:
             return ""
         if self.best_trial is not None:
             return "the replay of what was learned did not hit every goal"
@@ -127,16 +122,6 @@ class LearningRun:
     def initial_reward(self) -> int | None:
         """Reward of trial 0."""
         return int(self.rewards[0]) if self.completed[0] else None
-
-    @property
-    def replay_completed(self) -> bool:
-        """Whether the replay hit every goal."""
-        return self.replay_reward is not None
-
-    @property
-    def replay_hands(self) -> str | None:
-        """Hand sequence of the replay."""
-        return hands_in(self.replay) if self.replay_completed else None
 
     def execute(self) -> Execution:
         """Execute the learned solution again, apart from the learner.

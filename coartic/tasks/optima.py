@@ -11,13 +11,11 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from coartic.inputs import FileData
 from coartic.tasks.task import Task
 
 BASE = "task"
@@ -27,8 +25,6 @@ BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 """Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``hands`` and
 ``essence``."""
 
-OtherArm = Literal["free", "still"]
-"""Whether the arm that is not chosen may move, or is kept still."""
 KEPT = ("start", "radius", "hands", "locked_base", "robot")
 """What makes a task beside its goals."""
 
@@ -47,34 +43,6 @@ class KnownOptimum:
     def proven(self) -> bool:
         """Whether no solution can be better."""
         return self.bound == self.reward
-
-
-class ShippedOptimum(FileData):
-    """What is shipped of one task under one restriction: a reward, or why there is none."""
-
-    task: str
-    essence: str
-    """The task's :func:`essence`."""
-    base: str
-    """Directions in which the base is locked; ``task``: as the task locks it."""
-    other_arm: OtherArm
-    run_ids: tuple[str, ...]
-    made_by: dict[str, Any]
-    reward: int | None = None
-    hands: str = ""
-    bound: int | None = None
-    """Reward that no solution exceeds; None where nothing is proven."""
-    searches: Mapping[str, int] = {}
-    """Reward that each search found, by method."""
-    solution: tuple[dict[str, Any], ...] = ()
-    """Movements as :func:`coartic.runs.run.movements_from` reads them, in full precision."""
-    infeasible: str = ""
-    """Why no search has a solution."""
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What it is about: task, lock of the base, other arm."""
-        return self.task, self.base, self.other_arm
 
 
 def essence(task: Task) -> str:
@@ -102,12 +70,20 @@ def _by_essence() -> dict[str, KnownOptimum]:
             for row in csv.DictReader(lines)
         }
     for entry in entries():
-        if (entry.base, entry.other_arm) == (BASE, "free") and entry.reward is not None:
-            known[entry.essence] = KnownOptimum(entry.reward, entry.bound, entry.hands)
+        if (entry["base"], entry["other_arm"]) == (BASE, "free") and "reward" in entry:
+            best = KnownOptimum(entry["reward"], entry["bound"], entry["hands"])
+            known[entry["essence"]] = best
     return known
 
 
-def entries() -> list[ShippedOptimum]:
-    """The shipped data, one entry per task and restriction."""
-    content = json.loads(DATA.read_text(encoding="utf-8"))
-    return [ShippedOptimum.model_validate(entry) for entry in content["optima"]]
+def entries() -> list[dict[str, Any]]:
+    """The shipped data, an entry per task and restriction, as ``optima.json`` has it.
+
+    ``task``, its :func:`essence`, ``base`` (directions in which it is locked; ``task``: as the task
+    locks it), ``other_arm`` (``free`` or ``still``), ``run_ids`` and ``made_by``; then ``reward``,
+    ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (reward that each found)
+    and ``solution`` (movements as :func:`coartic.runs.run.movements_from` reads them); or
+    ``infeasible``, why no search has a solution.
+    """
+    content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
+    return content["optima"]

@@ -8,7 +8,7 @@ the next, so that what is drawn depends on counter and key alone, and on no libr
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -49,14 +49,8 @@ class Draws:
 
     def __init__(self, key: tuple[int, int], *place: int) -> None:
         first, second, third = place
-        self._pairs = self._pairs_of(key, (first, second, third))
-
-    @staticmethod
-    def _pairs_of(key: tuple[int, int], place: tuple[int, int, int]) -> Iterator[int]:
-        for block in range(_WORD):
-            a, b, c, d = philox4x32((block, *place), key)
-            yield a << 32 | b
-            yield c << 32 | d
+        blocks = (philox4x32((block, first, second, third), key) for block in range(_WORD))
+        self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
     def integer(self, least: int, most: int) -> int:
         """One of ``least`` to ``most``, all of them as likely to within (most - least) / 2^64."""

@@ -12,13 +12,13 @@ from coartic.analysis.optima import from_runs, restrictions
 from coartic.analysis.study import Study, load
 from coartic.files import write_atomically
 from coartic.runs.plan import SEARCH
-from coartic.tasks.optima import DATA, ShippedOptimum, entries, essence
+from coartic.tasks.optima import DATA, entries, essence
 from coartic.text import one_line
 
 OTHER_SEARCH = "trajectory-optimisation/path-length"
 
 
-def collect(study: Study) -> list[ShippedOptimum]:
+def collect(study: Study) -> list[dict[str, Any]]:
     """Entries of ``optima.json`` from a results folder of suite ``optimum``.
 
     Raises CoarticError where the folder has no searches for the optimum.
@@ -45,28 +45,32 @@ def collect(study: Study) -> list[ShippedOptimum]:
                 "searches": good.groupby("method").reward.max().astype(int).to_dict(),
                 "solution": rows.to_dict("records"),
             }
-        entry = ShippedOptimum(
-            task=name,
-            essence=essence(study.tasks[name]),
-            base=base,
-            other_arm=arm,
-            run_ids=tuple(sorted(group.run_id)),
-            made_by=made_by,
-            **facts,
-        )
-        collected.append(entry)
+        entry = {
+            "task": name,
+            "essence": essence(study.tasks[name]),
+            "base": base,
+            "other_arm": arm,
+            "run_ids": sorted(group.run_id),
+            "made_by": made_by,
+        }
+        collected.append(entry | facts)
     return collected
 
 
-def content_with(new: Iterable[ShippedOptimum], old: Iterable[ShippedOptimum]) -> bytes:
+def key_of(entry: dict[str, Any]) -> tuple[str, str, str]:
+    """What an entry is about: task, lock of the base, other arm."""
+    return entry["task"], entry["base"], entry["other_arm"]
+
+
+def content_with(new: Iterable[dict[str, Any]], old: Iterable[dict[str, Any]]) -> bytes:
     """Content of ``optima.json``: new entries replace old ones about the same problem that are no
     better."""
-    by_key = {entry.key: entry for entry in old}
+    by_key = {key_of(entry): entry for entry in old}
     for entry in new:
-        before = by_key.get(entry.key, entry).reward
-        if before is None or (entry.reward is not None and entry.reward >= before):
-            by_key[entry.key] = entry
-    content = [by_key[key].model_dump(exclude_unset=True) for key in sorted(by_key)]
+        before = by_key.get(key_of(entry), entry).get("reward")
+        if before is None or ("reward" in entry and entry["reward"] >= before):
+            by_key[key_of(entry)] = entry
+    content = [by_key[key] for key in sorted(by_key)]
     return f"{json.dumps({'optima': content}, indent=1, ensure_ascii=False)}\n".encode()
 
 

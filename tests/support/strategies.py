@@ -1,5 +1,7 @@
 """Hypothesis strategies and small tasks shared by several test modules."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -7,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
 from coartic.method import Session
 from coartic.optimisers import TOLD
+from coartic.tasks.optima import entries
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -86,3 +89,8 @@ def solve(method, task, seed=0, **parameters):
 def make_trials(task, hands, targets, model=PAPER):
     """Trials in a session of their own."""
     return Session(task, 0, TOLD, model=model).trials(hands, targets)
+
+
+def shipped_optima():
+    """Entries of the shipped optima, with None for what they do not have."""
+    return [SimpleNamespace(**({"reward": None, "bound": None} | entry)) for entry in entries()]
