@@ -30,7 +30,7 @@ from coartic.text import counted
 
 _SCORED = (
     *(f"{prefix}{name}" for prefix in PREFIXES.values() for name in ("reward", "hands")),
-    *("solution_corrections", "result"),
+    "solution_corrections",
 )
 """Columns of ``results`` that follow from the solutions of a run."""
 
@@ -43,7 +43,7 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
 
     Raises CoarticError where the folders do not go together, where one lacks runs that cannot be
     performed here, where a stored solution does not do what is stored of it, and where two folders
-    have different results of a run. Then nothing is copied.
+    have different results of a run. Then nothing is copied but shipped results.
     """
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
@@ -55,7 +55,10 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
                 raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
-        with writing(out) as target, target.transaction():
+        target = stack.enter_context(writing(out))
+        if RELEASED in sources:
+            target.begin_as(sources[RELEASED])
+        with target.transaction():
             target.replace_plan(whole, current_environment(), command(), now())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
@@ -80,7 +83,7 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
     missing = [cell for asked, cell in cells_of(plan) if lacks(asked, cell)]
     parts = plans | {"this command": replace(plan, cells=tuple(missing))}
     check_together(parts)
-    methods = {cell.method.name: cell.method for part in parts.values() for cell in part.cells}
+    methods = {name: method for part in parts.values() for name, method in part.methods.items()}
     cells: dict[str, Cell] = {}
     for part in parts.values():
         for asked, cell in cells_of(part):
@@ -96,11 +99,10 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
             )
         few = [c for a, c in theirs if a not in own and c.method.stochastic and c.runs < plan.runs]
         if few:
-            warnings.warn(
-                f"{name} has {counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked "
-                "for here",
-                stacklevel=3,
+            theirs_and_ours = (
+                f"{counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked"
             )
+            warnings.warn(f"{name} has {theirs_and_ours} for here", stacklevel=3)
     order = dict.fromkeys(asked for part in (plan, *plans.values()) for asked, _ in cells_of(part))
     return replace(
         plan,
@@ -146,23 +148,21 @@ def check_together(plans: Mapping[str, Plan]) -> None:
 
 
 def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -> None:
-    """Copy the runs that a source was asked for, each scored again; ``origin`` says where those
-    are from that the target has. Raises CoarticError where a run does not do what is stored of it,
-    or the target has another result of it."""
-    methods = source.plan().methods
-    there = target.runs().set_index("run_id").result.to_dict()
+    """Copy the runs that a source was asked for and the target lacks, each scored again; ``origin``
+    says where those are from that the target has. Raises CoarticError where a run does not do what
+    is stored of it, or the target has another result of it."""
+    methods, there = source.plan().methods, target.runs().set_index("run_id").result.to_dict()
     for _, cell in source.runs().groupby(["task", "label"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
         for run_id in results.keys() & there.keys():
-            if results[run_id] != there[run_id]:  # but for trials that one of them does not keep
-                run, other = source.run(run_id), target.run(run_id)
-                if changes := compare_runs(other, run):
-                    which = (
-                        f"run {run.key.number} of {run.setting.method} on {run.setting.task.name}"
-                    )
-                    raise CoarticError(
-                        f"{which} differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
-                    )
+            if results[run_id] == there[run_id]:
+                continue
+            run = source.run(run_id)
+            if changes := compare_runs(target.run(run_id), run):  # beyond trials not kept
+                raise CoarticError(
+                    f"run {run.key.number} of {run.setting.method} on {run.setting.task.name} "
+                    f"differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
+                )
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != RELEASED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
@@ -199,8 +199,8 @@ def check_scores(
             for column in _SCORED
             if before[column] != after[column]
         ]
-        if run.result != results[run.key.id]:
-            wrong.append("a joint or a trial was changed")
+        if {run.result, scored.result} != {results[run.key.id]}:
+            wrong.append("a joint, a tick or a trial was changed")
         if run.key != setting.key(run.key.suite_seed, run.key.number):
             wrong.append("it is not the run that its id says")
         if not math.isclose(run.other_arm_travel or 0, scored.other_arm_travel or 0, abs_tol=1e-9):

@@ -86,8 +86,8 @@ CHEATS = {
     "reward is -": "UPDATE results SET reward = reward + 1",
     "hands is RRR, not RRL": "UPDATE results SET hands = 'RRL'",
     "initial_reward is -": f"UPDATE results SET initial_reward = -9 WHERE id = {OF_EC1}",
-    "result is ": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
-    "a joint or a trial": "UPDATE movements SET left_1 = left_1 + 1e-12",
+    "a joint, a tick": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
+    "tick or a trial": "UPDATE movements SET left_1 = left_1 + 1e-12",
     "travel": "UPDATE results SET other_arm_travel = other_arm_travel + 1",
     "its id": "UPDATE results SET seed = seed + 1",
 }
