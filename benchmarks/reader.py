@@ -72,11 +72,10 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         try:
             said: Any
             if question == "cards":
-                said = []
                 module = import_file(Path(path), shown)
-                for card in cards_of_module(module, methods_in(module), shown, path):
-                    methods[card.name] = card.load()
-                    said.append(asdict(card))
+                methods = {method.name: method for method in methods_in(module)}
+                cards = cards_of_module(module, methods.values(), shown, path)
+                said = [asdict(card) for card in cards]
             else:
                 said = answer(methods[name], question, *arguments)
             text = json.dumps({"answer": said})

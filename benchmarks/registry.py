@@ -12,7 +12,7 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def built_in() -> Mapping[str, MethodCard]:
     cards: dict[str, MethodCard] = {}
     for name in MODULES:
         module = importlib.import_module(name)
-        code = cache(partial(code_of, Path(inspect.getfile(module))))  # once for its methods
+        code = code_of(Path(inspect.getfile(module)))
         cards |= {method.name: card_of(method, BUILT_IN, name, code) for method in module.METHODS}
     return cards
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from coartic.errors import CoarticError
@@ -32,10 +32,13 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
     Raises CoarticError, before anything is written, where another file is in the way.
     """
-    make_folder(folder, files)
+    before = make_folder(folder, files)
+
+    def list_files(names: Collection[str]) -> None:
+        write_atomically(folder / LISTING, "".join(f"{name}\n" for name in sorted(names)).encode())
+
     with errors_in_words(folder):
-        before = listed_files(folder)
-        write_listing(folder, {*before, *files})  # whatever happens now, all of them are known
+        list_files({*before, *files})  # whatever happens now, all of them are known
         for name, data in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(folder / name, data)
@@ -43,35 +46,38 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
             (folder / name).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # others are in it
                 (folder / name).parent.rmdir()
-        write_listing(folder, {*files})
+        list_files(files)
 
 
-def check_inside(folder: Path, path: Path) -> None:
-    """Raises CoarticError for a path of a folder that is a link or leads out of it by one."""
-    if path.is_symlink() or not Path(os.path.realpath(path)).is_relative_to(
-        os.path.realpath(folder)
-    ):
-        raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
-
-
-def make_folder(folder: Path, names: Collection[str] = ()) -> None:
-    """Make a folder for :func:`publish`, for those who work long before. Raises CoarticError where
-    that would."""
+def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
+    """Make a folder for :func:`publish`, for those who work long before. Returns the files that an
+    earlier call wrote there. Raises CoarticError where :func:`publish` would."""
     if os.path.lexists(folder) and not folder.is_dir():
         raise CoarticError(f"cannot write {folder}: what is there is no folder")
-    ours = listed_files(folder)
+    ours, listing = set[str](), folder / LISTING
+    if listing.is_file() and not listing.is_symlink():
+        ours = {*listing.read_text(encoding="utf-8", errors="replace").splitlines()}
+        # Names that lead elsewhere are somebody else's, and a folder is no file.
+        ours = {n for n in ours if n and not Path(n).is_absolute() and ".." not in n}
+        ours = {name for name in ours if not (folder / name).is_dir()}
     for name in sorted({*ours, *names}):
         check_inside(folder, folder / name)
     in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
     if in_the_way:
-        shown = ", ".join(map(plain, in_the_way[:3]))
-        more = f" and {len(in_the_way) - 3} more" if len(in_the_way) > 3 else ""
         raise CoarticError(
-            f"{folder} holds {shown}{more}, which coartic did not write there. Move it away or "
-            "choose another folder."
+            f"{folder} holds {plain(', '.join(in_the_way), 80)}, which coartic did not write "
+            "there. Move it away or choose another folder."
         )
     with errors_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)
+    return ours
+
+
+def check_inside(folder: Path, path: Path) -> None:
+    """Raises CoarticError for a path of a folder that is a link or leads out of it by one."""
+    inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+    if path.is_symlink() or not inside:
+        raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
@@ -89,10 +95,8 @@ def check_output(path: Path, *, replace: bool) -> None:
     a folder or a link, or, without ``replace``, is taken."""
     if not path.parent.is_dir():
         raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
-    if path.is_symlink():
-        raise CoarticError(f"cannot write {path}: it is a link; name what it leads to")
-    if path.exists() and not path.is_file():
-        raise CoarticError(f"cannot write {path}: what is there is no file")
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise CoarticError(f"cannot write {path}: what is there is a link or no file")
     if path.exists() and not replace:
         raise CoarticError(
             f"{path} is there already; add --replace to write over it, or choose another name"
@@ -100,8 +104,8 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """A folder by its name. Raises CoarticError for an empty one, which is not the current one, and
-    for one that no folder can have."""
+    """A file or folder by its name. Raises CoarticError for an empty name, which is not the current
+    folder, and for one that nothing can have."""
     if isinstance(name, str) and not name.strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
     try:
@@ -113,28 +117,9 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
         raise CoarticError(f"{what} {plain(repr(name), 80)} cannot be used: {reason}") from None
 
 
-def listed_files(folder: Path) -> set[str]:
-    """What an earlier call wrote; folders and names that lead elsewhere are none of it."""
-    path = folder / LISTING
-    if path.is_symlink() or not path.is_file():
-        return set()
-    try:
-        names = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError):
-        return set()
-    inside = (name for name in names if name and not Path(name).is_absolute() and ".." not in name)
-    return {name for name in inside if not (folder / name).is_dir()}
-
-
-def write_listing(folder: Path, names: Iterable[str]) -> None:
-    """Say which files in a folder are ours."""
-    text = "".join(f"{name}\n" for name in sorted(names))
-    write_atomically(folder / LISTING, text.encode())
-
-
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """What the system says, as a sentence."""
+    """Raises CoarticError for what the system refuses."""
     try:
         yield
     except OSError as error:

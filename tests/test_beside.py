@@ -141,7 +141,7 @@ def test_what_does_not_go_together(parts, tmp_path):
     other = plan_suite("quick", cells=LEFT, **OPTIONS)
     for plan, folder, said in (
         (other, parts[0], "the suite is 'paper' in .*left and 'quick' in this command"),
-        (planned(LEFT, **OPTIONS), tmp_path / "nowhere", "nowhere does not exist"),
+        (planned(LEFT, **OPTIONS), tmp_path / "nowhere", "nowhere is not a results folder"),
         (planned(LEFT, **OPTIONS), tmp_path / "whole", "cannot stand beside itself"),
     ):
         with pytest.raises(CoarticError, match=said):

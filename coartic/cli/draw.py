@@ -32,7 +32,7 @@ def draw(
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
-    from coartic.files import check_output, publish, write_output
+    from coartic.files import publish, write_output
     from coartic.tasks.families import named_by, task_text
 
     meant = given.tasks_meant(tasks or builtin_tasks())
@@ -45,7 +45,6 @@ def draw(
     if out.suffix:
         if out.suffix.lower() not in FORMATS:
             raise CoarticError(f"--out {out}: the name must end in {', '.join(FORMATS)}.")
-        check_output(out, replace=replace)
         write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}

@@ -9,6 +9,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,23 +24,6 @@ from coartic.text import error_line, plain
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
-_LOADED: dict[tuple[str, str, str], type[Method]] = {}
-"""Methods that this process has imported, by :attr:`MethodCard.key`."""
-
-
-class Late:
-    """A text that may be given as a function, which is called when the text is first asked for."""
-
-    def __get__(self, card: MethodCard | None, _: object) -> str:
-        if card is None:
-            raise AttributeError  # it has no default
-        text = vars(card)["code"]
-        if callable(text):
-            text = vars(card)["code"] = text()
-        return str(text)
-
-    def __set__(self, card: MethodCard, text: str | Callable[[], str]) -> None:
-        vars(card)["code"] = text
 
 
 @dataclass(frozen=True)
@@ -57,14 +41,10 @@ class MethodCard:
     """Its parameters; None for one that has no default."""
     origin: str
     """``built in``, the distribution of a plug-in, or the path of a method file."""
-    code: str = Late()  # type: ignore[assignment]
-    """Hash of the code that its results come from. It takes a while, and names need none."""
+    code: str
+    """Hash of the code that its results come from."""
     where: str = field(default="", compare=False)
     """Module or method file that a worker imports. Not stored."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """For other processes: with the hash."""
-        return vars(self) | {"code": self.code}
 
     @property
     def is_ours(self) -> bool:
@@ -78,9 +58,7 @@ class MethodCard:
 
     def load(self) -> type[Method]:
         """The method itself, imported once a process, unless its code has changed since."""
-        if self.key not in _LOADED:
-            _LOADED[self.key] = load_method(self.where, self.name)
-        return _LOADED[self.key]
+        return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
         """The method with these parameters."""
@@ -142,16 +120,14 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         ) from None
 
 
-def card_of(
-    method: type[Method], origin: str, where: str, code: str | Callable[[], str]
-) -> MethodCard:
+def card_of(method: type[Method], origin: str, where: str, code: str) -> MethodCard:
     """The card of a method that is imported from ``where``."""
     fields = method.Parameters.model_fields.items()
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in fields
     }
-    card = MethodCard(
+    return MethodCard(
         name=method.name,
         title=method.title,
         citation=method.citation,
@@ -160,15 +136,15 @@ def card_of(
         stochastic=method.stochastic,
         defaults=json.loads(json.dumps(defaults, default=str)),
         origin=origin,
-        code=code,  # type: ignore[arg-type]
+        code=code,
         where=where,
     )
-    _LOADED[card.key] = method
-    return card
 
 
-def load_method(where: str, name: str) -> type[Method]:
-    """A method from its module or file. Raises CoarticError where it is not there."""
+@cache
+def load_method(where: str, name: str, code: str = "") -> type[Method]:
+    """A method from its module or file, whose ``code`` may change. Raises CoarticError where it is
+    not there."""
     module = load_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
     for method in [*getattr(module, "METHODS", ()), *methods_in(module)]:
         if method.name == name:

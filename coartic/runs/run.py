@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coartic.errors import SolutionError
-from coartic.learner.kernel import TENTHS
 from coartic.learner.run import CORRECTIONS
 from coartic.method import Meter
 from coartic.model import PAPER
@@ -160,13 +159,6 @@ class Run:
             best = max(best, -math.inf if reward is None else reward)
         return replace(self, rewards=kept)
 
-    @property
-    def corrections(self) -> list[int] | None:
-        """Of a learner: corrective movements in trial 0 and in each tenth of the others."""
-        corrections = self.details.get(CORRECTIONS)
-        counted = isinstance(corrections, list) and len(corrections) == 1 + TENTHS
-        return corrections if counted else None
-
     @cached_property
     def result(self) -> str:
         """Hash of status, solutions to the last joint, rewards of all trials, bound.
@@ -194,6 +186,9 @@ class Run:
         """Its columns of table ``results``, apart from the numbers of other tables' rows."""
         row: dict[str, Any] = dict.fromkeys(RESULTS)
         del row["setting"], row["environment"]
+        corrections = self.details.get(CORRECTIONS)
+        if isinstance(corrections, list) and len(corrections) == 11:  # trial 0 and ten tenths
+            row |= {"early_corrections": corrections[1], "late_corrections": corrections[-1]}
         for part, score in self.scores.items():
             prefix = PREFIXES[part]
             row |= {f"{prefix}reward": score.reward, f"{prefix}hands": score.hands}
@@ -207,8 +202,6 @@ class Run:
             "best_trial": self.best_trial,
             **(vars(self.meter) if self.meter else {}),
             "solution_corrections": self.solution_corrections,
-            "early_corrections": self.corrections[1] if self.corrections else None,
-            "late_corrections": self.corrections[-1] if self.corrections else None,
             "other_arm_travel": self.other_arm_travel,
             "proven_bound": self.bound,
             **asdict(self.times),

@@ -9,6 +9,7 @@ whatever interrupts it, a batch is there whole or not at all.
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -23,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from coartic.errors import CoarticError
 from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
@@ -31,7 +32,7 @@ from coartic.robot import Array
 from coartic.runs.earlier import other_reading
 from coartic.runs.plan import Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
-from coartic.text import counted, one_line, plain
+from coartic.text import one_line, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +57,6 @@ _DTYPES: dict[str, Any] = {
 """Types with which columns of views are read; all have room for missing values."""
 _JOINT = re.compile("base_[xy]|(left|right)_[0-9]{1,3}")
 _OF_SEVERAL = bytes.fromhex("d9d505f920a163d7")  # a journal ends so that names another
-_REWARDS = ("reward", "replay_reward", "initial_reward", "proven_bound")  # minus a count
 _OWN = [name for name in RESULTS if name not in ("setting", "suite_seed", "environment", "details")]
 _SCHEMA = f"""
 CREATE TABLE suite (name TEXT, seed INTEGER, runs INTEGER, trials INTEGER, readings TEXT,
@@ -109,30 +109,12 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
 """
 
 
-class Commit(BaseModel):
-    """The commit of a checkout."""
-
-    id: str
-    dirty: bool
-
-
-class MadeWith(BaseModel):
-    """The surroundings in which a suite was run."""
-
-    command: list[str]
-    date: str
-    coartic: str
-    model_code: str
-    commit: Commit | None
-    python: str
-    packages: dict[str, str]
-    platform: str
-    processor: str
-    cores: int
-
-
+_SURROUNDINGS: dict[str, Any] = {
+    **dict.fromkeys(("coartic", "model_code", "python", "platform", "processor", "date"), str),
+    **{"command": list, "packages": dict, "cores": int, "commit": str},
+}
+"""Of what kind the facts are that reports show of the surroundings of a suite."""
 WAIT_S = 1.0  # for another program, before more is done about it
-_LOCK_TRIES = 20
 
 
 class Store:
@@ -200,7 +182,10 @@ class Store:
             )
             how = {"command": json.loads(row["command"]), "date": row["date"]}
             made_with = json.loads(row["content"]) | how
-            MadeWith.model_validate(made_with)
+            facts = made_with | {"commit": (made_with["commit"] or {"id": ""})["id"]}
+            for name, kind in _SURROUNDINGS.items():
+                if not isinstance(facts[name], kind):
+                    raise ValueError(f"{name} is {plain(repr(facts[name]), 80)}")
             return dict(made_with)
 
     @contextmanager
@@ -214,14 +199,13 @@ class Store:
             return
         try:
             self._wait_for("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._wait_for("COMMIT")
-            finally:
-                if self._db.in_transaction:
-                    self._db.rollback()
+            yield
+            self._wait_for("COMMIT")
         except sqlite3.DatabaseError as error:
             raise CoarticError(explain(self.folder / RUNS_FILE, error)) from None
+        finally:
+            if self._db.in_transaction:
+                self._db.rollback()
 
     # Which runs there are.
 
@@ -403,20 +387,18 @@ class Store:
 
     def _wait_for(self, statement: str) -> None:
         """Execute it as soon as other programs that have the file open let it."""
-        tries = 0
-        while True:
+        for tries in itertools.count():
+            if tries == 2:
+                warnings.warn(
+                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
+                    stacklevel=2,
+                )
             try:
                 self._db.execute(statement)
                 return
             except sqlite3.OperationalError as error:
                 if "locked" not in str(error):
                     raise
-            tries += 1
-            if tries == 2:
-                warnings.warn(
-                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
-                    stacklevel=2,
-                )
 
 
 @contextmanager
@@ -427,26 +409,19 @@ def open_store(folder: Path) -> Iterator[Store]:
     work in it.
     """
     path = folder / RUNS_FILE
-    if not folder.exists():
-        raise CoarticError(f"{folder} does not exist; name a folder that `coartic run` has written")
     if not os.path.lexists(path):
         inside = [f"; did you mean {each.parent}?" for each in folder.glob(f"*/{RUNS_FILE}")]
         hint = min(inside, default="")
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
     check_files(folder)
     with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
-        with explain_errors(folder), lock(folder, shared=True) as is_ours:
+        with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
             if not has_tables(connection, folder):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
             check_reading(connection)
-            if not is_ours:
-                done = connection.execute(f"SELECT count(*) {_ASKED_FOR}").fetchone()[0]
-                asked = connection.execute("SELECT coalesce(sum(runs), 0) FROM cells").fetchone()[0]
-                raise CoarticError(
-                    f"another `coartic run` is at work in {folder}: {done} of "
-                    f"{counted(asked, 'run')} are done; wait for it"
-                )
+            with lock(folder, shared=True):  # or somebody is writing
+                pass
         yield Store(folder, connection)
 
 
@@ -466,8 +441,6 @@ def writing(folder: Path) -> Iterator[Store]:
     Raises CoarticError where the folder holds something else, cannot be written, or another
     process is at work in it.
     """
-    if folder.exists() and not folder.is_dir():
-        raise CoarticError(f"{folder} is a file where a folder is needed; choose another --out")
     visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
     if not (folder / RUNS_FILE).exists() and any(visible):
         raise CoarticError(
@@ -477,12 +450,7 @@ def writing(folder: Path) -> Iterator[Store]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CoarticError(f"cannot write to {folder}: {error.strerror}") from None
-    with lock(folder) as is_ours:
-        if not is_ours:
-            raise CoarticError(
-                f"another `coartic run` is at work in {folder}; wait for it, or choose another "
-                "folder"
-            )
+    with lock(folder):
         check_files(folder)
         with closing(connect(str(folder / RUNS_FILE), WAIT_S)) as connection:
             with explain_errors(folder):
@@ -495,31 +463,35 @@ def writing(folder: Path) -> Iterator[Store]:
 
 
 @contextmanager
-def lock(folder: Path, *, shared: bool = False) -> Iterator[bool]:
-    """Whether this process alone, or with others that share it, has a folder in this block: what
-    other programs read there is no matter. Where the system or the disk has no such locks, it has.
+def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
+    """Have a folder in this block alone, or with others that share it, where the system and the
+    disk have such locks. What other programs read there is no matter.
+
+    Raises CoarticError where another process has it.
     """
     try:
         import fcntl
 
         opened = os.open(folder, os.O_RDONLY)
     except (ImportError, OSError):
-        yield True
+        yield
         return
-    how = fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
+    end = time.monotonic() + (0 if shared else WAIT_S)  # somebody may just be looking
     try:
-        is_ours = False
-        for _ in range(1 if shared else _LOCK_TRIES):  # somebody may just be looking
+        while True:
             try:
-                fcntl.flock(opened, how)
+                fcntl.flock(opened, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
+                break
             except BlockingIOError:
-                time.sleep(WAIT_S / _LOCK_TRIES)
-                continue
+                if time.monotonic() > end:
+                    raise CoarticError(
+                        f"another `coartic run` is at work in {folder}; wait for it, or choose "
+                        "another folder"
+                    ) from None
+                time.sleep(WAIT_S / 20)
             except OSError:
-                pass
-            is_ours = True
-            break
-        yield is_ours
+                break
+        yield
     finally:
         os.close(opened)
 
@@ -690,7 +662,8 @@ def check_runs(runs: pd.DataFrame) -> pd.DataFrame:
         if "NOT NULL" in RESULTS[name]:
             rules[f"lack of {name}"] = runs[name].notna()
         if _DTYPES[name] in ("Int64", "Float64"):
-            size = runs[name].fillna(0) * (-1 if name in _REWARDS else 1)
+            is_reward = name.endswith("reward") or name == "proven_bound"  # minus a count
+            size = runs[name].fillna(0) * (-1 if is_reward else 1)
             rules[f"size of {name}"] = (size >= 0) & (size < np.inf)
     for name, holds in rules.items():
         if not holds.all():
