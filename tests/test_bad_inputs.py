@@ -201,12 +201,10 @@ def test_a_folder_that_cannot_be(name):
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
-        ("learner EC4", "dual-process/EC4"),
         ("the learner EC1", "dual-process/EC1"),
         ("CMA-ES", "cma-es/bandit"),
         ("nullspace", "nullspace-qp/none"),
         ("Posture based: two goals", "posture-based/two-goals"),
-        ("Two-armed 1", "two-armed-1"),
         ("two armed 2", "two-armed-2"),
         ("DESCENDING", "descending"),
     ],
@@ -238,8 +236,6 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["run", "papr"], "did you mean 'paper'"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
         (["report", "nowhere"], "nowhere"),
-        (["verify", "nowhere"], "nowhere"),
-        (["trace", "cells", "--in", "nowhere"], "nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
         (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
         (["draw", "ascending", "--out", "x.bmp"], ".bmp"),

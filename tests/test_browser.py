@@ -69,42 +69,9 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     assert page.locator(f"#{claim} dl").is_visible()
 
 
-FRAMES = (
-    """async () => { for (let n = 0; n < 10; n += 1) await new Promise(requestAnimationFrame); }"""
-)
-
-
 def part(page, name):
     """A part of the figure to play with."""
     return page.locator(f".play [data-is={name}]")
-
-
-def tick(page):
-    return int(part(page, "tick").input_value())
-
-
-def test_the_figure_plays_by_keyboard(opened):
-    page = opened(reduced_motion="reduce")
-    play, slider = part(page, "play"), part(page, "tick")
-    slider.fill("0")
-    play.focus()
-    page.keyboard.press("Space")
-    page.get_by_role("button", name="Pause").wait_for()
-    page.wait_for_function("document.querySelector('[data-is=tick]').value > 20")
-    page.keyboard.press("Space")
-    page.get_by_role("button", name="Play").wait_for()
-    stopped = tick(page)
-    page.evaluate(FRAMES)
-    assert tick(page) == stopped
-    page.keyboard.press("Tab")  # one tick back
-    page.keyboard.press("Enter")
-    part(page, "count").get_by_text(f"{stopped - 1} of").wait_for()
-    page.keyboard.press("Tab")  # one tick on
-    page.keyboard.press("Enter")
-    part(page, "count").get_by_text(f"{stopped} of").wait_for()
-    page.keyboard.press("Tab")  # the slider
-    page.keyboard.press("End")
-    assert tick(page) > stopped
 
 
 def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, traced):
@@ -169,38 +136,23 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme):
     assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
-def test_printing_shows_every_picture_once(opened):
-    page = opened(color_scheme="dark")
+def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened):
+    page = opened(688, color_scheme="dark")  # A4 within its margins
     page.emulate_media(media="print")
+    assert page.evaluate(OVERFLOWS) == []
+    assert not page.locator(".play").is_visible()
     figures = page.locator("figure").all()
     assert figures
     for figure in figures:
         assert figure.locator(".drawn svg").is_visible()
-    ids = [figure.get_attribute("id") for figure in figures]
-    assert len(ids) == len(set(ids))
     ink = page.evaluate("getComputedStyle(document.body).color")
     assert max(map(int, re.findall(r"\d+", ink))) < 80  # dark on white
-
-
-def test_heads_of_tables_are_printed_on_every_page(opened):
-    """Chromium leaves buttons out of the heads that it repeats."""
-    page = opened()
-    page.emulate_media(media="print")
-    boxes = "all => all.map(button => getComputedStyle(button).display)"
-    assert set(page.locator("thead button").evaluate_all(boxes)) == {"contents"}
 
 
 OVERFLOWS = """[...document.querySelectorAll("main *")].filter(each => each.checkVisibility()
     && !each.closest("svg") && getComputedStyle(each).display != "inline"
     && (each.scrollHeight > each.clientHeight + 1 || each.scrollWidth > each.clientWidth + 1))
     .map(each => each.outerHTML.slice(0, 80))"""
-
-
-def test_in_print_nothing_leaves_its_box_and_no_film_is_there(opened):
-    page = opened(688)  # A4 within its margins
-    page.emulate_media(media="print")
-    assert page.evaluate(OVERFLOWS) == []
-    assert not page.locator(".play").is_visible()
 
 
 def test_without_scripts_all_is_there(browser, address):

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, Robot, Task, execute, load_task
 from coartic.baselines.certificate import certify, fastest_hand, ticks_for_distance
-from coartic.baselines.relaxation import Relaxation, disc_of, split, support_of
+from coartic.baselines.relaxation import Relaxation, split, support_of
 from coartic.baselines.trajectory_problem import held_joints
 from coartic.baselines.whole_ticks import mergeable
 from coartic.motion.initial import hand_sequences
@@ -129,21 +129,6 @@ def test_any_multipliers_give_a_bound(name):
             pulls /= np.maximum(np.linalg.norm(pulls * moves, axis=1, keepdims=True), 1.0)
             forces = best.forces + size * rng.standard_normal(best.forces.shape)
             assert bound(root, box, pulls, forces, length) <= length + 1e-9
-
-
-def test_where_the_relaxation_begins():
-    """Where all joints turn alike, the last of four links goes as far as its interval."""
-    task = load_task("ascending")
-    box = Relaxation(task, ("right",) * 3, (), True).first_box(0.2)
-    q = np.tile(task.q0, (3, 1))
-    q[:, task.robot.joints("right")] += 0.1
-    angles = angles_of(task, ("right",) * 3, q)
-    assert (angles <= box[:, 1] + 1e-12).all()
-    np.testing.assert_allclose(angles[3::4], box[3::4, 1])
-    np.testing.assert_allclose((box[:, 1] - box[:, 0]) / 0.4, np.sqrt([1, 2, 3, 4] * 3))
-    # A hand that is undecided: shoulders half a unit from their middle, arms of 4, discs of 0.1.
-    middle, radius = disc_of(load_task("two-armed-2"), None)
-    assert (middle.tolist(), radius) == ([0.0, 0.1], pytest.approx(4.6))
 
 
 def test_the_least_of_a_term_is_exact():

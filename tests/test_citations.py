@@ -1,6 +1,5 @@
 """The bibliography: well-formed, and what the methods say of themselves."""
 
-import hashlib
 import re
 import sqlite3
 import unicodedata
@@ -15,7 +14,6 @@ from coartic.analysis.citations import (
     THE_PAPER,
     bibliography,
     references,
-    software,
 )
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.reader import METHOD_NAME
@@ -83,19 +81,6 @@ def test_every_method_has_a_row_and_every_entry_is_used():
     assert {THE_PAPER, *STATISTICS} | behind_methods == set(BIB) == set(keys_in(text))
 
 
-def test_the_software_is_cited_by_the_facts_of_citation_cff():
-    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    facts = dict(re.findall(r'^(title|version|date-released): "?([^"\n]+)"?$', text, re.MULTILINE))
-    fields = fields_of(software())
-    assert fields["title"] == facts["title"]
-    assert fields["note"] == f"Version {facts['version']}"
-    assert fields["year"] == facts["date-released"][:4]
-    assert fields["author"].strip("{}") in text
-    paper = BIB[THE_PAPER]
-    for fact in (f'title: "{paper["title"]}"', paper["journal"], f"year: {paper['year']}"):
-        assert fact in text
-
-
 def declared(title, citation, origin="built in"):
     return MethodCard(title, title, citation, (), (), True, {}, origin, "")
 
@@ -152,7 +137,3 @@ def test_command(tmp_path, monkeypatch, capsys):
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]
     assert "% the paper, corrective-alone/given\n" in text
-    _, every, _ = call(monkeypatch, capsys, "cite", "--analysis")
-    assert set(keys_in(every)) == {"coartic", "coartic-results", *BIB}
-    released = ROOT / "benchmarks" / "released" / "comparison.sqlite.xz"
-    assert hashlib.sha256(released.read_bytes()).hexdigest() in every

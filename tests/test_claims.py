@@ -552,25 +552,6 @@ def test_coarticulation_is_more_than_either_placebo_shows(
 
 
 @pytest.mark.parametrize(
-    ("first", "others", "verdict"),
-    [
-        (1, -20, "undecided"),  # one tick is rounding
-        (6, 20, "not supported"),  # the whole is not faster
-    ],
-)
-def test_the_first_movement_is_sacrificed_for_the_whole(first, others, verdict):
-    solutions = {
-        (task, label): [timed(task, much + k, others) for k in OFF.tolist()]
-        for task in ONE_ARMED
-        for label, much in (
-            ("dual-process/EC1", first), (GUESSES, -9), ("dual-process/EC1-subtask", -9)
-        )
-    }  # fmt: skip
-    judged = verdict_of("first-movement-sacrificed", plant(solutions))
-    assert judged.verdict == verdict, judged.evidence
-
-
-@pytest.mark.parametrize(
     ("rewards", "first", "verdict"),
     [
         ((HIGH, MIDDLE), 6, "supported"),

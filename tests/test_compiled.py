@@ -1,6 +1,5 @@
 """Compiled code is never older than the sources it comes from."""
 
-import logging
 import os
 import shutil
 import subprocess
@@ -118,19 +117,3 @@ def test_machine_code_of_several_processes_goes_together(tmp_path):
     for numbers in ([4, 8], [8, 4]):
         assert apart(reaches, tmp_path, numbers) == (numbers, 2)
     assert apart(reaches, tmp_path, [1, 3, 5, 11]) == ([4, 4, 8, 11], 2)
-
-
-def said(folder):
-    """What the package logs while the kernel is called."""
-    log, texts = logging.getLogger("coartic"), []
-    log.setLevel(logging.INFO)
-    log.addFilter(lambda record: texts.append(record.getMessage()))
-    lever(folder)
-    return texts
-
-
-def test_compiling_is_said_once(tmp_path):
-    write_kernel(tmp_path)
-    (text,) = apart(said, tmp_path)
-    assert "Compiling (once)" in text
-    assert apart(said, tmp_path) == []

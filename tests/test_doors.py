@@ -344,23 +344,6 @@ def test_a_batch_counts_as_so_many_trials():
     assert 0 < batch.meter.forward_kinematics < single.meter.forward_kinematics
 
 
-@pytest.mark.parametrize(
-    ("name", "printed"),
-    [("two-armed-1", {"LRLR": -532, "RRRR": -675}), ("two-armed-2", {"RRRR": -357})],
-)
-def test_corrective_process_alone(name, printed):
-    """Every hand sequence; those of the best and of the initial solution are printed."""
-    task = load_task(name)
-    rewards = {hands: corrective_trial(task, hands).reward for hands in hand_sequences(task)}
-    assert len(rewards) == 16
-    for hands, reward in rewards.items():
-        alone = [Movement(g, hand, "corrective") for g, hand in enumerate(hands_of(hands), 1)]
-        assert reference.execute(task, alone).reward == reward
-    assert {hands: rewards[hands] for hands in printed} == printed
-    assert max(rewards, key=rewards.get) == next(iter(printed)) == coartic.objective(task).hands
-    assert sorted(rewards.values())[-2] < max(rewards.values())
-
-
 def test_rows_of_a_trajectory_by_hand():
     """A goal hit at the start, two lines of 3 and 2 steps, q + k m (target - q)/distance."""
     task = tiny_task(goals=[[4.5, 0.1], [4.625, 0.1], [4.645, 0.1]], initial_hands="RRR")

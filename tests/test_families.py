@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from coartic import TaskError, builtin_tasks, corrective_trial, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.run import plan_suite, run_suite
+from coartic.benchmarks.run import run_suite
 from coartic.inputs import MOST_CELLS
 from coartic.tasks.families import (
     FAMILY_FOLDER,
@@ -57,26 +57,6 @@ RELEASED = {
     "redundancy/v1": "29dd33d58da81c12",
     "two-armed/v1": "421fe30fedfb532a",
 }
-TEXT = """\
-name = "two-armed/v1/i016"
-title = "Two-armed i016"
-description = "4 goals, 4 links an arm, a free base: drawn from family two-armed/v1."
-hands = ["left", "right"]
-goals = [[5.063, -0.303], [3.888, 0.845], [2.511, -0.612], [5.742, 0.985]]
-radius = 0.1
-locked_base = []
-initial_hands = "LLLL"
-
-[start]
-base = [0.0, 0.0]
-left = [2.147, 0.048, -0.662, -0.499]
-right = [1.405, 0.228, 0.966, -0.396]
-
-[provenance]
-goals = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
-start = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
-initial_hands = { status = "chosen", source = "drawn: family two-armed/v1, instance i016" }
-"""
 addresses = st.builds(
     Address,
     st.sampled_from(sorted(RELEASED)),
@@ -100,7 +80,6 @@ def test_a_released_family_is_not_changed(name):
 
 
 def test_an_instance_is_what_it_was():
-    assert task_text(load_task("two-armed/v1/i016")) == TEXT
     texts = {name: task_text(instance(name)).encode() for name in PINNED}
     assert {n: hashlib.sha256(text).hexdigest()[:16] for n, text in texts.items()} == PINNED
 
@@ -254,13 +233,13 @@ def test_ranges():
 
 
 def test_a_file_by_an_instances_name_is_that_instance(tmp_path):
-    path = tmp_path / "i016.toml"
-    path.write_text(TEXT, encoding="utf-8")
-    assert load_task(path) == instance("two-armed/v1/i016")
-    path.write_text(TEXT.replace("5.063", "5.064"), encoding="utf-8")
+    path, text = tmp_path / "i016.toml", task_text(GOOD)
+    path.write_text(text, encoding="utf-8")
+    assert load_task(path) == GOOD
+    path.write_text(text.replace("5.063", "5.064"), encoding="utf-8")
     with pytest.raises(TaskError, match="not the instance of that name"):
         load_task(path)
-    path.write_text(TEXT.replace("two-armed/v1/i016", "two-armed/v1/mine"), encoding="utf-8")
+    path.write_text(text.replace("two-armed/v1/i016", "two-armed/v1/mine"), encoding="utf-8")
     with pytest.raises(TaskError, match="is not an instance of a family"):
         load_task(path)
 
@@ -269,17 +248,6 @@ def test_a_family_that_cannot_be_met_ends():
     message = "20 draws of family 'two-armed/v1' broke a rule, 20 of them 'overlap'"
     with pytest.raises(TaskError, match=message):
         first_good(of_family(apart=99_000), address_of("two-armed/v1/i000"), most=20)
-
-
-def test_an_instance_beside_a_suites_tasks():
-    names = ["two-armed/v1/i003..i004", "two-armed-1"]
-    plan = plan_suite("paper", runs=1, tasks=names, methods=["EC4"])
-    assert [cell.task.name for cell in plan.cells] == [
-        "two-armed-1", "two-armed/v1/i003", "two-armed/v1/i004",
-    ]  # fmt: skip
-    # The paper's EC1 is for one arm, and comes to the right hand by itself.
-    alone = plan_suite("paper", runs=1, tasks=["one-armed/v1/i000"])
-    assert [cell.method.name for cell in alone.cells] == ["dual-process/EC1"]
 
 
 def test_command_draws_and_writes_instances(monkeypatch, capsys, tmp_path):

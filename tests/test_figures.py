@@ -12,7 +12,6 @@ from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.sections import FIGURES
 from coartic.analysis.topics.hands import hand_shares
 from coartic.analysis.topics.learning import learning_curves
-from coartic.analysis.topics.tasks import picture_of_tasks
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
 
@@ -101,14 +100,6 @@ def test_published_differences(tmp_path):
     assert np.isnan(data.difference["RRLR"])
     assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2}
     assert len(FIGURES["published"](planted).data) == 3
-
-
-def test_variants_of_a_task_are_told_apart():
-    task = load_task("ascending")
-    moved = task.model_copy(update={"name": "ascending.goal2_0_1"})
-    titles = [axes.get_title(loc="left").strip() for axes in picture_of_tasks([task, moved]).axes]
-    assert titles == ["ascending", "ascending.goal2_0_1"]
-    assert picture_of_tasks([task]).axes[0].get_title(loc="left").strip() == "Ascending"
 
 
 def test_names_and_looks_tell_methods_apart():

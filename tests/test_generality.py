@@ -12,7 +12,6 @@ from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
 from coartic.analysis.sections import TABLES
-from coartic.analysis.topics import instances
 from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -141,25 +140,6 @@ def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
                     values = {sign: placebo * of + off for sign, of in values.items()}
                 by_cell[name, label] = values
     return by_cell
-
-
-def test_the_placebo_that_shows_most_in_a_family_counts(monkeypatch):
-    drawn = "placebo/hands"
-    study = rewarded({PLACEBO: -580, drawn: -580}, families=("two-armed/v1",), count=2)
-    shown = {
-        "arm": {PLACEBO: [1.0, 6.0], drawn: [5.0, 1.0]},
-        "first": {PLACEBO: [1.0, 1.0], drawn: [0.0, 3.0]},
-    }
-    vars(study)["executed"] = lambda name, label: (label, int(name[-3:]))
-    planted = {
-        sign: SimpleNamespace(of=lambda run, values=values: np.array([values[run[0]][run[1]]]))
-        for sign, values in shown.items()
-    }
-    monkeypatch.setattr(instances, "SIGNS", planted)
-    monkeypatch.setattr(instances, "THERE", dict.fromkeys(planted, 0.0))
-    counted = [signs(study)[name, PLACEBO] for name in study.tasks]
-    assert [float(each["arm"][0]) for each in counted] == shown["arm"][PLACEBO]
-    assert [float(each["first"][0]) for each in counted] == shown["first"][drawn]
 
 
 def with_signs(study, **values):

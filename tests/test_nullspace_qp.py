@@ -95,19 +95,6 @@ def test_subgoals_of_lower_priority_coarticulate():
     assert [solve(method, task)[1].reward for method in METHODS] == [-318, -293]
 
 
-@pytest.mark.parametrize(
-    ("method", "goal", "aims"),
-    [
-        (NullspaceQP, 1, [("left", 1)]),
-        (NextGoal, 0, [("right", 0), ("left", 1), ("left", 2)]),
-        (NextGoal, 3, [("right", 3), ("left", 4)]),
-    ],
-)
-def test_goals_that_are_prepared_for(method, goal, aims):
-    hands = ("right", "left", "left", "right", "left")
-    assert method().aims(hands, goal) == tuple(Aim(*aim) for aim in aims)
-
-
 def test_a_goal_behind_a_straight_arm_is_reached():
     """The gradient vanishes there: the corrective process does not leave (test_corrective)."""
     task = tiny_task(goals=[[2.5, 0.1], [3.0, 1.0]], hands=["right"])
@@ -207,13 +194,3 @@ def test_faces_say_how_the_hand_leaves_the_disc(locked):
     far = miss(q, task, "left", 2)
     half = directions(np.pi / FACES)[0]
     assert half * far - 0.1 - 1e-3 <= outside.max() <= far - half * 0.1 + 1e-3
-
-
-def test_the_hand_comes_nearer_all_the_time():
-    """Level 1 of the movement: to within what a disc's polygon and its linear steps leave."""
-    task = load_task("one-armed/v1/d003")
-    result, _, _ = solve(NextGoal, task)
-    for movement in result.solution:
-        hands = ROBOT.forward_kinematics(movement.waypoints, movement.hand)
-        distances = np.hypot(*(hands - task.goal_array[movement.goal - 1]).T)
-        assert (np.diff(distances) < 0.02 * distances[:-1]).all()

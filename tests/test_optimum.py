@@ -16,7 +16,7 @@ from coartic.benchmarks.suites import Cell
 from coartic.method import MethodError
 from coartic.motion.solution import other_arm_travel
 from coartic.runs.run import movements_from
-from coartic.tasks.optima import DATA, best_shipped, entries, essence
+from coartic.tasks.optima import best_shipped, essence
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, shipped_optima, solve, tiny_task
 from tests.support.suites import KNOWN, run_and_write
@@ -134,19 +134,6 @@ def test_the_shipped_data_is_what_a_folder_of_the_suite_gives(tmp_path):
     assert entry["run_ids"] == sorted(study.runs.run_id)
     assert entry["searches"] == dict.fromkeys(names, -292)
     assert execute(task, movements_from(task, entry["solution"])).reward == -292
-
-
-def test_renewing_with_what_is_there_changes_nothing():
-    shipped = entries()
-    before = DATA.read_bytes()
-    assert renew_optima.content_with(shipped[2:], shipped) == before
-    better, worse = (shipped[0] | {"reward": reward} for reward in (-1, -999))
-    assert renew_optima.content_with([worse], shipped) == before
-    changed = json.loads(renew_optima.content_with([better], shipped))["optima"]
-    assert changed[0].pop("reward") == -1
-    as_before = json.loads(before)["optima"]
-    del as_before[0]["reward"]
-    assert changed == as_before
 
 
 def test_searches_of_a_folder_better_what_is_shipped_and_any_run_those_of_a_family():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from coartic import Movement, corrective_trial, execute, initial_hands, learn, load_task
+from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.signatures.context_tests import context_dependence
 from coartic.play import page as pages
 from tests.support.strategies import changed
@@ -152,23 +152,6 @@ def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_
     assert "One goal at a time" in text(settled(page), "score")
 
 
-def test_two_arms_more_goals_and_a_plan(opened):
-    page = settled(opened("preset=3&who=plan&ahead=3"))
-    assert 451 <= ticks(page, "The planner") < 470  # the best known is 451
-    alone = corrective_trial("two-armed-1", initial_hands("two-armed-1"))
-    assert ticks(page, "One goal at a time") == -alone.reward
-    page.get_by_role("button", name="Remove a goal").click()
-    page.get_by_role("radio", name="Evolution").check()
-    settled(page)
-    assert ticks(page, r"Evolution \(CMA-ES\)") < ticks(page, "One goal at a time")
-    page.get_by_role("button", name="Add a goal").click()
-    page.get_by_role("button", name="Goal 4").wait_for()
-    page.get_by_role("radio", name="A planner").check()
-    page.get_by_label("two next goals").check()
-    settled(page)
-    assert re.search(r"apart|alike|different hands", text(page, "finding"))
-
-
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page = settled(opened("preset=3&who=you"))
     handle = page.get_by_role("button", name="right arm, elbow 2")
@@ -237,15 +220,6 @@ def test_it_plays_holds_at_hits_and_saves_pictures(opened, tmp_path):
     assert re.fullmatch(r"coartic\.(webm|mp4)", download.value.suggested_filename)
     assert download.value.path().stat().st_size > 1000
     page.get_by_role("button", name="Record").wait_for()
-
-
-def test_a_browser_that_cannot_record_has_no_button_for_it(browser, address):
-    with browser.new_context() as context:
-        context.add_init_script("delete window.MediaRecorder")
-        page = context.new_page()
-        page.goto(address)
-        assert page.get_by_role("button", name="Save PNG").is_visible()
-        assert not page.locator("[data-is=record]").is_visible()
 
 
 def test_a_goal_is_dragged_by_a_finger(opened):

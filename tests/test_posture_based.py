@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from coartic import load_task
-from coartic.baselines.posture_based import OneGoal, PosturePlanner, TwoGoals
-from coartic.method import MethodError, Session
+from coartic.baselines.posture_based import OneGoal, TwoGoals
+from coartic.method import MethodError
 from tests.support.strategies import solve, tiny_task, uneven_task
 
 ACCURACY = 0.09  # θ^g − θ^a
@@ -140,17 +140,6 @@ def test_looking_ahead_takes_the_other_hand_where_that_pays():
     reached = right + (ticks(math.radians(40)) - 1) * STEP
     assert one.details["expected_ticks"] == [ticks(math.radians(40)), ticks(reached)]
     assert -sum(two.details["expected_ticks"]) == execution.reward
-
-
-def test_the_way_on_is_that_of_the_base_and_the_next_hand():
-    """By the right arm 1.0 and on by the left one 0.5, or by the base 0.7 and on by 0.86."""
-    task = bent(goals=[[5.0, 1.0], [4.0, 2.5]])
-    session = Session(task, 0, TwoGoals.told, trusted=True)
-    planner = PosturePlanner(session, TwoGoals.Parameters(), 2)
-    q, unit = planner.q, np.eye(10)
-    first, second = np.stack([q + 1.0 * unit[6], q + 0.7 * unit[0]]), q + 0.5 * unit[2]
-    chosen = planner.most_promising(("right", "left"), [first, second[None]])
-    np.testing.assert_array_equal(chosen, [first[0], first[0] + second - q])
 
 
 @pytest.mark.parametrize("locked", [["x", "y"], ["y"], ["x"]])

@@ -11,7 +11,7 @@ from coartic.baselines.posture_graph import (
     cheapest_chains,
     move_other_arm,
 )
-from coartic.method import Information, MethodError, Session
+from coartic.method import MethodError, Session
 from tests.support.strategies import changed
 
 TASKS = {
@@ -70,22 +70,6 @@ def test_a_free_arm_is_spread_over_its_way():
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
     assert np.array_equal(spread[[0, 3]][:, left], chain[[0, 3]][:, left])
     assert np.array_equal(spread[:, :2], chain[:, :2])
-
-
-@pytest.mark.parametrize(
-    ("name", "graphs", "chains", "spread", "count"),
-    [
-        ("two-armed-1", 1, 16, False, 16),
-        ("two-armed-1", 1, 17, False, 32),
-        ("two-armed-1", 3, 1, True, 96),
-        ("ascending", 1, 5, True, 5),
-    ],
-)
-def test_graphs_are_sampled_until_there_are_as_many_and_chains(name, graphs, chains, spread, count):
-    session = Session(TASKS[name], 0, Information, trusted=True)
-    options = {"nodes": 12, "graphs": graphs, "chains": chains, "spread": spread}
-    found = cheapest_chains(session, TASKS[name], np.random.default_rng(8), **options)
-    assert len([*found]) == count
 
 
 def test_a_goal_without_a_posture_is_named():

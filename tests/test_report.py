@@ -14,19 +14,16 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.claims.judgements import CLAIMS, judge_claims
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import render
-from coartic.analysis.report.about import answers, limits
+from coartic.analysis.report.about import answers
 from coartic.analysis.report.build import write_report
 from coartic.analysis.report.trace import rows_of, tables_of
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
-from coartic.analysis.topics.failed import failed_runs
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
-from tests.support import made_up
 from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
 
@@ -148,13 +145,6 @@ def test_a_report_is_not_written_through_a_link(traced, tmp_path):
     assert not list((tmp_path / "mine").iterdir())
 
 
-def test_columns_with_one_header_keep_their_values():
-    frame = pd.DataFrame({"on two-armed/v1/i000": [1.25], "on two-armed/v1/i001": [7.5]}, ["a"])
-    assert len(set(render.columns_of(frame).values())) == 1
-    for text in (render.html_table(frame, "name", ""), render.latex_table(frame, "name", "")):
-        assert re.search(r"125.*750", text, re.DOTALL)
-
-
 def test_a_page_stands_alone(report):
     """Every id is there once, every reference has its id, and ink is the page's."""
     text = (report / "report.html").read_text(encoding="utf-8")
@@ -188,16 +178,6 @@ def test_answers_name_failed_runs_behind_them(traced):
     assert not told["Coarticulation"][1]  # the learner's on one-armed tasks
     assert told["Nearest"][0].endswith(f" 2 of {of + 1} runs of {name_of(planner)} and learner EC4")
     assert told["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")  # a planner makes no trials
-
-
-def test_claims_without_their_runs_are_named(traced):
-    assert judge_claims(traced, [CLAIMS["context"]]).failed.tolist() == [()]
-    runs = traced.runs.assign(status="crashed")
-    spoiled = Study(traced.folder, traced.plan, traced.made_with, runs)
-    (failed,) = judge_claims(spoiled, [CLAIMS["context"]]).failed
-    assert ("ascending", "dual-process/EC1") in failed
-    told = failed_runs(spoiled, failed, "")
-    assert re.fullmatch(r" (\d+) of \1 runs of learner EC1 failed\.", told)
 
 
 def test_few_runs_say_so(tmp_path):
@@ -266,21 +246,3 @@ def test_tables_compile_and_fit_a_column(tables_by_name, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:]
     assert "Overfull \\hbox" not in done.stdout
-
-
-def test_limits_count_the_runs_of_the_papers_cells_and_all_trials_of_learners():
-    """20 runs under EC1 are as many as the paper's; two of a control and 200 trials are told."""
-    rows = [made_up.row("dual-process/EC1", -300, task="ascending", run=n, trials=10_000)
-            for n in range(20)]  # fmt: skip
-    rows += [
-        made_up.row("dual-process/EC1-subtask", -320, task="ascending", run=n, trials=10_000)
-        for n in range(2)
-    ]
-    runs = pd.DataFrame(rows).assign(commit="")
-    found = limits(made_up.study_of(runs, [load_task("ascending")]))
-    assert (found["few"], found["trials"]) == (0, [])
-    short = runs.assign(trials=200, variant="trials=200")
-    found = limits(made_up.study_of(short, [load_task("ascending")]))
-    assert (found["few"], found["trials"]) == (0, [200])
-    found = limits(made_up.study_of(runs[runs.run < 7], [load_task("ascending")]))
-    assert found["few"] == 7

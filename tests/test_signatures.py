@@ -22,7 +22,6 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics import hypotheses
 from coartic.analysis.topics import coarticulation, placebo
 from coartic.robot import HANDS
 from tests.support.made_up import MadeUp, made, row, study_of
@@ -256,10 +255,6 @@ def test_signs_are_one_number_a_run():
     first, whole = SIGNS["first"].of(cell), SIGNS["whole"].of(cell)
     assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
-    nearer = [signs.preshaping(task, run, corrective_trial(task, "RRRR")) for run in cell.runs]
-    assert SIGNS["other arm"].of(cell) == pytest.approx([np.nanmean(run) for run in nearer])
-    gains = signs.gain_at_next(cell)
-    assert SIGNS["arm"].of(cell) == pytest.approx(gains.mean(axis=1))
     assert not any(sign.of(Solutions(task, "", ())).size for sign in SIGNS.values())
     one = load_task("ascending")
     alone = Solutions(one, "", (corrective_trial(one, "RRR"),))
@@ -411,23 +406,3 @@ def test_a_method_that_draws_nothing_needs_no_test(apart):
     assert not placebo.selects(study, cells[0].label)
     answer = "Yes. Depending on the next goal" if apart else "No significant difference:"
     assert coarticulation.next_goal(study).startswith(answer)
-
-
-def test_signs_beside_the_placebo():
-    """Both tails: a method may be slower or faster at first than the placebo."""
-    task = load_task("ascending")
-    reference = corrective_trial(task, "RRR").ticks_by_goal()
-    slower = {EC1: [9, 12, 10, 14], PLACEBO: [8, 9, 10, 12]}
-    runs = {
-        label: sum((posed(task, label, [posture()], np.add(reference, [ticks, 0, 0])).runs
-                    for ticks in of_label), ())
-        for label, of_label in slower.items()
-    }  # fmt: skip
-    study = study_with(*(Solutions(task, label, runs[label]) for label in slower))
-    p = placebo.sign_beyond_p(study, task.name, EC1, "first")
-    assert p == hypotheses.bootstrap_test(*slower.values(), "two-sided").p
-    assert p > 1.5 * hypotheses.bootstrap_test(*slower.values(), "greater").p
-    assert math.isnan(placebo.sign_beyond_p(study, task.name, PLACEBO, "first"))
-    shown = coarticulation.signatures(study).loc[f"ascending {EC1}"]
-    assert (shown.first_p, shown["first"]) == (p, np.mean(slower[EC1]))
-    assert math.isnan(shown.preshaping_p)  # there is no other arm

@@ -5,7 +5,6 @@ apart. The learner's runs on ascending differ, all else has no spread.
 """
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.sections import TABLES
-from coartic.analysis.topics import coarticulation, costs, placebo, ranking
+from coartic.analysis.topics import costs
 from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -153,55 +152,3 @@ def test_learning(study):
     same(TABLES["learning"](study), {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
-
-
-def test_contexts(study, monkeypatch):
-    """Goals that two methods share, a row each; Holm by method."""
-    columns = ["method", "runs", "distance", "dependence", "p_holm", "p_placebo", "equivalent",
-               "other"]  # fmt: skip
-    cells = {
-        f"{ONE} {CMA} goal 1 right": (CMA, 6, 0.5, 3.0, 0.02, 0.5, 0.4, 0.3),
-        f"{ONE} {CMA} goal 2 right": (CMA, 5, 0.1, 1.0, 0.04, 0.5, 0.06, 0.08),
-        f"{ONE} {PLAN} goal 1 right": (PLAN, 2, 0.2, 2.0, 0.04, NONE, 0.12, 0.16),
-    }
-    tasks = study.tasks[ONE], study.tasks[TWO]
-    shared = [
-        SimpleNamespace(tasks=tasks, goal=int(name.split()[-2]), hand="right", p=p,
-                        method=method, n=n, apart=apart, spreads=spreads, parts=parts)
-        for (name, (method, n, apart, spreads, _, _, *parts)), p in zip(
-            cells.items(), (0.01, 0.04, 0.04), strict=True
-        )
-    ]  # fmt: skip
-    monkeypatch.setattr(
-        coarticulation,
-        "shared_goals",
-        lambda _, label: [each for each in shared if each.method == label],
-    )
-    beyond = {CMA: 0.5, PLAN: NONE}
-    monkeypatch.setattr(placebo, "context_beyond_p", lambda _, contexts: beyond[contexts.method])
-    frame = coarticulation.contexts(study)
-    same(frame, {name: dict(zip(columns, row, strict=True)) for name, row in cells.items()})
-    assert frame.run_ids.iloc[2].split() == [f"{ONE}-plan", f"{TWO}-plan"]
-
-
-@pytest.mark.parametrize(
-    ("learner", "said"),
-    [
-        (-310, "last, at 6.2 %; random guesses at 9.6 %."),
-        (-297, "number 2, at 1.7 %; random guesses at 9.6 %."),
-        (-330, "last, at 13.0 %; random guesses at 9.6 %."),
-        (-292, ""),
-    ],
-)
-def test_methods_that_only_try_do_not_count_among_those_that_learn(learner, said):
-    """On ascending, to an optimum of -292: the learner among CMA-ES, hill climbing and guesses."""
-    rewards = {CMA: -293, "random-search/climbing": -305, EC1: learner, "placebo/guesses": -320,
-               "corrective-alone/every": -319}  # fmt: skip
-    rows = [row(method, reward, task=ONE, run=k, seed=k)
-            for method, reward in rewards.items() for k in range(2)]  # fmt: skip
-    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    alone = MadeUp(study_of(frame, [load_task(ONE)]), optima=made_up_optima(ONE))
-    text = ranking.nearest(alone)
-    assert ("The paper's learner" in text) == bool(said)
-    assert said in text
-    assert "Of the 3 algorithms that learn from rewards alone" in text

@@ -117,12 +117,6 @@ def test_policies_with_many_goals():
         initial_hands(tiny_task(**many, initial_hands="best-of-all"))
 
 
-def test_a_file_with_a_byte_order_mark(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
-    assert load_task(path).name == "mine"
-
-
 def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
     goals = [(3.0, 2.0), (4.5, 2.0)]
     robot = Robot(right_links=(0.5,) * 6)

@@ -8,9 +8,9 @@ import pytest
 
 from coartic import MotionModel, corrective_trial, execute, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
-from coartic.baselines.random_search import Climbing, DrawnHands, Guesses
+from coartic.baselines.random_search import Climbing, DrawnHands
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import BudgetError, Meter, MethodError, Session
+from coartic.method import Meter, MethodError, Session
 from coartic.optimisers import TOLD
 from tests.support.strategies import tiny_task
 
@@ -190,20 +190,6 @@ def test_failed_trials_rank_last():
     assert [*dict.fromkeys(attempts.sizes)][:3] == [7, 14, 28]  # it begins anew with twice as many
 
 
-def test_guesses_fill_the_box():
-    asked = []
-
-    def many(points):
-        asked.append(points)
-        raise BudgetError
-
-    box = np.array([[0.0, 1.0], [-2.0, 2.0]])
-    cost = SimpleNamespace(bounds=box, dim=2, many=many)
-    with pytest.raises(BudgetError):
-        Guesses().optimise(cost, np.random.default_rng(0))
-    np.testing.assert_allclose([asked[0].min(axis=0), asked[0].max(axis=0)], box.T, atol=0.05)
-
-
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_without_a_trial_that_hits_every_goal_it_is_infeasible(method):
     few = MotionModel(max_iterations=2)
@@ -214,14 +200,6 @@ def test_without_a_trial_that_hits_every_goal_it_is_infeasible(method):
         with pytest.raises(MethodError, match=message) as caught:
             solve(method, load_task("two-armed-2"), **options)
         assert caught.value.outcome == "infeasible"
-
-
-def test_a_policy_for_the_first_hands_is_paid_for():
-    task = tiny_task(initial_hands="best-of-all")
-    session, _ = solve(Climbing, task, trials=50)
-    assert session.meter.trials == 4 + 50
-    with pytest.raises(MethodError, match="leaves no trial"):
-        solve(Climbing, task, budget=4)
 
 
 def test_a_single_joint_to_explore():

@@ -184,11 +184,6 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
             "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
         ),
         ("Cell 0: its method has other code", "UPDATE methods SET code = 'newer'"),
-        ("Tables or views are not", "CREATE VIEW mine AS SELECT 1"),
-        (
-            "Tables or views are not",
-            "CREATE TRIGGER more AFTER UPDATE ON suite BEGIN SELECT 1; END",
-        ),
         ("Tables or views are not", "ALTER TABLE learning ADD COLUMN base_x REAL"),
         ("Tables or views are not", "DROP VIEW paths"),
     ],
