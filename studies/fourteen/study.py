@@ -7,11 +7,7 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
         --family-file studies/fourteen/seven-two.v1.toml
     python studies/fourteen/study.py results/fourteen
 
-With two arms the fourth goal ahead is judged on 88 tasks, some planned repeatedly with numbers of
-postures (``nodes``) that differ by 2 % at most, so that every repeat samples other postures. A case
-is a task, and its value is the mean over its repeats. A claim on its gain is supported if three
-tests agree, otherwise undecided: the bootstrap test of the mean; the same without the case that
-speaks most for the claim; a signed-rank test, p < 0.05. The rule was written before these runs.
+With two arms the fourth goal ahead is judged by the rule for repeats in README.md.
 
 Writes results.csv, gains.csv, repeats.csv, fourth.csv, claims.csv, figure.svg and the page,
 README.md; without a folder the page alone, from the tables that are there.
