@@ -136,7 +136,6 @@ def certify(
     ``most_nodes`` cone programmes.
     """
     search = ProofSearch(task, ticks, still, model.step)
-    search.begin()
     least = 0
     if too_many_sequences(task.name, len(task.goals), len(task.hands)) is None:
         sequences = itertools.product(task.hands, repeat=len(task.goals))
@@ -167,22 +166,18 @@ class ProofSearch:
             return Relaxation(task, hands, merged, still)
 
         self.relaxation = relaxation
+        # All solutions: by hand sequence, or in one subproblem if there are many sequences.
+        goals = len(task.goals)
+        sequences: list[PartialSequence] = [(None,) * goals]
+        if len(self._robot_hands) ** goals <= _FEW_SEQUENCES:
+            sequences = list(itertools.product(self._robot_hands, repeat=goals))
+        for hands in sequences if ticks else []:
+            box = relaxation(hands, ()).first_box(self.longest(0))
+            self.add(Subproblem(hands, (), mergeable(task, hands), box), 0.0)
 
     def longest(self, moves: int) -> float:
         """Path of any solution that takes fewer ticks with so many movements, or more."""
         return max(0, self._ticks - 1 - moves) * self._step
-
-    def begin(self) -> None:
-        """Add all solutions: by hand sequence, or in one subproblem if there are many sequences."""
-        if not self._ticks:
-            return
-        goals = len(self._task.goals)
-        sequences: list[PartialSequence] = [(None,) * goals]
-        if len(self._robot_hands) ** goals <= _FEW_SEQUENCES:
-            sequences = list(itertools.product(self._robot_hands, repeat=goals))
-        for hands in sequences:
-            box = self.relaxation(hands, ()).first_box(self.longest(0))
-            self.add(Subproblem(hands, (), mergeable(self._task, hands), box), 0.0)
 
     def branch(self, node: Node) -> None:
         """Split a subproblem into others that together hold every solution in it."""

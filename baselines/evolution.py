@@ -117,7 +117,17 @@ class EvolutionStrategy:
     def tell(self, points: Array, costs: Array) -> None:
         """Learn from the points of a generation and their costs, shape ``(λ,)``, finite."""
         self._generation += 1
-        self._note(costs)
+        least = int(np.argmin(costs))
+        if costs[least] < self._best:
+            self._best, self._best_point = float(costs[least]), self._generation * self.size
+            self._best_point += least + 1 - self.size
+        self._costs = ranked = np.sort(costs)
+        self._bests.appendleft(ranked[0])
+        if self._generation % _NOTED_EACH == 0:
+            self._noted_bests.appendleft(ranked[0])
+            self._noted_medians.appendleft(np.median(ranked))
+        self._flat = 0 if ranked[0] < ranked[int(0.75 * self.size)] else self._flat + 1
+
         points = points[np.argsort(costs)]
         before, self._mean = self._mean, np.dot(self._recombined, points[: self._parents])
         shift = self._mean - before
@@ -136,7 +146,14 @@ class EvolutionStrategy:
             factor = (self._c_path * (2 - self._c_path) * self._selected) ** 0.5 / self._step_size
             self._path += factor * shift
             weights, path = self._learned, self._path
-        self._learn(np.vstack([path, (points - before) / self._step_size]), weights.copy())
+        # Points with negative weights count as if they had the expected length.
+        weights, rejected = weights.copy(), slice(1 + self._parents, None)
+        vectors = np.vstack([path, (points - before) / self._step_size])
+        self._covariance *= 1 - weights.cumsum()[-1]
+        scaled = np.matmul(self._axes.T, vectors[rejected, :, None])[..., 0] / self._lengths
+        squares = (scaled**2).cumsum(axis=1)[:, -1]  # term by term, as the package sums
+        weights[rejected] *= [len(shift) / (square**0.5 + 1e-9) ** 2 for square in squares.tolist()]
+        self._covariance += np.dot(weights * vectors.T, vectors)
 
         length = np.sqrt(np.sum(np.square(self._step_path)))
         change = (length / self._length - 1) * (self._c_step / self._damping)
@@ -145,31 +162,6 @@ class EvolutionStrategy:
         delta = _STILL * max(1, (self._generation - self._still_since) / threshold) ** 0.5
         if np.sum((self._still_at - self._mean) ** 2) ** 0.5 > delta:
             self._still_at, self._still_since = self._mean, self._generation
-
-    def _learn(self, vectors: Array, weights: Array) -> None:
-        """Update the covariance matrix with rows of vectors; those with negative weights as if
-        they had the expected length."""
-        self._covariance *= 1 - weights.cumsum()[-1]
-        rejected = slice(1 + self._parents, None)
-        scaled = np.matmul(self._axes.T, vectors[rejected, :, None])[..., 0] / self._lengths
-        squares = (scaled**2).cumsum(axis=1)[:, -1]  # term by term, as the package sums
-        weights[rejected] *= [
-            len(self._mean) / (square**0.5 + 1e-9) ** 2 for square in squares.tolist()
-        ]
-        self._covariance += np.dot(weights * vectors.T, vectors)
-
-    def _note(self, costs: Array) -> None:
-        """Note of the costs what the stopping criteria need."""
-        least = int(np.argmin(costs))
-        if costs[least] < self._best:
-            self._best, self._best_point = float(costs[least]), self._generation * self.size
-            self._best_point += least + 1 - self.size
-        self._costs = costs = np.sort(costs)
-        self._bests.appendleft(costs[0])
-        if self._generation % _NOTED_EACH == 0:
-            self._noted_bests.appendleft(costs[0])
-            self._noted_medians.appendleft(np.median(costs))
-        self._flat = 0 if costs[0] < costs[int(0.75 * self.size)] else self._flat + 1
 
     def has_ended(self) -> bool:
         """Whether going on is of no use: little changes, or too much."""

@@ -139,20 +139,15 @@ class PostureGraph:
             last = hands[-1] if hands else hand
             base = squared_distances(nodes[last], layer, slice(0, BASE_DOF))
             arm = squared_distances(nodes[hand], layer, self.task.robot.joints(hand))
-            if hand == last:
-                # (i, j) -> (k, j): the least over i.
-                step = np.sqrt(base + arm)
-                came = np.empty((len(layer), cost.shape[1]), dtype=np.int32)
-                reached = np.empty(came.shape)
-                for j in range(cost.shape[1]):
-                    came[:, j], reached[:, j] = least_of_columns(cost[:, j, None] + step)
-            else:
-                # (i, j) -> (k, i): the hand comes from its own node j; the least over j.
-                came = np.empty((len(layer), cost.shape[0]), dtype=np.int32)
-                reached = np.empty(came.shape)
-                for i in range(cost.shape[0]):
-                    total = cost[i, :, None] + np.sqrt(base[i][None, :] + arm)
-                    came[:, i], reached[:, i] = least_of_columns(total)
+            # A hand comes from its own node. If it is the last one, (i, j) leads to (k, j) by the
+            # least over i, else to (k, i) by the least over j.
+            came_from, step = (cost, np.sqrt(base + arm)) if hand == last else (cost.T, None)
+            came = np.empty((len(layer), came_from.shape[1]), dtype=np.int32)
+            reached = np.empty(came.shape)
+            for other in range(came.shape[1]):
+                ways = np.sqrt(base[other] + arm) if step is None else step
+                total = came_from[:, other, None] + ways
+                came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
 
     def chain_of(self, complete: Beginning) -> Chain:
@@ -230,9 +225,3 @@ def squared_distances(before: Array, after: Array, joints: slice) -> Array:
     """Squared distances of every pair, over some joints, shape ``(before, after)``."""
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))
-
-
-def least_of_columns(costs: Array) -> tuple[NDArray[np.intp], Array]:
-    """The row of the least of every column, and that least."""
-    rows = costs.argmin(axis=0)
-    return rows, costs[rows, np.arange(len(rows))]

@@ -148,10 +148,10 @@ class Relaxation:
             iterations = self._problem.solver_stats.num_iters
         except cp.SolverError:
             iterations = 0  # what was found for the box before serves as well
-        q, u = found(self._q), found(self._u)
+        q, u = value_of(self._q), value_of(self._u)
         angles = self._sums @ q.ravel()
-        pulls = -found(self._movements.dual_variables[1])
-        pulls[self._held] += found(self._holds.dual_variables[0])
+        pulls = -value_of(self._movements.dual_variables[1])
+        pulls[self._held] += value_of(self._holds.dual_variables[0])
         # Within the unit ball over the joints that may move; without limit over the others.
         norms = np.linalg.norm(np.where(self._held, 0.0, pulls), axis=1, keepdims=True)
         return Relaxed(
@@ -159,7 +159,7 @@ class Relaxation:
             angles=angles,
             wrong=np.linalg.norm(u - directions(angles), axis=1) * self._lengths,
             pulls=np.where(self._held, pulls, pulls / np.maximum(norms, 1.0)),
-            forces=-found(self._hits.dual_variables[1]),
+            forces=-value_of(self._hits.dual_variables[1]),
             iterations=iterations,
         )
 
@@ -265,7 +265,7 @@ def split(box: Array, relaxed: Relaxed) -> tuple[Array, Array]:
     return below, above
 
 
-def found(variable: Any) -> Array:
+def value_of(variable: Any) -> Array:
     """The value of a variable or of a multiplier; zeros where there is none."""
     if variable.value is None:
         return np.zeros(variable.shape)

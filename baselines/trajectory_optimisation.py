@@ -101,11 +101,15 @@ class TrajectoryOptimisation(Method):
         radius = task.radius  # rounded to whole control ticks, a plan goes through the rims
         if self.cost != "path-length":
             radius = sure_to_hit(session, task)
-        plans, failed = list[PathPlan](), dict[str, str]()
+        plans, failed, parameters = list[PathPlan](), dict[str, str](), self.parameters
         with session.solving():
             for hands, starts in self.starts(session, task).items():
                 instance = Instance.of(task, hands, still=False, radius=radius)
-                plan = self.cheapest(session, problem, instance, starts)
+                plan = cheapest_plan(session, problem, instance, starts)
+                if plan.converged and isinstance(parameters, SmoothParameters) and parameters.stop:
+                    # A plan that stops starts from the one that passes the goals as well.
+                    starts = [plan.configurations, *starts]
+                    plan = cheapest_plan(session, problem, instance, starts, stops=True)
                 if plan.converged:
                     plans.append(plan)
                 else:
@@ -123,12 +127,6 @@ class TrajectoryOptimisation(Method):
             "failed": failed,
         }
         return Result(solution, details)
-
-    def cheapest(
-        self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
-    ) -> PathPlan:
-        """The cheapest plan that starts lead to; where none converges the last one."""
-        return cheapest_plan(session, problem, instance, starts)
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Starts for every hand sequence.
@@ -220,16 +218,6 @@ class Acceleration(TrajectoryOptimisation):
     secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
-
-    def cheapest(
-        self, session: Session, problem: TrajectoryProblem, instance: Instance, starts: list[Array]
-    ) -> PathPlan:
-        """The cheapest plan; one that stops starts from the one that passes the goals as well."""
-        passing = cheapest_plan(session, problem, instance, starts)
-        if not (self.parameters.stop and passing.converged):
-            return passing
-        starts = [passing.configurations, *starts]
-        return cheapest_plan(session, problem, instance, starts, stops=True)
 
     def movements_of(
         self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan

@@ -278,16 +278,16 @@ class Objective:
         left, costs = self._trials_left(len(array)), np.empty(len(array))
         for first in range(0, left, CHUNK):
             part = slice(first, min(first + CHUNK, left))
-            some, found = array[part], costs[part]
+            some, ours = array[part], costs[part]
             chosen, targets = self._trials_of(some, None if codes is None else codes[part])
             trials = self._session.unchecked_trials(chosen, targets)
-            np.minimum(-trials.rewards, FAILED, out=found)
-            best = int(found.argmin())
-            if found[best] < self.best_cost:
-                lowest = np.minimum.accumulate(found)
+            np.minimum(-trials.rewards, FAILED, out=ours)
+            best = int(ours.argmin())
+            if ours[best] < self.best_cost:
+                lowest = np.minimum.accumulate(ours)
                 for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
                     at = self.evaluations + n + 1
-                    self._keep(float(found[n]), at, some[n], chosen[n], targets[n])
+                    self._keep(float(ours[n]), at, some[n], chosen[n], targets[n])
             self.evaluations += len(some)
         if left < len(array):
             raise BudgetError("all trials of the budget are made")

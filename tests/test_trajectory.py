@@ -148,14 +148,18 @@ ONE_SEGMENT = {"acceleration": (12, 3), "jerk": (720, 5)}  # from rest to rest: 
 QUICK = {"nodes": 20, "graphs": 1, "chains": 1, "noisy_starts": 0}
 
 
-def planned(cost, task, **parameters):
+def planned(cost, task, stops=False):
     """The plan of a task's initial hands by the method of a cost."""
     (kind,) = (kind for kind in METHODS if kind.cost == cost)
-    method, session = kind(kind.Parameters(**QUICK, **parameters)), Session(task, 0, kind.told)
+    method, session = kind(kind.Parameters(**QUICK)), Session(task, 0, kind.told)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), cost)
     hands = hands_of(task.initial_hands)
     instance = Instance.of(task, hands, still=False, radius=task.radius - PAPER.arrival_tolerance)
-    plan = method.cheapest(session, problem, instance, method.starts(session, task)[hands])
+    starts = method.starts(session, task)[hands]
+    plan = cheapest_plan(session, problem, instance, starts)
+    if stops:
+        starts = [plan.configurations, *starts]
+        plan = cheapest_plan(session, problem, instance, starts, stops=True)
     assert plan.converged
     return plan
 
@@ -165,7 +169,7 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost):
     """In straight lines; no goal would gain by time from another."""
     goals = ((2.6, 1.0), (3.2, -0.4), (1.5, -1.2), (0.2, 1.9), (2.2, 1.6))
     task = small_task(goals=goals, initial_hands="RRRLR")
-    plan = planned(cost, task, stop=1)
+    plan = planned(cost, task, stops=True)
     factor, power = ONE_SEGMENT[cost]
     lengths, times = plan.lengths(), plan.durations
     assert plan.cost == pytest.approx((factor * lengths**2 / times**power).sum(), rel=1e-9)

@@ -266,16 +266,9 @@ def make_straight(bench: Bench, plans: list[ByGoal]) -> list[list[Subtask]]:
                     targets[n, g, m] = movement.target
                     stops[n, g, m] = movement.kind != "corrective"
     reached = reach_all(bench, hands, targets, stops)
+    names = ("hit", "ticks", "moved", "corrections", "iterations", "evaluations")
     hit, ticks, moved, corrections, iterations, evaluations = (
-        each.tolist()
-        for each in (
-            reached.hit,
-            reached.ticks,
-            reached.moved,
-            reached.corrections,
-            reached.iterations,
-            reached.evaluations,
-        )
+        getattr(reached, name).tolist() for name in names
     )
     outcomes = []
     for n, plan in enumerate(plans):
