@@ -381,11 +381,10 @@ class Session:
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
         """Make N physical trials at once, which takes a fraction of the time of N :meth:`trial`.
 
-        ``hands`` is one hand sequence for all (``"RRLR"``), one each, or an array of shape
-        ``(N, G)`` with 0 for left and 1 for right. ``targets`` has shape ``(N, G, dof)``, length
-        unit (base) and rad (joints): a joint whose target is NaN keeps its value, and for a goal
-        without any target the corrective process acts alone, which has to be declared. Goals
-        that are missed are corrected, and paid for.
+        ``hands`` is one hand sequence for all (``"RRLR"``), or one each. ``targets`` has shape
+        ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
+        keeps its value, and for a goal without any target the corrective process acts alone, which
+        has to be declared. Goals that are missed are corrected, and paid for.
 
         Where the budget has fewer trials left, only the first are made: what comes back is as
         long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first

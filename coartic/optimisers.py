@@ -252,10 +252,9 @@ class Objective:
         ----------
         points : array_like, shape (N, dim)
             Entries are finite, or NaN for all joints of a goal (the corrective process alone).
-        hands : str, sequence of str or ndarray, optional
-            The hand sequence of all points (``"RRLR"``), of each, or an array of shape ``(N, G)``
-            with 0 for left and 1 for right, whatever the hands of this problem are. Joints that
-            have no entries keep still.
+        hands : str or sequence of str, optional
+            The hand sequence of all points (``"RRLR"``), or of each, whatever the hands of this
+            problem are. Joints that have no entries keep still.
 
         Returns
         -------

@@ -6,7 +6,6 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from pydantic import ValidationError
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
@@ -16,7 +15,6 @@ from coartic.benchmarks.beside import put_beside
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_again
-from coartic.learner.method import DualProcessParameters
 from coartic.runs.plan import Setting
 from coartic.runs.store import RUNS_FILE, open_store
 from tests.support.suites import paper_cells, run_and_write
@@ -118,10 +116,3 @@ def test_another_reading_is_refused_in_a_sentence(now, tmp_path, statement, whic
         (words,) = check_runs(then).wrong
         assert which in words
         assert "version 1.1.0" in words
-
-
-def test_parameters_of_1_0_are_read():
-    old = {"trials": 5, "update": "greater", "learned": "best"}
-    assert DualProcessParameters(**old) == DualProcessParameters(trials=5)
-    with pytest.raises(ValidationError, match="update"):
-        DualProcessParameters(update="not-less")

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from itertools import chain
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from coartic.learner.conditions import (
     CONDITIONS,
@@ -47,15 +47,6 @@ class DualProcessParameters(Parameters):
     """ε"""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
-    of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "best"}
-
-    @model_validator(mode="before")
-    @classmethod
-    def drop_old_parameters(cls, given: Any) -> Any:
-        """Drop parameters of version 1.0 at the values that are now fixed; others are unknown."""
-        if not isinstance(given, dict):
-            return given
-        return {name: v for name, v in given.items() if cls.of_version_1.get(name) != v}
 
 
 class SubtaskParameters(DualProcessParameters):
@@ -66,7 +57,6 @@ class SubtaskParameters(DualProcessParameters):
     counted: Counted = "later"
     """Subtasks whose rewards the return counts: from the goal on, or all, which with γ = 1 is the
     total reward."""
-    of_version_1: ClassVar[dict[str, str]] = {"update": "greater", "learned": "replay"}
 
 
 class DualProcess(Method):

@@ -20,9 +20,8 @@ from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, hands_misfit, hands_of, letters_of
 
-HandSequences = str | Sequence[str] | NDArray[np.integer[Any]]
-"""Hand sequences of N trials: one for all (``"RRLR"``), one each, or an array of shape ``(N, G)``
-of indices into HANDS (0 left, 1 right)."""
+HandSequences = str | Sequence[str]
+"""Hand sequences of N trials: one for all (``"RRLR"``), or one each."""
 
 
 class Trials(NamedTuple):
@@ -110,15 +109,6 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> NDArray[np.int64
 
     Raises ValueError where they do not fit the task.
     """
-    if isinstance(hands, np.ndarray) and hands.dtype.kind in "iu":
-        allowed = [HANDS.index(hand) for hand in task.hands]
-        fits = (hands >= min(allowed)) & (hands <= max(allowed))
-        if hands.shape != (count, len(task.goals)) or not fits.all():
-            raise ValueError(
-                f"hands of shape {hands.shape} do not fit task {task.name!r}: needed is shape "
-                f"({count}, {len(task.goals)}) of numbers among {allowed}"
-            )
-        return hands.astype(np.int64)
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
     letters = set(letters_of(task.hands))
