@@ -615,10 +615,10 @@ class Method(ABC):
 
         Returns for each the result of :meth:`solve`, or the error that it raises.
         """
-        return [self._result(session) for session in sessions]
-
-    def _result(self, session: Session) -> Result | MethodError:
-        try:
-            return self.solve(session)
-        except MethodError as error:
-            return error
+        results: list[Result | MethodError] = []
+        for session in sessions:
+            try:
+                results.append(self.solve(session))
+            except MethodError as error:
+                results.append(error)
+        return results

@@ -152,15 +152,17 @@ def test_straight_solutions_are_executed_tick_by_tick(constants):
 
 LEARN = """(cases) => cases.map(([task, id, seed, trials]) => {
   const problem = coartic.problem_of(task);
-  const rules = { ...coartic.CONDITIONS, ...coartic.VARIANTS }[id];
-  const { learner, rewards } = coartic.learn(problem, rules, BigInt(seed), trials);
+  const [condition, credit] = id.split("-");
+  const rules = { ...coartic.CONDITIONS[condition], ...(credit && { credit }) };
+  const learner = new coartic.Learner(problem, rules, BigInt(seed));
+  const rewards = Array.from({ length: trials }, () => learner.step().reward);
   const learned = coartic.letters_of(learner.learned().hands);
   return { rewards, replay: learner.replay().reward, learned };
 })"""
 RUNS = [
     *((task, condition, 7) for task, condition in PAPER_CELLS),
     ("descending", "EC1-subtask", 2**100 + 3),
-    ("two-armed-1", "EC4-uncorrected", 0),
+    ("two-armed-1", "EC4-subtask", 0),
     ("two-armed/v1/i003", "EC4", 2**63 - 1),
 ]
 

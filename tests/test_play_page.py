@@ -181,11 +181,8 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
 def test_the_link_holds_the_whole_state(opened):
     page = settled(opened())
     page.get_by_role("radio", name="each movement").check()
-    page.locator("[data-is=arms]").select_option("2")
+    page.get_by_label("Task").select_option("3")
     page.get_by_label("It explores").select_option("EC3")
-    page.get_by_label("two next goals").uncheck()
-    page.get_by_label("Speed").select_option("0.5")
-    page.get_by_label("pause at hits").uncheck()
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowRight")
     settled(page)
@@ -209,7 +206,7 @@ def test_it_plays_holds_at_hits_and_saves_pictures(opened, tmp_path):
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("slider", name="Tick").fill("100")
-    page.get_by_role("button", name="One tick on").click()
+    page.get_by_role("slider", name="Tick").press("ArrowRight")
     page.get_by_text("101 of").wait_for()
     with page.expect_download() as download:
         page.get_by_role("button", name="Save PNG").click()

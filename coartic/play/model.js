@@ -112,25 +112,11 @@ function distance_to_goal(problem, q, number, hand) {
 
 /* ---- Movement ---- */
 
-const CLEARANCE = 1e-9;
-const ROUNDING = 1e-15;
-
-/* coartic/motion/movement.py, in double precision: steps during which the hand stays out of a disc. */
-function clear_steps(square, rim, closing, slowness, bend) {
-  const distance = Math.sqrt(square);
-  const gap = distance * (1 - 1e-12) - rim;
-  if (!(gap > 0)) return 0;
-  const turn = bend * distance;
-  const twice = 2 * gap * distance;
-  const root = Math.sqrt(closing * closing + turn * twice);
-  const curved = closing > 0 ? twice / (closing + root) : (root - closing) / (turn + 1e-300);
-  return Math.max(gap * slowness, curved) * (1 - 1e-9);
-}
-
-const rates = new Float64Array(MOST_LINKS);
+const CLEARANCE = 1e-9; // for rounding
 let between = new Float64Array(0);
 
-/* coartic/motion/movement.py: move `q` itself; ticks, negative for a miss. */
+/* coartic/motion/movement.py: move `q` itself; ticks, negative for a miss. Steps are skipped in which the hand,
+   which moves by at most `speed` a step, stays out of both discs. */
 function move(problem, q, target, number, hand, stop_on_arrival) {
   const { model, radius } = problem;
   const [goal_x, goal_y] = problem.goals[number];
@@ -146,23 +132,12 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
   const distance = Math.sqrt(square);
   const last = Math.ceil(distance / model.step);
-  const per_step = distance > 0 ? model.step / distance : 0;
-  const base_x = (target[0] - q[0]) * per_step;
-  const base_y = (target[1] - q[1]) * per_step;
-  let speed = Math.sqrt(base_x * base_x + base_y * base_y);
-  let [reach, rate, bend, most] = [0, 0, 0, model.step * tip];
+  let [turned, way] = [0, Math.hypot(target[0] - q[0], target[1] - q[1])];
   for (let k = 0; k < tip; k += 1) {
-    reach += links[k];
-    rate += (target[first + k] - q[first + k]) * per_step;
-    rates[k] = rate;
-    speed += links[k] * Math.abs(rate);
-    bend += links[k] * rate * rate;
-    most += Math.abs(q[first + k]) + Math.abs(target[first + k]);
+    turned += target[first + k] - q[first + k];
+    way += links[k] * Math.abs(turned);
   }
-  const slowness = 1 / speed;
-  const away = reach * (1 + most) + model.step + Math.abs(q[0]) + Math.abs(target[0]) + Math.abs(arm.shoulder_x)
-    + Math.abs(q[1]) + Math.abs(target[1]) + Math.abs(arm.shoulder_y);
-  const clearance = CLEARANCE + ROUNDING * (tip + 1) * away;
+  const speed = (way * model.step) / distance;
   let [end_x, end_y] = [0, 0];
   if (stop_on_arrival) {
     chain(target, arm, xs, ys);
@@ -178,33 +153,20 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
       for (let j = first; j < first + tip; j += 1) between[j] = q[j] + fraction * (target[j] - q[j]);
     }
     chain(here, arm, xs, ys);
-    let velocity_x = base_x;
-    let velocity_y = base_y;
-    for (let k = 0; k < tip; k += 1) {
-      velocity_x -= rates[k] * (ys[k + 1] - ys[k]);
-      velocity_y += rates[k] * (xs[k + 1] - xs[k]);
-    }
-    let dx = goal_x - xs[tip];
-    let dy = goal_y - ys[tip];
-    const to_goal = dx * dx + dy * dy;
-    let clear = clear_steps(to_goal, radius + clearance, velocity_x * dx + velocity_y * dy, slowness, bend);
+    const to_goal = Math.sqrt((goal_x - xs[tip]) ** 2 + (goal_y - ys[tip]) ** 2);
+    let clear = to_goal - radius;
     let stop = step === last;
     if (stop_on_arrival) {
-      dx = end_x - xs[tip];
-      dy = end_y - ys[tip];
-      const to_end = dx * dx + dy * dy;
-      if (Math.sqrt(to_end) <= model.arrival_tolerance) stop = true;
-      clear = Math.min(
-        clear,
-        clear_steps(to_end, model.arrival_tolerance + clearance, velocity_x * dx + velocity_y * dy, slowness, bend),
-      );
+      const to_end = Math.sqrt((end_x - xs[tip]) ** 2 + (end_y - ys[tip]) ** 2);
+      if (to_end <= model.arrival_tolerance) stop = true;
+      clear = Math.min(clear, to_end - model.arrival_tolerance);
     }
-    const hit = Math.sqrt(to_goal) <= radius;
+    const hit = to_goal <= radius;
     if (stop || hit) {
       for (let j = 0; j < dof; j += 1) q[j] = step === last ? target[j] : q[j] + fraction * (target[j] - q[j]);
       return hit ? step + 1 : -(step + 1);
     }
-    step = Math.min(step + 1 + Math.floor(Math.min(clear, last)), last);
+    step = Math.min(step + 1 + Math.floor(Math.max(0, Math.min(last, (clear - CLEARANCE) / speed))), last);
   }
 }
 
@@ -281,9 +243,9 @@ class Trial {
   }
 
   /* coartic/motion/reach.py: reach for a goal, with a target or by **A** alone. */
-  reaches(goal, hand, target, corrects = true) {
+  reaches(goal, hand, target) {
     const hit = target ? this.moves(goal, hand, "learned", target) : this.looks(goal, hand);
-    this.going = hit || ((corrects || !target) && this.corrects(goal, hand));
+    this.going = hit || this.corrects(goal, hand);
     if (this.going) this.ends(goal, hand);
   }
 
@@ -410,6 +372,7 @@ const ziggurat = (() => {
 const LIMB = 2 ** 24;
 const limbs_of = (value) => [0n, 24n, 48n, 72n, 96n, 120n].map((shift) => Number((value >> shift) & 0xffffffn));
 const PCG_FACTOR = limbs_of(0x2360ed051fc65da44385df649fccf645n);
+const made = new Float64Array(6);
 
 /* numpy.random.default_rng: PCG64 (O'Neill 2014), its 128 bits in limbs of 24. */
 class Generator {
@@ -429,31 +392,15 @@ class Generator {
   /* Makes the next 64 bits: `high` and `low`. */
   next() {
     const { state, increment } = this;
-    const [f0, f1, f2, f3, f4, f5] = PCG_FACTOR;
-    const [s0, s1, s2, s3, s4, s5] = state;
-    let sum = s0 * f0 + increment[0];
-    let carry = Math.floor(sum / LIMB);
-    const n0 = sum - carry * LIMB;
-    sum = s0 * f1 + s1 * f0 + increment[1] + carry;
-    carry = Math.floor(sum / LIMB);
-    const n1 = sum - carry * LIMB;
-    sum = s0 * f2 + s1 * f1 + s2 * f0 + increment[2] + carry;
-    carry = Math.floor(sum / LIMB);
-    const n2 = sum - carry * LIMB;
-    sum = s0 * f3 + s1 * f2 + s2 * f1 + s3 * f0 + increment[3] + carry;
-    carry = Math.floor(sum / LIMB);
-    const n3 = sum - carry * LIMB;
-    sum = s0 * f4 + s1 * f3 + s2 * f2 + s3 * f1 + s4 * f0 + increment[4] + carry;
-    carry = Math.floor(sum / LIMB);
-    const n4 = sum - carry * LIMB;
-    sum = s0 * f5 + s1 * f4 + s2 * f3 + s3 * f2 + s4 * f1 + s5 * f0 + increment[5] + carry;
-    const n5 = sum - Math.floor(sum / 256) * 256;
-    state[0] = n0;
-    state[1] = n1;
-    state[2] = n2;
-    state[3] = n3;
-    state[4] = n4;
-    state[5] = n5;
+    let carry = 0;
+    for (let k = 0; k < 6; k += 1) {
+      let sum = increment[k] + carry;
+      for (let i = 0; i <= k; i += 1) sum += state[i] * PCG_FACTOR[k - i];
+      carry = Math.floor(sum / LIMB);
+      made[k] = sum - carry * LIMB;
+    }
+    state.set(made);
+    const [n0, n1, n2, n3, n4, n5] = state;
     const top = n4 | (n5 << 24) | 0;
     const word = (n2 >>> 16) | (n3 << 8); // bits 64 to 95
     const low = (n0 | (n1 << 24)) ^ word;
@@ -495,9 +442,8 @@ class Generator {
 /* ---- The learner ---- */
 
 /* coartic/learner/conditions.py */
-const condition = (hands, modify_other, hand_exploration, changes = {}) => ({
-  hands, modify_chosen: true, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, corrects: true,
-  credit: "overall", discount: 0, ...changes,
+const condition = (hands, modify_other, hand_exploration) => ({
+  hands, modify_chosen: true, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, credit: "overall",
 });
 const CONDITIONS = {
   EC1: condition([RIGHT], false, "none"),
@@ -505,10 +451,6 @@ const CONDITIONS = {
   EC3: condition([LEFT, RIGHT], false, "random"),
   EC4: condition([LEFT, RIGHT], true, "random"),
 };
-const VARIANTS = Object.fromEntries(["EC1", "EC4"].flatMap((base) => [
-  [`${base}-uncorrected`, { ...CONDITIONS[base], corrects: false }],
-  [`${base}-subtask`, { ...CONDITIONS[base], credit: "subtask" }],
-]));
 const EQUALLY_NEAR = 1e-9;
 
 /* coartic/learner/kernel.py */
@@ -587,21 +529,18 @@ class Learner {
     for (let goal = 0; trial.going && goal < this.problem.goals.length; goal += 1) {
       const hand = first ? this.first_hands[goal] : this.choose_hand(trial.q, goal, previous, explore);
       const target = first ? null : this.set_target(trial.q, goal, previous, hand, explore);
-      trial.reaches(goal, hand, target, this.rules.corrects);
+      trial.reaches(goal, hand, target);
       previous = hand;
     }
     return trial;
   }
 
   update_tables(trial) {
-    let later = 0;
     for (let goal = this.problem.goals.length - 1; goal >= 0; goal -= 1) {
       let credit = trial.reward;
       if (this.rules.credit === "subtask") {
-        let ticks = 0;
-        trial.movements.forEach((movement) => { if (movement.goal === goal) ticks += movement.ticks; });
-        credit = this.rules.discount * later - ticks;
-        later = credit;
+        credit = 0;
+        trial.movements.forEach((movement) => { if (movement.goal === goal) credit -= movement.ticks; });
       }
       const previous = goal ? trial.hands[goal - 1] : NO_HAND;
       const hand = trial.hands[goal];
@@ -634,14 +573,6 @@ class Learner {
     const replay = this.trials ? this.replay() : null;
     return replay && replay.going ? replay : null;
   }
-}
-
-/* coartic/learner/learning.py: a whole run. */
-function learn(problem, rules, seed, trials) {
-  const learner = new Learner(problem, rules, seed);
-  const rewards = [];
-  while (learner.trials < trials) rewards.push(learner.step().reward);
-  return { learner, rewards };
 }
 
 /* ---- CMA-ES on the same trials (coartic/baselines/cma_es.py) ---- */
@@ -924,8 +855,7 @@ function receding_horizon(problem, horizon, starts = 8) {
 
 if (typeof module !== "undefined") {
   module.exports = {
-    CONDITIONS, VARIANTS, PAPER, Generator, Learner, Search, Trial, chain, correct, corrective_trial, distance_to_goal,
-    execute, initial_hands, joint_positions, learn, letters_of, make_trial, move, problem_of,
+    CONDITIONS, PAPER, Generator, Learner, Search, execute, initial_hands, letters_of, make_trial, problem_of,
     receding_horizon, trajectory,
   };
 }

@@ -13,11 +13,13 @@ const NAMES = {
   alone: "one goal at a time", learner: "the learner", "cma-es": "evolution (CMA-ES)", plan: "the planner", you: "you",
 };
 const short = (value) => Number(value.toFixed(2)).toString();
+const grouped = (count) => count.toLocaleString("en").replace(",", "\u202f");
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 /* What the reader has chosen; all of it is in the link. */
 const AT_FIRST = {
-  preset: 0, who: "learner", reward: "whole", explores: "EC4", ahead: 1, arms: 0, goals: null, others: null, trials: 0,
-  tick: 0, speed: 1, pauses: 1, own: null, edited: 1,
+  preset: 0, who: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null, others: null, trials: 0, tick: 0,
+  own: null, edited: 1,
 };
 
 /* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
@@ -102,22 +104,17 @@ class Play {
   /* The tasks in view, one or two, which share the start and the first goal. */
   get tasks() {
     const { task } = this.preset;
-    const { goals, others, arms } = this.state;
-    const hands = arms === 1 ? ["right"] : arms === 2 ? ["left", "right"] : task.hands;
-    const named = /^[LR]*$/.test(task.initial_hands) && task.initial_hands.length === goals.length
-      && (hands.length > 1 || !task.initial_hands.includes("L"));
-    const initial_hands = named ? task.initial_hands : hands.length > 1 ? "best-of-all" : "R".repeat(goals.length);
+    const { goals, others } = this.state;
     return [goals, ...(others ? [[goals[0], ...others]] : [])].map((each) => ({
-      ...task, hands, goals: each, initial_hands: each.length === goals.length || hands.length > 1 ? initial_hands : "R".repeat(each.length),
+      ...task, goals: each, initial_hands: task.initial_hands.length === each.length ? task.initial_hands : "best-of-all",
     }));
   }
 
   /* Runs of a results folder, as long as nobody has changed the task. */
   stored(who) {
     const run = (this.preset.runs || []).find(({ id }) => id === who);
-    const { goals, others, arms } = this.state;
-    const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
-    const kept = !arms && same(goals, this.preset.task.goals) && (!others || same(others, this.preset.others));
+    const { goals, others } = this.state;
+    const kept = same(goals, this.preset.task.goals) && (!others || same(others, this.preset.others));
     return run && kept ? run : null;
   }
 
@@ -258,11 +255,6 @@ class Play {
     return [...new Set(stops)].sort((a, b) => a - b);
   }
 
-  go(tick) {
-    this.state.tick = Math.max(0, Math.min(this.last, Math.round(tick)));
-    this.refresh();
-  }
-
   play() {
     if (this.playing) return;
     this.playing = true;
@@ -275,8 +267,8 @@ class Play {
       if (Math.round(at) !== this.state.tick) at = this.state.tick; // moved by hand
       if (held > 0) held -= seconds;
       else if (this.inSight !== false) {
-        const next = at + seconds * PACE * this.state.speed;
-        const stop = this.state.pauses ? this.stops.find((each) => each > at + 0.5 && each <= next) : undefined;
+        const next = at + seconds * PACE;
+        const stop = this.stops.find((each) => each > at + 0.5 && each <= next);
         at = stop === undefined ? next : stop;
         if (stop !== undefined) held = HOLD_S;
         if (at >= this.last) {
@@ -431,7 +423,7 @@ class Play {
     for (let trials = 1; trials <= TRIALS; trials *= 10) {
       context.fillStyle = colours.line;
       context.fillRect(x(trials), top, 1, bottom - top);
-      curve.text(trials.toLocaleString("en").replace(",", "\u202f"), [x(trials), height - 10], colours.soft, trials === 1 ? "left" : trials === TRIALS ? "right" : "center", 12);
+      curve.text(grouped(trials), [x(trials), height - 10], colours.soft, trials === 1 ? "left" : trials === TRIALS ? "right" : "center", 12);
     }
     const step = [5, 10, 20, 50, 100, 200, 500, 1000].find((each) => (high - low) / each < 5) || 5000;
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
@@ -533,7 +525,7 @@ class Play {
       }
     }
     this.find("finding").textContent = finding;
-    const progress = learns ? `${at.toLocaleString("en").replace(",", "\u202f")} trials` : "";
+    const progress = learns ? `${grouped(at)} trials` : "";
     this.find("progress").textContent = progress;
     if (state.who === "you") this.find("hand").value = this.own[state.edited - 1].hand;
     this.find("told").disabled = !this.moved || !this.snapshot("0 run 0") || !this.snapshot("0 far", Infinity);
@@ -732,10 +724,6 @@ class Play {
     on("reward", "change", (event) => change("reward", event.target.value));
     on("explores", "change", (event) => change("explores", event.target.value));
     on("ahead", "change", (event) => change("ahead", Number(event.target.value)));
-    on("arms", "change", (event) => {
-      this.state.own = null;
-      change("arms", Number(event.target.value));
-    });
     on("two", "change", (event) => {
       const [first, ...rest] = this.state.goals;
       if (event.target.checked && this.state.who === "you") this.state.who = "learner";
@@ -788,22 +776,13 @@ class Play {
         this.pause();
       } else this.play();
     });
-    const step = (by) => () => {
-      this.watching = true;
-      this.playing = false;
-      this.go(this.state.tick + by);
-      this.keep();
-    };
-    on("back", "click", step(-1));
-    on("on", "click", step(1));
     on("tick", "input", (event) => {
       this.watching = true;
       this.playing = false;
-      this.go(Number(event.target.value));
+      this.state.tick = Number(event.target.value);
+      this.refresh();
     });
     on("tick", "change", () => this.keep());
-    on("speed", "change", (event) => { this.state.speed = Number(event.target.value); this.keep(); });
-    on("pauses", "change", (event) => { this.state.pauses = Number(event.target.checked); this.keep(); });
     on("png", "click", () => this.save(this.find("stage"), "coartic.png"));
     on("record", "click", () => (this.recorder ? this.recorder.stop() : this.record()));
     this.find("record").hidden = !(window.MediaRecorder && this.find("stage").captureStream);
@@ -837,7 +816,7 @@ class Play {
       select.dataset.has = JSON.stringify(options);
       select.replaceChildren(...options.map(([value, text]) => new Option(text, value)));
     };
-    const hands = state.arms || preset.task.hands.length;
+    const hands = preset.task.hands.length;
     fill("preset", this.data.presets.map(({ label }, k) => [k, label]));
     this.find("preset").value = state.preset;
     const runs = preset.runs || [];
@@ -850,7 +829,6 @@ class Play {
     state.ahead = Math.min(state.ahead, state.goals.length - 1);
     this.find("ahead").value = state.ahead;
     this.find("explores").value = state.explores;
-    this.find("arms").value = hands;
     this.find("two").checked = Boolean(state.others);
     this.find("two").disabled = state.goals.length < 2;
     this.find("told").textContent = `Move goal ${this.moved + 1} now`;
@@ -864,8 +842,6 @@ class Play {
     state.edited = Math.min(state.edited, state.goals.length);
     this.find("posture").value = state.edited;
     this.find("by-hand").hidden = hands < 2;
-    this.find("speed").value = state.speed;
-    this.find("pauses").checked = Boolean(state.pauses);
   }
 
   /* ---- To keep: link, picture, recording ---- */
@@ -873,7 +849,6 @@ class Play {
   get link() {
     const { goals, others } = this.state;
     const { task, others: second = null } = this.preset;
-    const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
     return written({
       ...this.state, goals: same(goals, task.goals) ? null : goals, others: same(others, second) ? null : others || [],
     }, this.first);
