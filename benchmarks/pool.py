@@ -20,34 +20,21 @@ import signal
 import sys
 import tempfile
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
 from multiprocessing import connection
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
-from coartic.benchmarks.worker import (
-    Job,
-    Outcome,
-    answer_of,
-    fail,
-    outcomes_from,
-    perform_job,
-    prepare,
-)
+from coartic.benchmarks.worker import Job, Outcome, answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.files import write_atomically
 from coartic.interruption import blocked_signals
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.text import error_line, plain
-from coartic.threads import (
-    ONE_THREAD,
-    begin_worker,
-    end_group,
-    environment,
-    threads_for,
-)
+from coartic.threads import ONE_THREAD, begin_worker, end_group, environment, threads_for
 
 _POLL_S = 0.2  # between looks for answers and at limits
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
@@ -58,6 +45,7 @@ _PRINTED = 4000  # bytes that are read of it
 _STARTS = 5  # processes in a row that may end before they begin a job
 _KILLED = (-9, 255)  # exit codes of a process that somebody has killed, or whose server
 _END_S = 1.0  # that a process which is killed has to end
+_OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
 
 
@@ -90,27 +78,26 @@ class Local:
 
         Raises CoarticError where one process after another ends before it begins a job.
         """
-        by_method: dict[Any, list[Job]] = {}
+        by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
-            by_method.setdefault(job.method.key, []).append(job)
-        shares = (
+            by_method[job.method.key].append(job)
+        waiting = deque(
             of_method[first :: self.workers]  # each has some of every cell
             for of_method in by_method.values()
             for first in range(min(self.workers, len(of_method)))
         )
-        waiting, crew = deque(shares), list[Worker]()
-        lost, repeated = 0, set[int]()
+        crew, lost, repeated = list[Worker](), 0, set[int]()
         with tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True) as folder:
             try:
                 while waiting or crew:
                     while waiting and len(crew) < self.workers:
-                        crew.append(Worker(folder, waiting.popleft(), self.workers))
+                        crew.append(Worker(folder, waiting.popleft(), self))
                         crew[-1].start()
                     connection.wait([s for worker in crew for s in worker.sentinels], _POLL_S)
                     for worker in tuple(crew):
                         exit_code = worker.exit_code  # first: after the end comes no answer
                         yield from worker.answers()
-                        if exit_code is None and worker.jobs and not self.is_late(worker):
+                        if exit_code is None and worker.jobs and not worker.is_late:
                             continue
                         worker.end()
                         crew.remove(worker)
@@ -119,52 +106,37 @@ class Local:
                         job = worker.jobs[0]
                         lost = lost + 1 if worker.since_s is None else 0
                         if lost == _STARTS:
-                            words = f"processes cannot begin ({worker.last_words}"
-                            raise CoarticError(f"{words}; finished runs are kept")
+                            raise CoarticError(
+                                f"processes cannot begin ({worker.last_words}; finished runs are "
+                                "kept"
+                            )
                         if lost:
                             time.sleep(_POLL_S)  # a server that was killed may yet be there
                         elif exit_code in _KILLED and id(job) not in repeated:
                             repeated.add(id(job))
                         else:
+                            yield job, worker.failure(exit_code)
                             worker.jobs.popleft()
-                            yield job, self.fail_at_end(worker, job, exit_code)
                         if worker.jobs:
                             waiting.appendleft(list(worker.jobs))
             finally:
                 for worker in crew:
                     worker.end()
 
-    def wall_limit(self, job: Job) -> float:
-        """Seconds of wall time after which a job is ended."""
-        return 3 * (job.time_limit_s or _LONGEST_S) + self.patience_s
-
-    def is_late(self, worker: Worker) -> bool:
-        """Whether the current job of a process takes too long."""
-        since_s, limit_s = worker.since_s, self.wall_limit(worker.jobs[0])
-        return since_s is not None and time.monotonic() > since_s + limit_s
-
-    def fail_at_end(self, worker: Worker, job: Job, exit_code: int | None) -> list[Outcome]:
-        """The outcomes of a job that a process has not answered: it is late, or has ended."""
-        if exit_code is None:
-            wall_s = self.wall_limit(job)
-            return fail(job, "timeout", f"wall time limit of {wall_s:g} s exceeded", wall_s)
-        if signal_named(exit_code) in ("SIGPROF", "SIGXCPU"):
-            cpu_s = job.time_limit_s or _LONGEST_S
-            return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
-        return fail(job, "crashed", f"the worker process ended ({worker.last_words}")
-
 
 class Worker:
     """A process that performs jobs of one method in their order."""
 
-    def __init__(self, folder: str, jobs: Sequence[Job], workers: int) -> None:
+    def __init__(self, folder: str, jobs: Sequence[Job], crew: Local) -> None:
         self.jobs = deque(jobs)
         """Jobs that are not answered yet."""
         self.since_s: float | None = None
         """Clock when it began the first of these; None before."""
+        self._patience_s = crew.patience_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
-        self._process = WorkerProcess(target=perform_jobs, args=(self._folder, jobs, workers))
+        arguments = self._folder, jobs, crew.workers
+        self._process = WorkerProcess(target=perform_jobs, args=arguments)
 
     def start(self) -> None:
         """Begin it; where it cannot begin, it has ended."""
@@ -187,6 +159,17 @@ class Worker:
         """Exit code, or minus the signal that ended it; None while it runs."""
         return 1 if self._process.pid is None else self._process.exitcode
 
+    @property
+    def is_late(self) -> bool:
+        """Whether its job takes too long."""
+        since_s = self.since_s
+        return since_s is not None and time.monotonic() > since_s + self.wall_limit_s
+
+    @property
+    def wall_limit_s(self) -> float:
+        """Wall time after which its job is ended."""
+        return 3 * (self.jobs[0].time_limit_s or _LONGEST_S) + self._patience_s
+
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
         """The jobs that it has answered since, with their outcomes."""
         if self.since_s is None and (self._folder / _BEGUN).exists():
@@ -201,29 +184,30 @@ class Worker:
     @property
     def last_words(self) -> str:
         """How it has ended, and the last lines that it has printed."""
-        name = signal_named(self.exit_code or 0)
-        how = f"killed by {name}" if name else f"exit code {self.exit_code}"
-        words = b""
+        words, code = b"", self.exit_code or 0
         with contextlib.suppress(OSError), open(self._folder / _SAID, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _PRINTED))
             words = file.read()
         lines = words.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_WORDS:])
+        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return f"{how}): {plain(last, 1000) or 'it left no message'}"
+
+    def failure(self, exit_code: int | None) -> list[Outcome]:
+        """The outcomes of the job that it has not answered: it is late, or has ended."""
+        job, cpu_s = self.jobs[0], self.jobs[0].time_limit_s or _LONGEST_S
+        if exit_code is None:
+            reason = f"wall time limit of {self.wall_limit_s:g} s exceeded"
+            return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
+        if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
+            return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
+        return fail(job, "crashed", f"the worker process ended ({self.last_words}")
 
     def end(self) -> None:
         """End it, with the processes that it has started."""
         if self._process.pid is not None:
             end_group(self._process.pid)
             self._process.join(_END_S)
-
-
-def signal_named(exit_code: int) -> str:
-    """The signal that ended a process; empty where none did."""
-    try:
-        return signal.Signals(-exit_code).name
-    except ValueError:
-        return ""
 
 
 def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
@@ -234,7 +218,9 @@ def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
     for stream in (1, 2):
         os.dup2(descriptor, stream)
     bound_resources(workers)
-    prepare(jobs)
+    for job in jobs:  # kernels are compiled, or loaded, on no run's clock
+        learns = job.setting.method.startswith(METHOD_PREFIX)
+        warm_up(job.setting.task, "learner" if learns else "motion", "trials")
     place = folder / "place"
     place.mkdir()
     tempfile.tempdir = os.environ["TMPDIR"] = str(place)
@@ -243,36 +229,33 @@ def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
     process = os.getpid()
     for number, job in enumerate(jobs):
         os.truncate(folder / _SAID, 0)
+        limit_cpu_time(job.time_limit_s or _LONGEST_S)
+        outcomes = perform_job(job)
+        limit_cpu_time(0)
         try:
-            text = answer_of(perform_within_limit(job))
+            text = answer_of(outcomes)
         except Exception as error:
-            text = answer_of(
-                fail(job, "crashed", f"its outcome cannot be kept: {error_line(error)}")
-            )
+            reason = f"its outcome cannot be kept: {error_line(error)}"
+            text = answer_of(fail(job, "crashed", reason))
         if os.getpid() != process:  # a method has forked it
             os._exit(1)
         write_atomically(folder / str(number), text)
 
 
-def perform_within_limit(job: Job) -> list[Outcome]:
-    """Perform a job in a process that the system ends when it has taken as much CPU time as the
-    limit: by SIGPROF, or SIGXCPU where a method has turned that off."""
+def limit_cpu_time(limit_s: float) -> None:
+    """Let the system end this process when it has taken so much more CPU time, by SIGPROF, or
+    SIGXCPU where a method has turned that off; 0 lifts the limit."""
     if not hasattr(signal, "setitimer"):
-        return perform_job(job)
+        return
     import resource
 
-    limit_s = job.time_limit_s or _LONGEST_S
     for number in (signal.SIGPROF, signal.SIGXCPU):  # whatever a method before has set
         signal.signal(number, signal.SIG_DFL)
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
     with contextlib.suppress(ValueError):  # a limit from outside is lower
-        whole_s = math.ceil(time.process_time() + limit_s) + 1
+        whole_s = math.ceil(time.process_time() + (limit_s or _LONGEST_S)) + 1
         resource.setrlimit(resource.RLIMIT_CPU, (whole_s, most))
     signal.setitimer(signal.ITIMER_PROF, limit_s)
-    try:
-        return perform_job(job)
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def bound_resources(workers: int) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -18,10 +18,7 @@ from pydantic import Field, PlainValidator, TypeAdapter
 
 from coartic.benchmarks.provenance import process_peak_mb
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.learner.conditions import METHOD_PREFIX
-from coartic.learner.learning import warm_up
 from coartic.method import (
-    BudgetError,
     Information,
     Meter,
     MethodError,
@@ -30,7 +27,6 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
-from coartic.motion.lanes import links_for
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
@@ -153,7 +149,14 @@ def perform_job(job: Job) -> list[Outcome]:
     _seen.add(setting.method)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
-        results = solve(job, sessions)
+        method = job.method.configure(setting.parameters)
+        results: Sequence[Any]
+        if (reason_not := method.why_not(outline_of(setting.task))) is not None:
+            raise MethodError("infeasible", str(reason_not))
+        if len(sessions) == 1:
+            results = [method.solve(sessions[0])]
+        else:
+            results = method.solve_together(sessions)
         made = trials_outside() - made
         if made and not job.method.is_ours:
             words = f"the method made {made} trials outside its session, which are not counted"
@@ -167,30 +170,8 @@ def perform_job(job: Job) -> list[Outcome]:
     return [outcome_of(setting.method, result, session, times) for result, session in pairs]
 
 
-def prepare(jobs: Iterable[Job]) -> None:
-    """Compile the kernels for these jobs, or load them, on no run's clock; the learner has one of
-    its own."""
-    done = set()
-    for job in jobs:
-        task, learns = job.setting.task, job.setting.method.startswith(METHOD_PREFIX)
-        if (kernels := (links_for(task.robot), learns)) not in done:
-            done.add(kernels)
-            warm_up(task, "learner" if learns else "motion", "trials")
-
-
 _seen: set[str] = set()
 """Methods that this process has run."""
-
-
-def solve(job: Job, sessions: Sequence[Session]) -> Sequence[Result | BaseException]:
-    """The result of the method in each session."""
-    method = job.method.configure(job.setting.parameters)
-    reason_not = method.why_not(outline_of(job.setting.task))
-    if reason_not is not None:
-        raise MethodError("infeasible", str(reason_not))
-    if len(sessions) == 1:
-        return [method.solve(sessions[0])]
-    return method.solve_together(sessions)
 
 
 def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outcome:
@@ -208,11 +189,6 @@ def outcome_of(method: str, result: Any, session: Session, times: Times) -> Outc
         if isinstance(result, BaseException):
             raise result
         return Outcome("ok", **spent, **statement(method, result, session))
-    except UndeclaredError as error:
-        return Outcome("crashed", str(error), **spent)
-    except BudgetError as error:
-        reason = f"the method did not keep to its budget: {error}"
-        return Outcome("crashed", reason, **spent)
     except SolutionError as error:
         return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:

@@ -132,7 +132,7 @@ CASES = [
     ("test/random", "determinism", "same seed on ascending, same process: details"),
     ("test/local", "determinism", "same seed on tiny, another process: details"),
     ("test/remembers", "no hidden state", "after other runs, ascending with the same seed"),
-    ("test/spendthrift", "limits", "did not keep to its budget: all 7 trials"),
+    ("test/spendthrift", "limits", "BudgetError: all 7 trials of the budget"),
     ("test/peeks", "information", "the method used 'Jacobian', which it does not declare"),
     ("test/overdeclares", "information", "declared but never used: Jacobian"),
     ("test/taker", "information", "hand_over is for this project's own compiled methods"),
