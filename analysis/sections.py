@@ -181,8 +181,6 @@ SECTIONS = (
         table=random_tasks.exploration,
         caption="More exploration against less, in per cent of the best known reward",
         sentence=random_tasks.exploration_pays,
-        note="By hands: the part of the gain that comes from the hand sequences, if each run had "
-        "the best reward that is known for its hands.",
         single=False,
     ),
     Section(

@@ -3,8 +3,6 @@ many coarticulation is there."""
 
 from __future__ import annotations
 
-from statistics import fmean
-
 import pandas as pd
 
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
@@ -60,25 +58,6 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
     }
 
 
-@cached
-def best_by_hands(study: Study) -> dict[str, dict[str, int]]:
-    """Best reward of any run of the folder with each hand sequence, by instance.
-
-    The corrective process alone with every sequence counts as well. The best that a sequence can
-    give is at least that.
-    """
-    drawn = [name for name, task in study.tasks.items() if task.family is not None]
-    runs, columns = study.runs, ["task", "hands", "reward"]
-    alone = [study.sequences(name).assign(task=name) for name in drawn]
-    every = pd.concat([part[columns] for part in (runs[runs.status == "ok"], *alone)]).dropna()
-    best: dict[str, dict[str, int]] = {name: {} for name in drawn}
-    for task, of_task in every.groupby("task"):
-        if task in best:
-            highest = of_task.groupby("hands").reward.max()
-            best[str(task)] = {str(hands): int(highest[hands]) for hands in highest.index}
-    return best
-
-
 THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
 """Least values with which signs of :data:`~coartic.analysis.signatures.signs.SIGNS` are there: a
 tenth of the goals, or of the way; more than a tick, which rounding can make."""
@@ -100,16 +79,16 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
                 runs = study.executed(name, label)
                 measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
-    means: dict[tuple[str, str, str], list[float]] = {}
-    for (name, label), of_cell in by_cell.items():
-        for sign, each in of_cell.items() if label not in LEARNERS else ():
-            place = str(study.tasks[name].family), sign, label
-            means.setdefault(place, []).append(float(each.mean()))
-    most: dict[tuple[str, str], str] = {}
-    for family, sign, label in sorted(means, key=lambda place: fmean(means[place])):
-        most[family, sign] = label
+    # Of each family and sign, the placebo with the highest mean over instances.
+    means = pd.DataFrame(
+        [(study.tasks[name].family, sign, label, each.mean())
+         for (name, label), of_cell in by_cell.items() if label not in LEARNERS
+         for sign, each in of_cell.items()],
+        columns=["family", "sign", "label", "mean"],
+    ).groupby(["family", "sign", "label"], sort=False)["mean"].mean()  # fmt: skip
+    most = means.groupby(["family", "sign"], sort=False).idxmax().to_dict()
     for name in [name for name, label in by_cell if label == PLACEBO]:
-        chosen = {sign: most.get((str(study.tasks[name].family), sign), "") for sign in THERE}
+        chosen = {sign: most.get((study.tasks[name].family, sign), ("",))[-1] for sign in THERE}
         by_cell[name, PLACEBO] = {
             sign: by_cell[name, label][sign]
             for sign, label in chosen.items()

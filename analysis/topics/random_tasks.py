@@ -24,23 +24,18 @@ from coartic.analysis.methods import (
     most_exploring,
     name_of,
 )
-from coartic.analysis.optima import gap_share
 from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.estimates import LEVEL
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.statistics.instances import other_tasks, value
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import CellRuns, Study
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.instances import (
     THERE,
-    best_by_hands,
     best_of_instances,
     by_family,
     signs_by_family,
     solved,
 )
 from coartic.analysis.words import interval, number
-from coartic.robot import Array
 
 OfFamily = TypeVar("OfFamily")
 CONTRASTS = (
@@ -66,11 +61,8 @@ _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 def family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
     every = solved(study)
-    two_armed = {
-        str(study.tasks[name].family)
-        for name in best_of_instances(study)
-        if len(study.tasks[name].hands) > 1
-    }
+    drawn = [study.tasks[name] for name in best_of_instances(study)]
+    two_armed = {str(task.family) for task in drawn if len(task.hands) > 1}
     rows: list[tuple[str, Row]] = []
     for label in (name for name in every.label.unique() if not is_variant(name)):
         of_label = every[every.label == label]
@@ -80,10 +72,9 @@ def family_gaps(study: Study) -> Rows:
             if two_armed and two_armed <= scores.keys():
                 both = {family: part for family, part in scores.items() if family in two_armed}
                 row |= other_tasks(both).columns(column)
-        gaps = by_family(of_label, "gap")
-        for family in every.family.unique():
-            part = {family: gaps[family]} if family in gaps else {}
-            row[f"in {family}"] = other_tasks(part).value if part else math.nan
+        row |= {f"in {family}": math.nan for family in every.family.unique()}
+        for family, part in by_family(of_label, "gap").items():
+            row[f"in {family}"] = other_tasks({family: part}).value
         cells = [
             cell
             for (task, name), cell in study.cells.items()
@@ -92,14 +83,6 @@ def family_gaps(study: Study) -> Rows:
         ]
         rows.append((label, row | runs_of(*cells)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
-
-
-def told_apart(first: Array, second: Array) -> bool:
-    """Whether runs on one instance differ significantly (5 %, uncorrected)."""
-    if not np.ptp(first) and not np.ptp(second):
-        return bool(first[0] != second[0])
-    other = second if len(second) > 1 else float(second[0])
-    return bool(bootstrap_test(first, other, "two-sided", resamples=999).p < LEVEL)
 
 
 def each_and_all(parts: Mapping[str, OfFamily]) -> Iterator[tuple[str, Mapping[str, OfFamily]]]:
@@ -119,49 +102,31 @@ def family_cells(study: Study, family: str, labels: Iterable[str]) -> list[CellR
     ]
 
 
-@table("contrast, family, instances, gain[], median, by_hands[], better, worse, told_apart")
+@table("contrast, family, instances, gain[], better, worse")
 def exploration(study: Study) -> Rows:
     """More exploration against less, by family and over all of them.
 
-    ``gain``: of rewards, as a share of the best known. ``by_hands``: the part of it that the hand
-    sequences make, as if each run got the best that is known with its hands; the rest is what
-    joints make of them.
+    ``gain``: of rewards, as a share of the best known.
     """
-
-    def share(cell: CellRuns) -> Array:
-        return -gap_share(cell.rewards, best_of_instances(study)[cell.task].reward)
-
-    def share_by_hands(cell: CellRuns) -> Array:
-        best_of, best = best_by_hands(study)[cell.task], best_of_instances(study)[cell.task].reward
-        return np.array([best_of[str(hands)] for hands in cell.good.hands]) / abs(best)
-
+    rows = solved(study)
     for first, second in CONTRASTS:
         less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
         contrast = f"{name_of(first)} over {less}"
-        every = solved(study)
-        names = every[every.label == first].merge(every.task[every.label == second])
+        both = rows[rows.label == first].merge(rows[rows.label == second], on=["family", "task"])
         pairs = {
-            str(family): [(study.cells[name, first], study.cells[name, second]) for name in tasks]
-            for family, tasks in names.groupby("family", sort=False).task
+            str(family): [(-more, -less) for more, less in zip(part.gap_x, part.gap_y, strict=True)]
+            for family, part in both.groupby("family", sort=False)
         }
-        for family, cells in each_and_all(pairs):
-            scores, by_hands = (
-                {of: [(measure(a), measure(b)) for a, b in pairs] for of, pairs in cells.items()}
-                for measure in (share, share_by_hands)
-            )
-            of_instances = [runs for of_family in scores.values() for runs in of_family]
+        for family, scores in each_and_all(pairs):
             # Equal means of different runs may differ in the last bit.
-            values = np.array(list(map(value, of_instances))).round(12)
+            values = np.array([value(runs) for part in scores.values() for runs in part]).round(12)
             row: Row = {
                 "contrast": contrast,
                 "family": family,
                 "instances": len(values),
                 **other_tasks(scores).columns("gain"),
-                "median": float(np.median(values)),
-                **other_tasks(by_hands).columns("by_hands"),
                 "better": int((values > 0).sum()),
                 "worse": int((values < 0).sum()),
-                "told_apart": sum(told_apart(*runs) for runs in of_instances),
                 **runs_of(*family_cells(study, family, (first, second))),
             }
             yield f"{contrast}, {family}", row
@@ -185,24 +150,6 @@ def family_signs(study: Study) -> Rows:
             yield f"{sign}, {label}, {family}", row
 
 
-@cached
-def instance_gaps(study: Study) -> pd.DataFrame:
-    """Gap of every method without variants on every instance, beside the mean of its family.
-
-    Columns ``method``, ``family``, ``task``, ``gap`` (mean over runs), ``mean[]`` about other
-    tasks of the family, ``instances``.
-    """
-    columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
-    parts = [pd.DataFrame(columns=columns)]
-    rows = solved(study).rename(columns={"label": "method"})
-    rows = rows[~rows.method.str.contains(" ") & (rows.method != "learner")]
-    for _, part in rows.groupby(["method", "family"], sort=False):
-        mean = other_tasks(by_family(part, "gap")).columns("mean")
-        part = part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))
-        parts.append(part[columns])
-    return pd.concat(parts[1:] or parts, ignore_index=True)
-
-
 @figure(
     "Gap to the best known reward, by family",
     "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond; "
@@ -212,19 +159,24 @@ def instance_gaps(study: Study) -> pd.DataFrame:
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Gap to the best known reward of each instance, by method and family."""
-    data = instance_gaps(study)
-    if not len(data):
+    rows = solved(study).rename(columns={"label": "method"})
+    rows = rows[~rows.method.str.contains(" ") & (rows.method != "learner")]
+    if not len(rows):
         return None
+    columns = ["method", "family", "task", "gap", "mean", "mean_low", "mean_high", "instances"]
+    parts = []
+    for _, part in rows.groupby(["method", "family"], sort=False):
+        mean = other_tasks(by_family(part, "gap")).columns("mean")
+        parts.append(part.assign(gap=part.gap.map(np.mean), **mean, instances=len(part))[columns])
+    data = pd.concat(parts, ignore_index=True)
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
     looks = looks_in(study, order)
     families = list(dict.fromkeys(data.family))
     size = style.TWO, 0.9 + 0.19 * len(order)
     drawing, panels = style.panels((1, len(families)), size, sharey=True)
     for axes, family in zip(panels, families, strict=True):
-        for place, label in enumerate(order):
-            rows = data[(data.method == label) & (data.family == family)]
-            if not len(rows):
-                continue
+        for label, rows in data[data.family == family].groupby("method"):
+            place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
             dot: Any = {"color": looks[label]["color"], "markersize": 2.5, "markeredgewidth": 0}
             gaps = rows.gap.clip(upper=_FARTHEST)
@@ -253,9 +205,8 @@ def on_random_tasks(study: Study) -> str:
     if not len(gaps):
         return ""
     ends = [
-        f"{'the learner' if row['method'] == 'learner' else name_of(row['method'])} "
-        f"{number(100 * row['gap'], 1)} %"
-        for row in gaps.to_dict("records")
+        f"{'the learner' if label == 'learner' else name_of(label)} {number(100 * gap, 1)} %"
+        for label, gap in zip(gaps.method, gaps.gap, strict=True)
     ]
     return (
         f"Gaps to the best known reward on {len(best)} random tasks (means over families with two "
