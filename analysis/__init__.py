@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from coartic.analysis.claims.judging import all_of, judge, mean_beyond
     from coartic.analysis.frames import ecdf, gaps, means, ranking
     from coartic.analysis.pages import fill_page, write_study
-    from coartic.analysis.running_times import runtimes
     from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.signs import SIGNS
     from coartic.analysis.signatures.two_contexts import TwoContexts
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
     from coartic.analysis.study import Study, load
+    from coartic.analysis.topics.costs import runtimes
     from coartic.analysis.words import interval
 
 __all__ = [
@@ -29,7 +29,7 @@ _HOMES = {
     "claims.judging": ("all_of", "judge", "mean_beyond"),
     "frames": ("ecdf", "gaps", "means", "ranking"),
     "pages": ("fill_page", "write_study"),
-    "running_times": ("runtimes",),
+    "topics.costs": ("runtimes",),
     "signatures.context_tests": ("beyond_p",),
     "signatures.signs": ("SIGNS",),
     "signatures.two_contexts": ("TwoContexts",),

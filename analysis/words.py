@@ -44,9 +44,9 @@ def read_beside(module: str, name: str = "") -> dict[str, Any]:
 
 
 def id_of(function: Callable[..., Any]) -> str:
-    """Id of a table or figure by its function: ``family-gaps`` of ``family_gaps``, ``ranking`` of
-    ``draw_ranking``."""
-    return function.__name__.removeprefix("draw_").replace("_", "-")
+    """Id of a table or figure by its function: ``family-gaps`` of ``list_family_gaps``, ``ranking``
+    of ``draw_ranking``."""
+    return function.__name__.partition("_")[2].replace("_", "-")
 
 
 def number(value: float, digits: int | None = None) -> str:

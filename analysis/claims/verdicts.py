@@ -22,7 +22,7 @@ def papers_claims(study: Study) -> pd.DataFrame:
 @table(
     "statement, verdict, evidence, test, p_holm, opposite_p_holm, sets, place, quote",
 )
-def claims(study: Study) -> Rows:
+def list_claims(study: Study) -> Rows:
     """The paper's claims with their verdicts, where the folder has runs for any of them."""
     for name, judged in papers_claims(study).iterrows():
         claim = CLAIMS[str(name)]

@@ -64,7 +64,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
 
 
 @table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other")
-def contexts(study: Study) -> Rows:
+def list_contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
     for label in dict.fromkeys(label for _, label in study.cells):
         every = list(shared_goals(study, label))
@@ -87,7 +87,7 @@ def contexts(study: Study) -> Rows:
 
 
 @table("task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p")
-def signatures(study: Study) -> Rows:
+def list_signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals.
 
     ``first_p`` and ``preshaping_p`` are of the tests against the placebo.
@@ -222,7 +222,7 @@ def next_goal(study: Study) -> str:
 
 def joints_or_hand(study: Study) -> str:
     """Number of methods in which the next goal moves the joints more than the hand."""
-    rows = contexts(study)
+    rows = list_contexts(study)
     rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
     if not len(rows):
         return ""

@@ -6,25 +6,28 @@ Targets are rewards evenly spaced between those of the initial solution and of t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
-from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.methods import TOGETHER, in_order, is_learner, main_methods, name_of
 from coartic.analysis.settings import name_in, shown_methods
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.running_times import RunningTimes
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import interval, number
+from coartic.errors import CoarticError
+from coartic.inputs import brief_value
 from coartic.robot import Array
+from coartic.text import id_named, unknown
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
@@ -71,18 +74,17 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
     runs = cell.runs
     if spend == "solve_s":
         runs = runs.assign(solve_s=scores.solve_times(cell.good).reindex(runs.index))
-    rows, trials_made = [], scores.floats(runs.trials)
-    total, reward = scores.floats(runs[spend]), scores.floats(runs.reward)
-    for place, (run_id, status) in enumerate(zip(runs.run_id, runs.status, strict=True)):
+    rows = []
+    for run_id, status, made, total, reward in zip(
+        runs.run_id, runs.status, runs.trials, runs[spend], runs.reward, strict=True
+    ):
         if status != "ok":
             rows.append(np.full(len(targets), math.inf))
-        elif np.isfinite(total[place]):
-            spent, rewards = total[[place]], reward[[place]]
+        elif not pd.isna(total):
+            spent, rewards = np.array([float(total)]), np.array([float(reward)])
             if str(run_id) in improvements(study):
                 trials, rewards = improvements(study)[str(run_id)]
-                spent = (
-                    trials if spend == "trials" else total[place] * (trials / trials_made[place])
-                )
+                spent = trials if spend == "trials" else total * (trials / made)
             rows.append(np.append(spent, math.inf)[np.searchsorted(rewards, targets)])
     return np.array(rows).reshape(-1, len(targets))
 
@@ -104,17 +106,85 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
     tasks, compared = scores.common_tasks(study), scores.compared(study)
     return {
         method: [cell for task, cell in compared[method].items() if task in tasks]
-        for method in methods.in_order(compared)
+        for method in in_order(compared)
         if compared[method].keys() >= {*tasks}
-        and not (len(tasks) == 1 and method.startswith(methods.TOGETHER))
+        and not (len(tasks) == 1 and method.startswith(TOGETHER))
     }
+
+
+def runtimes(
+    results: str | Path | Study,
+    *,
+    methods: str | Sequence[str] = (),
+    targets: Sequence[float] | Array = TARGETS,
+) -> pd.DataFrame:
+    """Share of reward targets that methods reach within a budget: the ECDF of running times.
+
+    Parameters
+    ----------
+    results : str, Path or Study
+        A results folder, or a study of one.
+    methods : str or sequence of str, optional
+        Methods with their variants, such as ``"cma-es/bandit trials=200"`` or ``"CMA-ES"``, on the
+        tasks on which all of them have runs; by default all that are compared in the report and
+        have runs on all tasks. Tasks count alike.
+    targets : sequence of float, shape (n,), optional
+        As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
+        default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row at each budget at which the share rises: ``method``, ``spend`` (``trials``;
+        ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
+        trials of a run), ``budget``, and ``share`` of the pairs of run and target that are reached
+        within it. A method that reaches no target has one row, of share 0 and an infinite budget.
+
+    Raises
+    ------
+    CoarticError
+        For what is no results folder, an unknown method, targets out of bounds, and where no task
+        has a known optimum that is better than the initial solution.
+    """
+    study = results if isinstance(results, Study) else load(results)
+    shares = np.asarray(targets, dtype=np.float64)
+    if shares.ndim != 1 or not shares.size or not ((shares > 0) & (shares <= 1)).all():
+        raise CoarticError(
+            f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
+        )
+    tasks = list(scores.initial_and_optimum(study))
+    if not tasks:
+        raise CoarticError("no task has a known optimum that is better than its initial solution")
+    chosen = cells_compared(study)
+    if methods:
+        labels = scores.labels_by_task(study)
+        called = {name: name_of(name) for name in labels}
+        wanted = [methods] if isinstance(methods, str) else map(str, methods)
+        names = [id_named(name, called) for name in wanted]
+        for name in names:
+            if name not in labels:
+                raise CoarticError(unknown("method", name, labels))
+        tasks = [task for task in tasks if all(task in labels[name] for name in names)]
+        if not tasks:
+            raise CoarticError(f"no task has runs of all of {', '.join(names)}")
+        chosen = {name: [study.cells[task, labels[name][task]] for task in tasks]
+                  for name in in_order(names)}  # fmt: skip
+    rows = []
+    for name, cells in chosen.items():
+        for spend in SPENDS:
+            times = [times_of(study, cell, spend, shares) for cell in cells]
+            if all(map(len, times)):
+                budgets, reached = map(np.ndarray.tolist, running_times.share_by_budget(times))
+                steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
+                rows += [(name, spend, *step) for step in steps]
+    return pd.DataFrame(rows, columns=["method", "spend", "budget", "share"])
 
 
 @table(
     "method, reached, trials_to_quarter[], trials_to_half[], kinematics_to_half[], "
     "seconds_to_half[], half on *",
 )
-def runtimes(study: Study) -> Rows:
+def list_runtimes(study: Study) -> Rows:
     """Cost of a quarter and of half of the targets; ``half on``: median trials to the
     target halfway, by task, infinite where most runs never reach it."""
     for method, cells in cells_compared(study).items():
@@ -142,15 +212,36 @@ def runtimes(study: Study) -> Rows:
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Share of targets reached, against trials and kinematics."""
-    data = ecdf_curves(study)
+    tabled = list_runtimes(study).index
+    data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
+    shown = data.method.isin(shown_methods(study, tabled)) & (data.budget < math.inf)
+    data = data[shown & data.spend.isin(PANELS)]
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
         return None
+    steps = [
+        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, ECDF_STEPS).round()).astype(int)]
+        for _, rows in data.groupby(["method", "spend"], sort=False)
+    ]
+    data = pd.concat(steps, ignore_index=True)
     looks = looks_in(study, data.method.unique())
     size = style.TWO, 2.4 + 0.16 * -(-len(looks) // 3)
     drawing, panels = style.panels((1, len(spends)), size)
     for axes, spend in zip(panels, spends, strict=True):
-        draw_shares(axes, study, data[data.spend == spend], looks)
+        style.log_axis(axes)
+        of_spend = data[data.spend == spend]
+        positive = of_spend.budget[of_spend.budget > 0]
+        edge, most = positive.min() / 1.5, positive.max()
+        axes.axhline(50, color=style.GREY, linewidth=0.5)
+        for label, rows in of_spend.groupby("method", sort=False):
+            x = np.append(rows.budget.clip(lower=edge), most)
+            y = 100 * np.append(rows.share, rows.share.iloc[-1])
+            line: Any = {**looks[str(label)], "linewidth": 1.3}
+            (drawn,) = axes.step(x, y, where="post", **line)
+            name = name_in(study, str(label))
+            style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
+        axes.set_xlim(edge, most)
+        axes.set_ylim(-2, 102)
         axes.set_title(f"By {PANELS[spend]}")
         axes.set_xlabel(PANELS[spend])
         axes.set_ylabel("targets reached (%)")
@@ -164,59 +255,21 @@ def draw_runtimes(study: Study) -> Parts | None:
     return drawing, data, alt, study.tasks.values()
 
 
-def ecdf_curves(study: Study) -> pd.DataFrame:
-    """Share of targets reached within a budget, of the main methods.
-
-    A row at every step that is drawn: ``method``, ``spend`` (of :data:`PANELS`), ``budget``,
-    ``share``.
-    """
-    parts = [pd.DataFrame(columns=["method", "spend", "budget", "share"])]
-    for label in methods.in_order(shown_methods(study, runtimes(study).index)):
-        for spend in PANELS:
-            if (label, spend) in costs(study):
-                budget, share = running_times.share_by_budget(costs(study)[label, spend])
-                count = min(len(budget), ECDF_STEPS)
-                at = np.unique(np.linspace(0, len(budget) - 1, count).round()).astype(int)
-                rows = {"budget": budget[at], "share": share[at]}
-                parts.append(pd.DataFrame({"method": label, "spend": spend, **rows}))
-    return pd.concat(parts[1:] or parts, ignore_index=True)
-
-
-def draw_shares(
-    axes: Axes, study: Study, data: pd.DataFrame, looks: Mapping[str, style.Look]
-) -> None:
-    """A step curve for each method."""
-    style.log_axis(axes)
-    positive = data.budget[data.budget > 0]
-    least, most = positive.min(), positive.max()
-    edge = least / 1.5
-    axes.axhline(50, color=style.GREY, linewidth=0.5)
-    for label, rows in data.groupby("method", sort=False):
-        x = np.concatenate([rows.budget.clip(lower=edge), [most]])
-        y = np.concatenate([100 * rows.share, [100 * rows.share.iloc[-1]]])
-        line: Any = {**looks[str(label)], "linewidth": 1.3}
-        (drawn,) = axes.step(x, y, where="post", **line)
-        name = name_in(study, str(label))
-        style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
-    axes.set_xlim(edge, most)
-    axes.set_ylim(-2, 102)
-
-
 def what_it_costs(study: Study) -> str:
     """Trials that the learner and its rival need for half of the targets."""
-    table = runtimes(study)
-    learners = [label for label in methods.main_methods(table.index) if methods.is_learner(label)]
+    table = list_runtimes(study)
+    learners = [label for label in main_methods(table.index) if is_learner(label)]
     if not learners:
         return ""
     others = [
         label
         for label in table.index
-        if not methods.is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
+        if not is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
     ]
     # The other method that learns from the reward of trials and reaches most targets.
     rival = [table.reached[others].idxmax()] if others else []
     rows = table.loc[[learners[0], *rival]].to_dict("records")
-    names = ["the learner", *(methods.name_of(row["method"]) for row in rows[1:])]
+    names = ["the learner", *(name_of(row["method"]) for row in rows[1:])]
     halves = [row["trials_to_half"] for row in rows]
     ends = [f"{number(100 * row['reached'], 0)} %" for row in rows]
     reached = " and ".join(f"{name} reaches {end}" for name, end in zip(names, ends, strict=True))

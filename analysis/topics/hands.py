@@ -25,7 +25,7 @@ _EDGE: Any = {"edgecolor": style.INK, "linewidth": 0.4}
 
 
 @table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
-def hands(study: Study) -> Rows:
+def list_hands(study: Study) -> Rows:
     """Learned rewards by hand sequence, published and ours, where there are several."""
     for row in beside_paper(study):
         cell, name = row["cell"], task_and_condition(study, row["cell"])

@@ -35,7 +35,7 @@ CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
 
 
 @table("task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]")
-def learning(study: Study) -> Rows:
+def list_learning(study: Study) -> Rows:
     """Best reward after so many trials (mean over runs), and the trial at which half of what a run
     gains on the initial solution is there (median and middle half of the runs; ∞ without gain)."""
     for (task, label), cell in study.cells.items():
@@ -184,7 +184,7 @@ def draw_curves(
 
 def how_fast(study: Study) -> str:
     """When half of the gain of the learner that explores most is there, by task."""
-    half = learning(study).half_gain
+    half = list_learning(study).half_gain
     after = [
         f"{number(float(f'{half[row]:.2g}'))} trials on {marked(task)}"
         for name, task in study.tasks.items()

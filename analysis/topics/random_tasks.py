@@ -58,7 +58,7 @@ _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
 
 
 @table("method, instances, gap[], to_bound[], in *")
-def family_gaps(study: Study) -> Rows:
+def list_family_gaps(study: Study) -> Rows:
     """Gap to the best known reward over families with two arms, and in each family."""
     every = solved(study)
     drawn = [study.tasks[name] for name in best_of_instances(study)]
@@ -103,7 +103,7 @@ def family_cells(study: Study, family: str, labels: Iterable[str]) -> list[CellR
 
 
 @table("contrast, family, instances, gain[], better, worse")
-def exploration(study: Study) -> Rows:
+def list_exploration(study: Study) -> Rows:
     """More exploration against less, by family and over all of them.
 
     ``gain``: of rewards, as a share of the best known.
@@ -133,7 +133,7 @@ def exploration(study: Study) -> Rows:
 
 
 @table("sign, method, family, instances, there, mean[]")
-def family_signs(study: Study) -> Rows:
+def list_family_signs(study: Study) -> Rows:
     """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
     for label, sign in itertools.product((*LEARNERS, PLACEBO), THERE):
         for family, scores in each_and_all(signs_by_family(study, label, sign)):
@@ -201,7 +201,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
 def on_random_tasks(study: Study) -> str:
     """Gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study).values()
-    gaps = family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
+    gaps = list_family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
     if not len(gaps):
         return ""
     ends = [
@@ -217,7 +217,7 @@ def on_random_tasks(study: Study) -> str:
 
 def exploration_pays(study: Study) -> str:
     """Gain of each condition on the next lower one, over all families."""
-    rows = exploration(study)
+    rows = list_exploration(study)
     initial = rows.contrast.astype(str).str.endswith(INITIAL_SOLUTION)
     gains = [
         f"{row['contrast']} {interval(row, 'gain', scale=100, unit=' %')}, better on "

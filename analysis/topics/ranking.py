@@ -49,7 +49,7 @@ def main_gaps(study: Study) -> pd.DataFrame:
 
 
 @table("task, method, runs, reward, learner, p_holm, least_p")
-def against_learner(study: Study) -> Rows:
+def list_against_learner(study: Study) -> Rows:
     """Mean reward of every method and of the paper's learner that explores most, by task.
 
     Of methods that solved every run; p is corrected over the tasks of a method (Holm). A method
@@ -87,9 +87,9 @@ def against_learner(study: Study) -> Rows:
 
 
 @table("method, knows, gap[], better, worse, on *, runs")
-def ranking(study: Study) -> Rows:
+def list_ranking(study: Study) -> Rows:
     """Gap to the optimum over all tasks and on each, grouped by the use of the reward."""
-    over, tested = main_gaps(study).set_index("method"), against_learner(study)
+    over, tested = main_gaps(study).set_index("method"), list_against_learner(study)
     single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
     # Methods without a mean gap that solved every run on some task, by their gaps on the first.
     others = [
@@ -256,7 +256,7 @@ def nearest(study: Study) -> str:
 
 def from_files(study: Study) -> str:
     """Sentences about methods that are not built in, beside the learner where it ran."""
-    rows, text = ranking(study), ""
+    rows, text = list_ranking(study), ""
     rows = rows[~rows.method.map(methods.is_built_in).astype(bool)]
     learner = any(methods.is_learner(label) for _, label in study.cells)
     for row in rows.head(MOST_FOREIGN).to_dict("records"):

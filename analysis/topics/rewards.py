@@ -90,7 +90,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     "task, condition, published±, ours±, runs, difference[], margin, verdict, published_initial, "
     "ours_initial",
 )
-def published(study: Study) -> Rows:
+def list_published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
     for row in beside_paper(study):
         cell, name = row["cell"], task_and_condition(study, row["cell"])

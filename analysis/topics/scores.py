@@ -8,8 +8,8 @@ one-armed and two-armed tasks under different conditions, so that one method joi
 from __future__ import annotations
 
 import math
+from collections import Counter
 
-import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import (
@@ -29,7 +29,6 @@ from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, tally
 from coartic.method import Information
-from coartic.robot import Array
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",
@@ -110,15 +109,21 @@ def scores(study: Study) -> pd.DataFrame:
     Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
     ``reward`` (NaN for a run without a solution) and ``best_known``.
     """
-    parts = [pd.DataFrame(columns=["method", "task", "run", "seed", "reward", "best_known"])]
-    for method, cells in compared(study).items():
-        for task, cell in cells.items():
-            rewards = cell.runs.reward.where(cell.runs.status == "ok")
-            columns = {"reward": rewards.to_numpy(np.float64, na_value=np.nan)}
-            best = initial_and_optimum(study)[task][1]
-            part = cell.runs[["run", "seed"]].assign(method=method, task=task, best_known=best)
-            parts.append(part.assign(**columns))
-    return pd.concat(parts[1:] or parts, ignore_index=True)
+    columns, best = (
+        ["method", "task", "run", "seed", "reward", "best_known"],
+        initial_and_optimum(study),
+    )
+    parts = [
+        cell.runs.assign(
+            method=method,
+            task=task,
+            reward=cell.runs.reward.where(cell.runs.status == "ok").astype(float),
+            best_known=best[task][1],
+        )[columns]
+        for method, cells in compared(study).items()
+        for task, cell in cells.items()
+    ]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
 
 def is_compared(study: Study, label: str) -> bool:
@@ -148,12 +153,9 @@ def groups(study: Study) -> dict[str, str]:
 
 def best_condition(study: Study, task: str) -> str | None:
     """Label of the learner's own condition with the highest mean reward on a task."""
-    rewards = {
-        label: float(cell.rewards.mean())
-        for (name, label), cell in study.cells.items()
-        if name == task and label in LEARNERS and len(cell.good)
-    }
-    return max(rewards, key=lambda label: rewards[label]) if rewards else None
+    cells = [study.cells.get((task, label)) for label in LEARNERS]
+    solved = [cell for cell in cells if cell is not None and len(cell.good)]
+    return max(solved, key=lambda cell: cell.rewards.mean()).label if solved else None
 
 
 def cell_gap(study: Study, cell: CellRuns) -> float:
@@ -169,44 +171,27 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
-    warm = runs.warm.to_numpy(dtype=bool, na_value=False)
-    solving, all_in_all = floats(runs.solve_s), floats(runs.wall_s)
-    spent = np.where(solving > 0, solving, all_in_all)
-    times = pd.Series(spent, runs.index, dtype=runs.solve_s.dtype)
+    times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
+    warm = runs.warm.fillna(False).astype(bool)
     return times[warm] if warm.any() else times
-
-
-def median(values: pd.Series) -> float:
-    """Median of the known values; NaN where none is, as for runs that crashed."""
-    present = floats(values)
-    present = present[~np.isnan(present)]
-    return float(np.median(present)) if len(present) else math.nan
-
-
-def floats(values: pd.Series) -> Array:
-    """A column (n,), NaN where a value is missing."""
-    return np.asarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
 
 
 @table(
     "task, method, runs, solved, reward±, gap, hands, trials, forward_kinematics, solve_s, "
     "median_run",
 )
-def methods(study: Study) -> Rows:
+def list_methods(study: Study) -> Rows:
     """Every method on every task: mean reward, gap, hands and costs (medians).
 
     Within a task searches for the optimum come first, then the highest mean reward.
     ``median_run``: beginning of the id of the run whose reward is nearest the median.
     """
-    cells = [cell for cell in study.cells.values() if cell.task in one_by_one(study)]
-    places = list(study.tasks)
+    places = {task: place for place, task in enumerate(study.tasks) if task in one_by_one(study)}
+    cells = [cell for cell in study.cells.values() if cell.task in places]
     means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
-    cells.sort(
-        key=lambda c: (places.index(c.task), not is_search(c.label), -means[id(c)]),
-    )
+    cells.sort(key=lambda c: (places[c.task], not is_search(c.label), -means[id(c)]))
     for cell in cells:
         good, runs = cell.good, cell.runs
-        hands = tally(good.hands.value_counts().to_dict())
         row = {
             "task": marked(study.tasks[cell.task]),
             "method": cell.label,
@@ -215,10 +200,10 @@ def methods(study: Study) -> Rows:
             "reward": means[id(cell)] if len(good) else math.nan,
             "reward_sd": standard_deviation(cell.rewards),
             "gap": cell_gap(study, cell),
-            "hands": hands if len(good) > 1 else "".join(good.hands),
-            "trials": median(runs.trials),
-            "forward_kinematics": median(runs.forward_kinematics),
-            "solve_s": median(solve_times(good)),
+            "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
+            "trials": runs.trials.astype(float).median(),
+            "forward_kinematics": runs.forward_kinematics.astype(float).median(),
+            "solve_s": solve_times(good).astype(float).median(),
         }
         if len(good):
             row["median_run"] = str(good.run_id.iloc[typical_run(cell)])[:SHORT_ID]

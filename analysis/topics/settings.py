@@ -16,7 +16,7 @@ MOST_TASKS = 4
 
 
 @table("task, method, runs, solved, reward[], behind, p_holm, least_p")
-def settings(study: Study) -> Rows:
+def list_settings(study: Study) -> Rows:
     """Mean reward of each setting, the best of each task first.
 
     ``behind``: ticks behind the best of its task; ``p_holm``: of the two-tailed bootstrap test of
@@ -46,7 +46,7 @@ def settings(study: Study) -> Rows:
 
 def best_settings(study: Study) -> str:
     """The best setting of each task, and whether it is surely better than the next."""
-    rows, texts = settings(study), []
+    rows, texts = list_settings(study), []
     for task, of_task in rows.groupby("task", sort=False):
         first, *others = of_task.to_dict("records")
         best = name_in(study, first["method"])

@@ -23,7 +23,7 @@ from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
 @table("task, arms, base, initial, condition, learned[], published±, optimum, bound")
-def tasks(study: Study) -> Rows:
+def list_tasks(study: Study) -> Rows:
     """One row a task: initial, learned, published and best possible reward."""
     for name in sorted(one_by_one(study), key=list(study.tasks).index):
         task, label = study.tasks[name], best_condition(study, name)
