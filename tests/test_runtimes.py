@@ -86,5 +86,5 @@ def test_what_cannot_be_shown(study, tmp_path):
         runtimes(study, methods=[5])
     with pytest.raises(CoarticError, match="no task has a known optimum"):
         runtimes(MadeUp(study, optima={}))
-    with pytest.raises(CoarticError, match="does not exist"):
+    with pytest.raises(CoarticError, match="not a results folder"):
         runtimes(tmp_path / "nowhere")
