@@ -148,7 +148,6 @@ def test_the_package_imports_what_is_asked_for():
     [
         ("--help", "reproduce", {"numpy", "coartic.baselines", "coartic.analysis"}),
         ("list", "dual-process/", {"scipy"}),
-        ("cite", "@article", {"scipy"}),
     ],
 )
 def test_names_need_no_compiler(command, said, unneeded):

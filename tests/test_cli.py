@@ -174,7 +174,6 @@ coartic.__main__.main()
     ("moment", "name", "times"),
     [
         ("300", "SIGINT", 2),
-        ("1500", "SIGINT", 3),
         ("2500", "SIGTERM", 2),
         ("1800", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),

@@ -57,9 +57,6 @@ def test_what_plans_stores_reads_and_shows_runs_does_not_count():
 @pytest.mark.parametrize(
     ("place", "methods"),
     [
-        ("analysis/words.py", set()),
-        ("cli/__init__.py", set()),
-        ("play/page.py", set()),
         ("__init__.py", set()),
         ("baselines/evolution.py", {"cma_es"}),
         ("baselines/trajectory_problem.py", PLANNERS),

@@ -239,9 +239,7 @@ def test_a_goal_is_dragged_by_a_finger(opened):
     ("width", "scheme", "state"),
     [
         (1280, "light", ""),
-        (768, "dark", "who=plan"),
-        (390, "dark", "preset=3"),
-        (390, "light", "preset=4&who=you"),
+        (390, "dark", "preset=4&who=you"),
     ],
 )
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened, width, scheme, state):

@@ -32,7 +32,7 @@ def study(protocols, monkeypatch):
 
 def test_tables_and_figure_of_some_of_the_tasks(study):
     raw = [pd.read_csv(FOLDER / f"{name}.csv") for name in ("changes", "starts", "steps")]
-    few = raw[0].task.drop_duplicates()[:12]
+    few = raw[0].task.drop_duplicates()[:6]
     tables = study.measure(*(table[table.task.isin(few)] for table in raw))
     shares = tables["results"].share_1
     assert shares["change 0.5 planner, all goals"] == 1
@@ -104,8 +104,7 @@ def postures(task, movements):
     return np.array(reached)
 
 
-@pytest.mark.parametrize("name", ["one-armed/v1/i000", "one-armed/v1/i001", "one-armed/v1/i002",
-                                  "two-armed/v1/i000", "two-armed/v1/i001"])  # fmt: skip
+@pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
 def test_share_at_once_by_other_code(protocols, monkeypatch, name):
     monkeypatch.setattr(protocols, "AFTER", [1, 300])
     monkeypatch.setattr(protocols, "EVOLVED", 2)
