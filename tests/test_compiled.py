@@ -84,11 +84,12 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
 LANES = """
 from coartic import Robot
 from coartic.motion.compiled import entry
-from coartic.motion.lanes import lanes_for, near
+from coartic.motion.lanes import lanes_for, place
 
 @entry
 def length(at):
-    return at[0]["length"][:, 0].sum() if near(at[0], 1) else -1.0
+    place(at[0], 1, True)
+    return at[0]["x"][-1, 0]
 
 def reach_of(links):
     at = lanes_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at

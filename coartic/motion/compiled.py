@@ -51,7 +51,7 @@ def entry(function: F) -> F:
 
 
 def inner(function: F) -> F:
-    """A kernel that only other kernels call."""
+    """A kernel that only other kernels call; a division by 0 gives infinity or NaN."""
     return cast(F, Kernel(function, "inner"))
 
 
@@ -59,11 +59,6 @@ def inlined(function: F) -> F:
     """As :func:`inner`, but a part of its callers, whose error model it has: passing whole tables
     would cost, and loops over a shape are unrolled where it is known."""
     return cast(F, Kernel(function, "inlined"))
-
-
-def lanewise(function: F) -> F:
-    """As :func:`inner`, for a loop over lanes: a division by 0 gives infinity or NaN."""
-    return cast(F, Kernel(function, "lanewise"))
 
 
 def scalar(function: F) -> F:

@@ -119,11 +119,9 @@ def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
         case "entry":
             return keep_on_disk(njit(**_OPTIONS)(function), function)
         case "inner":
-            return for_any_number(njit(**_INNER)(function))
+            return for_any_number(njit(**_INNER, error_model="numpy")(function))
         case "inlined":
             return njit(**_INNER, inline="always")(function)
-        case "lanewise":
-            return for_any_number(njit(**_INNER, error_model="numpy")(function))
         case "scalar":
             return njit(nogil=True)(function)
     made = intrinsic(function)

@@ -13,14 +13,13 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.compiled import entry, inlined, inner, joint_lever, lanewise
+from coartic.motion.compiled import entry, inlined, inner, joint_lever
 from coartic.motion.lanes import (
     GOING,
     board,
     fill,
     lanes_for,
     leave,
-    near,
     padded_count,
     place,
     runs_for,
@@ -50,7 +49,7 @@ class Correction(NamedTuple):
         return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
 
 
-@lanewise
+@inner
 def find_fates(at: Any, count: int, square: float) -> None:
     """Set the fate of lanes whose hand is near enough, or nowhere."""
     tip = len(at.length)
@@ -64,7 +63,8 @@ def find_fates(at: Any, count: int, square: float) -> None:
 
 @inlined
 def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tuple[int, bool]:
-    """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
+    """q += α Jᵀ e in every lane that goes on; how many have ended, and whether all angles
+    are in the range of the fast cosine."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -100,8 +100,7 @@ def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
     at, model = lanes.at[0], setup.model
     gain, free_x, free_y = model.gain, setup.free_x, setup.free_y
     square = largest_square(model.correction_tolerance)
-    is_near = near(at, count)
-    iteration = 0
+    is_near, iteration = False, 0
     while count > 0:
         place(at, count, is_near)
         find_fates(at, count, square)

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.motion.compiled import chain_by, inlined, inner, lanewise, record_type
-from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
+from coartic.motion.compiled import chain_by, inlined, inner, record_type
+from coartic.motion.trigonometry import cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, Arm, Robot
 
 LANES = 72
@@ -172,14 +172,6 @@ def leave(at: Any, lane: int, q: Any) -> None:
         q[at.first[lane] + k] = at.q[BASE_DOF + k, lane]
 
 
-@inner
-def copy_lanes(source: Any, destination: Any) -> None:
-    """Copy rows of every lane."""
-    for j in range(len(source)):
-        for i in range(LANES):
-            destination[j, i] = source[j, i]
-
-
 @inlined
 def fill(rows: Any, lane: int, last: int) -> None:
     """Move rows of the last lane into one that has ended."""
@@ -197,15 +189,6 @@ def padded_count(count: int) -> int:
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
-@lanewise
-def near(at: Any, count: int) -> bool:
-    """Whether a bound shows that all angles are in the range of the fast cosine."""
-    far = 0
-    for i in range(padded_count(count)):
-        far += 0 if winding(at.q, i) < LARGEST else 1
-    return far == 0
-
-
 @inlined
 def winding(q: Any, lane: int) -> float:
     """Bound on the angle of every link of an arm, rad: all its joints' together."""
@@ -218,7 +201,7 @@ def winding(q: Any, lane: int) -> float:
 def chains_by(cos: Any, sin: Any) -> Any:
     """Forward kinematics of every lane, by these functions."""
 
-    @lanewise
+    @inner
     def chains(at: Any, count: int) -> None:
         for i in range(count):
             arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
@@ -233,7 +216,10 @@ _far_chains = chains_by(cosine, sine)
 
 @inner
 def place(at: Any, count: int, is_near: bool) -> None:
-    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
+    """Forward kinematics of every lane: fill ``x`` and ``y``.
+
+    ``is_near``: bounds (:func:`winding`) show that all angles are in the range of the fast cosine.
+    """
     if is_near:
         _near_chains(at, padded_count(count))
     else:

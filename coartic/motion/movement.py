@@ -26,10 +26,9 @@ import numpy as np
 from coartic.inputs import real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
-from coartic.motion.compiled import entry, fill_row, inner, lanewise
+from coartic.motion.compiled import entry, fill_row, inner
 from coartic.motion.lanes import (
     GOING,
-    copy_lanes,
     depart,
     fill,
     lanes_for,
@@ -81,7 +80,7 @@ def largest_square(length: float) -> float:
     return square
 
 
-@lanewise
+@inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
     """Number of steps during which the hand provably stays out of a disc.
 
@@ -102,11 +101,11 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
     return steps if (gap > _NOTHING) & (root < _OVERFLOW) else _NOTHING
 
 
-@lanewise
+@inner
 def set_off(at: Any, count: int, step: float) -> bool:
     """Set rates, bounds and number of steps of every lane.
 
-    Returns True if all angles stay in the range of the fast cosine (:func:`near`).
+    Returns True if all angles stay in the range of the fast cosine.
     """
     far = 0
     for i in range(padded_count(count)):
@@ -136,7 +135,7 @@ def set_off(at: Any, count: int, step: float) -> bool:
     return far == 0
 
 
-@lanewise
+@inner
 def place_between(at: Any, count: int, step: float) -> None:
     """The point at which each lane is now."""
     for i in range(padded_count(count)):
@@ -147,7 +146,7 @@ def place_between(at: Any, count: int, step: float) -> None:
             at.q[j, i] = end if at.step[i] == at.last[i] else between
 
 
-@lanewise
+@inner
 def look(
     at: Any,
     count: int,
@@ -206,7 +205,8 @@ def move_lanes(lanes: Any, count: int, stop_on_arrival: bool, setup: Any, runs: 
     hit, arrived = largest_square(radius), largest_square(near)
     is_near = set_off(at, count, step)
     if stop_on_arrival:
-        copy_lanes(at.target, at.q)
+        for j in range(len(at.q)):
+            fill_row(at.q[j], at.target[j])
         place(at, count, is_near)
         fill_row(at.end[0], at.x[-1])
         fill_row(at.end[1], at.y[-1])
