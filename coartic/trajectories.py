@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.errors import CoarticError, SolutionError
+from coartic.errors import SolutionError
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, hands_of
-from coartic.text import short_repr, unknown
+from coartic.text import short_repr
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -173,76 +173,6 @@ class Trajectory:
         title = f"{self.task.name}, {self.execution.hands}"
         panel = Panel(title, self.task, self.hands, self.configurations, self.hits)
         write_film([panel], Path(path), width=width, replace=replace)
-
-    def compare(
-        self, *others: str | Trajectory, runs: int = 10, trials: int = 10_000
-    ) -> pd.DataFrame:
-        """The movement beside others on the same task.
-
-        Parameters
-        ----------
-        *others : str or Trajectory
-            ``"EC1"`` to ``"EC4"``: the learner under this condition; ``"corrective process"``: the
-            corrective process alone with the hands of this movement; ``"optimum"``: the best known
-            reward; or another trajectory of the task.
-        runs : int
-            Runs of the learner, with seeds from 0.
-        trials : int
-            Trials of each run.
-
-        All of them move by the paper's constants.
-
-        Returns
-        -------
-        DataFrame
-            A row for this movement and for each other one: ``reward`` (of the learner the mean
-            learned reward), ``this_is_better_by`` (ticks by which this movement is better),
-            ``hands`` (of the learner those of its best run) and ``runs``.
-
-        Raises
-        ------
-        CoarticError
-            Another name, or no optimum of the task is known.
-        """
-        import pandas as pd
-
-        from coartic.learner.conditions import CONDITIONS
-        from coartic.learner.learning import learn_many
-        from coartic.motion.initial import corrective_trial
-        from coartic.tasks.optima import best_shipped
-
-        rows: dict[str, tuple[float | None, str, int]] = {
-            "this movement": (self.reward, self.execution.hands, 1)
-        }
-        for other in others:
-            if isinstance(other, Trajectory):
-                rows[f"movement {len(rows)}"] = other.reward, other.execution.hands, 1
-            elif other in CONDITIONS:
-                learned = learn_many(self.task, CONDITIONS[other], seeds=range(runs), trials=trials)
-                solved = {run.reward: run for run in learned if run.reward is not None}
-                if len(solved) == 0:
-                    raise CoarticError(f"no run of {other} completed task {self.task.name!r}")
-                best = solved[max(solved)]
-                mean = float(np.mean([run.reward for run in learned if run.reward is not None]))
-                rows[other] = mean, best.execute().hands, runs
-            elif other == "corrective process":
-                alone = corrective_trial(self.task, self.execution.hands)
-                rows[other] = alone.reward, alone.hands, 1
-            elif other == "optimum":
-                known = best_shipped(self.task)
-                if known is None:
-                    raise CoarticError(
-                        f"no optimum of task {self.task.name!r} is known; search for it: "
-                        "coartic run comparison --tasks FILE --methods optimum/branch-and-bound"
-                    )
-                which = "optimum" if known.proven else "best known"
-                rows[which] = known.reward, known.hands, 1
-            else:
-                names = [*CONDITIONS, "corrective process", "optimum"]
-                raise CoarticError(unknown("movement", str(other), names))
-        frame = pd.DataFrame.from_dict(rows, orient="index", columns=["reward", "hands", "runs"])
-        frame.insert(1, "this_is_better_by", self.reward - frame.reward)
-        return frame
 
 
 def trajectory(
