@@ -13,7 +13,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.topics import (
     coarticulation,
     costs,
-    hands,
     learning,
     random_tasks,
     ranking,
@@ -136,10 +135,9 @@ SECTIONS = (
         "hands",
         "Hands",
         "Which hands are chosen?",
-        table=hands.list_hands,
+        table=rewards.list_hands,
         caption="Learned rewards by hand sequence, published and ours (ticks)",
-        figure=hands.draw_recruitment,
-        sentence=hands.changed_hands,
+        sentence=rewards.changed_hands,
     ),
     Section(
         "learning",

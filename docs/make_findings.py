@@ -30,7 +30,7 @@ ANALYSIS = DOCS.parent / "analysis"
 KEPT = {
     "comparison": (
         "claims contexts hands learning methods runtimes published ranking signatures tasks",
-        "postures published ranking runtimes recruitment learning-curves",
+        "postures published ranking runtimes learning-curves",
     ),
     "ablations": ("methods signatures claims", ""),
     "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),

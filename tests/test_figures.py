@@ -10,7 +10,6 @@ from coartic import drawing, load_task
 from coartic.analysis.figures.style import looks
 from coartic.analysis.methods import KNOWN_METHODS, name_of
 from coartic.analysis.sections import FIGURES
-from coartic.analysis.topics.hands import hand_shares
 from coartic.analysis.topics.learning import learning_curves
 from coartic.benchmarks.suites import load_suite, select_cells
 from tests.support.suites import KNOWN, ROOT, run_and_write
@@ -42,7 +41,7 @@ def figures(study):
 
 
 def test_every_figure_of_the_papers_cells(figures):
-    assert {"tasks", "recruitment", "postures"} <= set(figures)
+    assert {"tasks", "postures"} <= set(figures)
     assert "published" not in figures  # printed means are of 10,000 trials, these runs of 120
     for name, plot in figures.items():
         assert plot.id == name
@@ -73,16 +72,6 @@ def test_learning_curves_against_a_loop(study):
             last = np.concatenate([run[max(row.trial - 100, 0) : row.trial] for run in runs])
             assert row.trials == pytest.approx(np.nanmean(last))
     assert spread > 100
-
-
-def test_shares_of_hand_sequences(study):
-    data = hand_shares(study)
-    for (task, label), rows in data[data.source == "ours"].groupby(["task", "method"]):
-        counts = study.cells[task, label].good.hands.value_counts()
-        assert dict(zip(rows.hands, rows.runs, strict=True)) == counts.to_dict()
-    assert data.groupby(["task", "method", "source"]).share.sum().to_numpy() == pytest.approx(1)
-    paper = data[(data.source == "published") & (data.method == "dual-process/EC2")]
-    assert dict(zip(paper.hands, paper.runs, strict=True)) == {"RRLR": 11, "RRRR": 9}
 
 
 def test_published_differences(tmp_path):

@@ -67,23 +67,10 @@ def test_shares_are_those_of_all_pairs(study, method, targets):
         assert runtimes(study).equals(curves)
 
 
-def test_methods_that_are_named_share_their_tasks(study):
-    """The learner has runs on one of the two tasks alone."""
-    curves = runtimes(study, methods=["own", LEARNER], targets=[0.5, 1.0])
-    for method, steps in curves[curves.spend == "trials"].groupby("method"):
-        assert steps.share.max() == share_by_hand([TWO], method, [0.5, 1.0], 5)
-    assert {*curves.method} == {"own", LEARNER}
-    assert {*runtimes(study, methods="null-space control, current goal").method} == {PLAN}
-
-
 def test_what_cannot_be_shown(study, tmp_path):
     for targets in ([], [0.0], [0.5, 1.01], [math.nan], [[0.5]], None):
         with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
             runtimes(study, targets=targets)
-    with pytest.raises(CoarticError, match="unknown method 'owm'; did you mean 'own'"):
-        runtimes(study, methods=["owm"])
-    with pytest.raises(CoarticError, match="unknown method '5'"):
-        runtimes(study, methods=[5])
     with pytest.raises(CoarticError, match="no task has a known optimum"):
         runtimes(MadeUp(study, optima={}))
     with pytest.raises(CoarticError, match="not a results folder"):

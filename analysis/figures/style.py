@@ -193,12 +193,6 @@ def legend_line(label: str, **line: Any) -> Line2D:
     return Line2D([], [], label=label, **line)
 
 
-def on(color: str) -> str:
-    """Colour of text on a filled area; neither is the ink, which changes with the page."""
-    red, green, blue = (int(color[k : k + 2], 16) / 255 for k in (1, 3, 5))
-    return "#111111" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.42 else "#fdfdfd"
-
-
 def log_axis(axes: Axes) -> None:
     """A logarithmic x axis with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1."""
     axes.set_xscale("log")

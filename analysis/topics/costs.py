@@ -27,7 +27,6 @@ from coartic.analysis.words import interval, number
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.robot import Array
-from coartic.text import id_named, unknown
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
@@ -113,21 +112,16 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
 
 
 def runtimes(
-    results: str | Path | Study,
-    *,
-    methods: str | Sequence[str] = (),
-    targets: Sequence[float] | Array = TARGETS,
+    results: str | Path | Study, *, targets: Sequence[float] | Array = TARGETS
 ) -> pd.DataFrame:
     """Share of reward targets that methods reach within a budget: the ECDF of running times.
+
+    Of the methods that the report compares and that have runs on all tasks; tasks count alike.
 
     Parameters
     ----------
     results : str, Path or Study
         A results folder, or a study of one.
-    methods : str or sequence of str, optional
-        Methods with their variants, such as ``"cma-es/bandit trials=200"`` or ``"CMA-ES"``, on the
-        tasks on which all of them have runs; by default all that are compared in the report and
-        have runs on all tasks. Tasks count alike.
     targets : sequence of float, shape (n,), optional
         As shares of the way from the initial solution to the optimum, above 0 and up to 1; by
         default 0.05, 0.1, ..., 1. Rewards are whole, so a target is the next whole tick.
@@ -143,8 +137,8 @@ def runtimes(
     Raises
     ------
     CoarticError
-        For what is no results folder, an unknown method, targets out of bounds, and where no task
-        has a known optimum that is better than the initial solution.
+        For what is no results folder, targets out of bounds, and where no task has a known optimum
+        that is better than the initial solution.
     """
     study = results if isinstance(results, Study) else load(results)
     shares = np.asarray(targets, dtype=np.float64)
@@ -152,25 +146,10 @@ def runtimes(
         raise CoarticError(
             f"targets are {brief_value(targets)}: needed are numbers above 0 and up to 1"
         )
-    tasks = list(scores.initial_and_optimum(study))
-    if not tasks:
+    if not scores.initial_and_optimum(study):
         raise CoarticError("no task has a known optimum that is better than its initial solution")
-    chosen = cells_compared(study)
-    if methods:
-        labels = scores.labels_by_task(study)
-        called = {name: name_of(name) for name in labels}
-        wanted = [methods] if isinstance(methods, str) else map(str, methods)
-        names = [id_named(name, called) for name in wanted]
-        for name in names:
-            if name not in labels:
-                raise CoarticError(unknown("method", name, labels))
-        tasks = [task for task in tasks if all(task in labels[name] for name in names)]
-        if not tasks:
-            raise CoarticError(f"no task has runs of all of {', '.join(names)}")
-        chosen = {name: [study.cells[task, labels[name][task]] for task in tasks]
-                  for name in in_order(names)}  # fmt: skip
     rows = []
-    for name, cells in chosen.items():
+    for name, cells in cells_compared(study).items():
         for spend in SPENDS:
             times = [times_of(study, cell, spend, shares) for cell in cells]
             if all(map(len, times)):

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
-from coartic import Task
 from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
@@ -22,7 +19,6 @@ from coartic.analysis.topics import scores
 from coartic.analysis.topics.costs import improvements
 from coartic.analysis.topics.ranking import optimum_in_words
 from coartic.analysis.words import marked, number
-from coartic.robot import Array
 
 BUDGETS = (100, 1_000, 10_000)
 """Trials after which the table reads rewards."""
@@ -39,31 +35,29 @@ def list_learning(study: Study) -> Rows:
     """Best reward after so many trials (mean over runs), and the trial at which half of what a run
     gains on the initial solution is there (median and middle half of the runs; ∞ without gain)."""
     for (task, label), cell in study.cells.items():
-        runs = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
-        learned = [run for run in runs if run is not None]
+        learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
+        runs = [run for run in learned if run is not None]
         if task not in one_by_one(study) or not scores.is_compared(study, label):
             continue
-        if not len(runs) == len(learned) == len(cell.good) > 0:
+        if not len(learned) == len(runs) == len(cell.good) > 0:
             continue
         if cell.runs.trials.min() < BUDGETS[0]:  # a try or two, no learning
             continue
-        initial, halves = initial_reward(study.tasks[task]), []
+        initial = initial_reward(study.tasks[task])
         row: Row = {
             "task": marked(study.tasks[task]),
             "method": label,
             "runs": len(runs),
             "initial": initial,
         }
-        for budget in BUDGETS:
-            if budget <= cell.runs.trials.min():
-                best = [
-                    rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in learned
-                ]
-                mean = np.mean(best)
-                row[f"after_{budget}"] = mean if np.isfinite(mean) else math.nan
-        for trials, rewards in learned:
-            gained = trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
-            halves.append(gained[0] if len(gained) else math.inf)
+        for budget in (each for each in BUDGETS if each <= cell.runs.trials.min()):
+            best = [rewards[trials <= budget].max(initial=-np.inf) for trials, rewards in runs]
+            row[f"after_{budget}"] = np.mean(best) if np.isfinite(best).all() else math.nan
+        gained = [
+            trials[(rewards >= (initial + rewards[-1]) / 2) & (rewards[-1] > initial)]
+            for trials, rewards in runs
+        ]
+        halves = [trials[0] if len(trials) else math.inf for trials in gained]
         quartiles = np.quantile(halves, [0.5, 0.25, 0.75], method="inverted_cdf").tolist()
         row |= dict(zip(("half_gain", "half_gain_low", "half_gain_high"), quartiles, strict=True))
         yield f"{task} {label}", row | runs_of(cell)
@@ -86,15 +80,35 @@ def draw_learning_curves(study: Study) -> Parts | None:
     rows, columns = style.grid(len(tasks))
     size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
     drawing, panels = style.panels((rows, columns), size, len(tasks))
+    looks = looks_in(study, labels)
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
-        draw_curves(axes, study, task, data[data.task == task.name], labels)
+        of_task = data[data.task == task.name]
+        for label, curve in of_task.groupby("method", sort=False):
+            look = looks[str(label)]
+            band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
+            axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
+            axes.plot(curve.trial, curve.best, linewidth=1.3, **look)
+            axes.plot(curve.trial, curve.trials, linewidth=0.6, **look)
+        floor, top = of_task.best.min(), of_task.best_high.max()
+        initial, optimum = initial_reward(task), study.optima.get(task.name)
+        if not math.isnan(initial):
+            axes.axhline(initial, **style.INITIAL)
+            floor, top = initial, max(top, initial)
+        if optimum is not None:
+            axes.axhline(optimum.reward, **style.OPTIMUM)
+            top = max(top, optimum.reward)
+        reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
+        lowest = np.fmax(of_task.trials.min(), floor - 0.9 * reach)
+        axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
+        style.log_axis(axes)
+        axes.set_xlim(1, max(2, of_task.trial.max()))
         axes.set_title(marked(task))
         axes.set_ylabel("reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
     style.letters(panels)
     handles = [
         style.legend_line(name_in(study, label), linewidth=1.3, **look)
-        for label, look in looks_in(study, labels).items()
+        for label, look in looks.items()
     ]
     handles += [style.legend_line("initial solution", **style.INITIAL)]
     handles += [style.legend_line(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
@@ -128,58 +142,25 @@ def learning_curves(study: Study) -> pd.DataFrame:
     for task, label in shown:
         good = study.cells[task, label].good
         runs = [trials_of[run_id] for run_id in map(str, good.run_id) if run_id in trials_of]
-        if runs:
-            named = {"task": task, "method": label, "runs": len(runs)}
-            curve = learning_curve(runs)
-            if sum(int(np.isnan(run).sum()) for run in runs) > good.failed_trials.sum():
-                # More trials were left out than failed.
-                curve["trials"] = np.full(len(curve["trial"]), math.nan)
-            curves.append(pd.DataFrame(named | curve))
+        if not runs:
+            continue
+        length = min(map(len, runs))
+        rewards = np.array([run[:length] for run in runs])
+        at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
+        # Until every run has a solution (NaN before) there is no mean of them.
+        best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
+        low, high = np.quantile(best, [0.25, 0.75], axis=0)
+        sums, counts = (
+            pd.Series(values).rolling(WINDOW, min_periods=1).sum()
+            for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
+        )
+        trials = (sums / counts).to_numpy()[at - 1]
+        if sum(int(np.isnan(run).sum()) for run in runs) > good.failed_trials.sum():
+            trials = np.full(len(at), math.nan)  # more trials were left out than failed
+        curve = {"trial": at, "best": best.mean(axis=0), "best_low": low, "best_high": high}
+        named = {"task": task, "method": label, "runs": len(runs)}
+        curves.append(pd.DataFrame(named | curve | {"trials": trials}))
     return pd.concat(curves[1:] or curves, ignore_index=True)
-
-
-def learning_curve(runs: Sequence[Array]) -> dict[str, Array]:
-    """Both curves at chosen trials, from the reward of every trial of runs, NaN where it failed."""
-    length = min(map(len, runs))
-    rewards = np.array([run[:length] for run in runs])
-    at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
-    # Until every run has a solution (NaN before) there is no mean of them.
-    best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
-    low, high = np.quantile(best, [0.25, 0.75], axis=0)
-    sums, counts = (
-        pd.Series(values).rolling(WINDOW, min_periods=1).sum()
-        for values in (np.nansum(rewards, axis=0), (~np.isnan(rewards)).sum(axis=0))
-    )
-    trials = (sums / counts).to_numpy()[at - 1]
-    mean = best.mean(axis=0)
-    return {"trial": at, "best": mean, "best_low": low, "best_high": high, "trials": trials}
-
-
-def draw_curves(
-    axes: Axes, study: Study, task: Task, data: pd.DataFrame, labels: Sequence[str]
-) -> None:
-    """Curves of the methods on a task, between its initial solution and its optimum."""
-    look_of = looks_in(study, labels)
-    for label, rows in data.groupby("method", sort=False):
-        look = look_of[str(label)]
-        band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
-        axes.fill_between(rows.trial, rows.best_low, rows.best_high, **band)
-        axes.plot(rows.trial, rows.best, linewidth=1.3, **look)
-        axes.plot(rows.trial, rows.trials, linewidth=0.6, **look)
-    floor, top = data.best.min(), data.best_high.max()
-    initial = initial_reward(task)
-    if not math.isnan(initial):
-        axes.axhline(initial, **style.INITIAL)
-        floor, top = initial, max(top, initial)
-    optimum = study.optima.get(task.name)
-    if optimum is not None:
-        axes.axhline(optimum.reward, **style.OPTIMUM)
-        top = max(top, optimum.reward)
-    reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
-    lowest = np.fmax(data.trials.min(), floor - 0.9 * reach)
-    axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
-    style.log_axis(axes)
-    axes.set_xlim(1, max(2, data.trial.max()))
 
 
 def how_fast(study: Study) -> str:

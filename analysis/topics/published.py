@@ -77,23 +77,19 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
     }
     if not entries:
         return None
-    together, sequences = None, {}
+    summaries: dict[str | None, Summary] = {}
     for (kind, hands), entry in entries.items():
         if kind == "reward":
             count = entries.get(("count", hands), {})
-            printed = RUNS if hands is None else count.get("value")
-            summary = Summary(
+            summaries[hands] = Summary(
                 entry["value"],
                 entries.get(("sd", hands), {}).get("value"),
                 count.get("value", RUNS),
-                printed,
+                RUNS if hands is None else count.get("value"),
                 derived_runs="difference_of" in count,
             )
-            if hands is None:
-                together = summary
-            else:
-                sequences[hands] = summary
-    return PublishedCell(together or pooled([*sequences.values()]), sequences)
+    sequences = {hands: summary for hands, summary in summaries.items() if hands is not None}
+    return PublishedCell(summaries.get(None) or pooled([*sequences.values()]), sequences)
 
 
 def pooled(parts: list[Summary]) -> Summary | None:

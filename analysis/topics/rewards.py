@@ -1,4 +1,4 @@
-"""Learned rewards beside those that the paper prints."""
+"""Learned rewards and hands beside those that the paper prints."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
@@ -15,14 +14,15 @@ from coartic.analysis.methods import LEARNER, LEARNERS, name_of
 from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached
-from coartic.analysis.table import Row, Rows, runs_of, table
+from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.topics.published import (
     RUNS,
     PublishedCell,
     published_alone,
     published_cell,
 )
-from coartic.analysis.words import interval, marked
+from coartic.analysis.topics.scores import best_condition
+from coartic.analysis.words import interval, listed, marked
 from coartic.learner.learning import TRIALS
 
 _MARKS = {
@@ -65,6 +65,8 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
             summary = printed.get(name) if name else paper.summary
             row: dict[str, Any] = {
                 "cell": cell,
+                "task": marked(study.tasks[cell.task]),
+                "condition": cell.label.removeprefix(LEARNER),
                 "hands": name,
                 "published": summary.mean if summary else None,
                 "published_sd": summary.sd if summary else None,
@@ -93,20 +95,25 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
 def list_published(study: Study) -> Rows:
     """Learned rewards of the paper's cells beside ours, and whether they are equivalent."""
     for row in beside_paper(study):
-        cell, name = row["cell"], task_and_condition(study, row["cell"])
+        cell = row["cell"]
         if not row["hands"]:
             printed = published_alone(cell.task, "initial hands")
             initial = {
                 "published_initial": printed and printed.mean,
                 "ours_initial": cell.good.initial_reward.dropna().mean(),
             }
-            yield f"{cell.task} {name['condition']}", row | name | initial | runs_of(cell)
+            yield f"{cell.task} {row['condition']}", row | initial | runs_of(cell)
 
 
-def task_and_condition(study: Study, cell: CellRuns) -> Row:
-    """The task of a cell by its title, and its condition."""
-    task = study.tasks[cell.task]
-    return {"task": marked(task), "condition": cell.label.removeprefix(LEARNER)}
+@table("task, condition, hands, published_runs, runs, of_runs, published±, ours±, difference[]")
+def list_hands(study: Study) -> Rows:
+    """Learned rewards by hand sequence, published and ours, where there are several."""
+    for row in beside_paper(study):
+        good = row["cell"].good
+        if row["hands"]:
+            ids = " ".join(map(str, good.run_id[good.hands == row["hands"]]))
+            name = f"{row['cell'].task} {row['condition']} {row['hands']}"
+            yield name, row | {"run_ids": ids}
 
 
 @figure(
@@ -120,33 +127,38 @@ def task_and_condition(study: Study, cell: CellRuns) -> Row:
 )
 def draw_published(study: Study) -> Parts | None:
     """Difference of every mean reward to the printed one, with interval and margin."""
-    shown: list[Row] = []
+    shown = []
     for pair in beside_paper(study):
         cell, paper = pair["cell"], published_of(pair["cell"])
         comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
         several = paper is not None and len(paper.sequences) > 1
         if comparable and pair["published"] is not None and (several or not pair["hands"]):
             shown.append(pair | {"task": cell.task, "method": cell.label})
+    if not shown:
+        return None
     order = list(study.tasks)
     shown.sort(key=lambda row: (order.index(row["task"]), LEARNERS.index(row["method"])))
     data = pd.DataFrame(shown)
-    if not len(data):
-        return None
     drawing, (axes,) = style.panels((1, 1), (style.ONE, 0.85 + 0.185 * len(data)))
     tasks = {name: task for name, task in study.tasks.items() if (data.task == name).any()}
-    rows = data.to_dict("records")
-    names = []
-    for row in rows:
+    names, words = [], []
+    for place, row in enumerate(data.to_dict("records")):
+        printed, margin, y = row["published_runs"], row["margin"], -place
+        name = f"{marked(tasks[row['task']])}, {name_of(row['method'])}{'*' * row['pooled']}"
         if row["hands"]:
-            runs = row["published_runs"]
-            printed = "" if runs is None or math.isnan(runs) else f"; {runs:.0f}"
-            names.append(f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{printed})")
-        else:
-            pooled = "*" if row["pooled"] else ""
-            name = marked(tasks[row["task"]])
-            names.append(f"{name}, {name_of(row['method'])}{pooled}")
-    for place, row in enumerate(rows):
-        draw_row(axes, -place, row)
+            of_printed = "" if printed is None or math.isnan(printed) else f"; {printed:.0f}"
+            name = f"↳ {row['hands']} ({row['runs']}/{row['of_runs']}{of_printed})"
+        names.append(name)
+        axes.barh(y, 2 * margin, 0.8, left=-margin, color=style.GREY, alpha=0.2)
+        if not row["runs"]:
+            axes.text(1.3 * margin, y, "never found here", va="center", color=style.GREY)
+            continue
+        color, marker, face = _MARKS[row["verdict"] if row["runs"] > 1 else ""]
+        if not math.isnan(row["difference_low"]):
+            axes.plot([row["difference_low"], row["difference_high"]], [y, y], color=color, lw=1.0)
+        axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
+        who = f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
+        words.append(f"{who}: {row['difference']:+.1f}")
     axes.axvline(0, color=style.INK, linewidth=0.6)
     style.name_rows(axes, names)
     axes.spines["left"].set_visible(False)
@@ -155,27 +167,8 @@ def draw_published(study: Study) -> Parts | None:
     reach = np.nanmax(np.abs(data.reindex(columns=ends).to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
     axes.set_xlabel("ours − published (ticks)")
-    words = "; ".join(
-        f"{row['task']}, {name_of(row['method'])} {row['hands']}".strip()
-        + f": {row['difference']:+.1f}"
-        for row in rows
-        if row["runs"]
-    )
-    alt = f"Differences of our mean rewards to the published ones, with intervals. {words}."
-    return drawing, data, alt, tasks.values()
-
-
-def draw_row(axes: Axes, y: float, row: Any) -> None:
-    """Margin, interval and difference of one comparison."""
-    axes.barh(y, 2 * row["margin"], 0.8, left=-row["margin"], color=style.GREY, alpha=0.2)
-    color, marker, face = _MARKS[row["verdict"] if row["runs"] > 1 else ""]
-    if not row["runs"]:
-        axes.text(1.3 * row["margin"], y, "never found here", va="center", color=style.GREY)
-        return
-    low, high = row["difference_low"], row["difference_high"]
-    if not math.isnan(low):
-        axes.plot([low, high], [y, y], color=color, linewidth=1.0)
-    axes.plot(row["difference"], y, marker, color=color, markersize=4, markerfacecolor=face)
+    alt = "Differences of our mean rewards to the published ones, with intervals. "
+    return drawing, data, f"{alt}{'; '.join(words)}.", tasks.values()
 
 
 def rewards_reproduced(study: Study) -> str:
@@ -192,10 +185,24 @@ def rewards_reproduced(study: Study) -> str:
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0
         if row["verdict"] == "undecided" and sure:
-            condition, task = row["cell"].label.removeprefix(LEARNER), row["cell"].task
             text += (
-                f" {condition} on {marked(study.tasks[task])} is "
+                f" {row['condition']} on {row['task']} is "
                 f"{interval(row, 'difference')} ticks from the printed mean: its interval "
                 "leaves out 0, not corrected for the number of rewards."
             )
     return text
+
+
+def changed_hands(study: Study) -> str:
+    """On which tasks the learner's best condition ends with other hands than it began with."""
+    changes = []
+    for name, task in study.tasks.items():
+        label = best_condition(study, name)
+        good = study.cells[name, label].good if label else None
+        if good is not None and good.initial_hands.notna().any():
+            before, commonest = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
+            if before not in commonest:
+                changes.append(f"on {marked(task)} from {before} to {' or '.join(commonest)}")
+    if not changes:
+        return "The learner keeps the hands of the initial solution."
+    return f"The learner changes hands {listed(changes)}."
