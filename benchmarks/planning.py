@@ -24,14 +24,6 @@ LIMITS = {
 """Least and greatest value of options that are numbers; whole ones where the least value is."""
 
 
-def check_list(name: str, value: object) -> None:
-    """Raises CoarticError unless the value is a list of names or paths."""
-    if isinstance(value, str | Path):
-        raise CoarticError(f"{name} is a list: write {name}=[{str(value)!r}]")
-    if not isinstance(value, Sequence) or not all(isinstance(item, str | Path) for item in value):
-        raise CoarticError(f"{name} is {value!r}; it must be a list of names or paths")
-
-
 def plan_suite(
     suite: str | Path | Suite,
     *,
@@ -81,7 +73,10 @@ def plan_suite(
     """
     lists = {"method_files": method_files, "family_files": family_files}
     for name, names in ({"tasks": tasks, "methods": methods} | lists).items():
-        check_list(name, names)
+        if isinstance(names, str | Path):
+            raise CoarticError(f"{name} is a list: write {name}=[{str(names)!r}]")
+        if not all(isinstance(item, str | Path) for item in names):
+            raise CoarticError(f"{name} is {names!r}; it must be a list of names or paths")
     numbers = {"runs": runs, "trials": trials, "trial_budget": trial_budget}
     try:
         check_limits("seed", seed, *LIMITS["seed"])
@@ -104,18 +99,26 @@ def plan_suite(
     by_name: dict[str, Task] = {}
     planned: dict[str, Cell] = {}
     for cell in cells:
-        name = cell.task.name
+        name, method = cell.task.name, cell.method
         if name not in by_name:
             by_name[name] = check_task(cell.task)
         elif by_name[name] != cell.task:  # results are told apart by names
             raise CoarticError(f"two different tasks are called {name!r}: give one another name")
-        wanted = complete_cell(replace(cell, task=by_name[name]), trials, runs)
+        takes_trials = trials is not None and "trials" in method.defaults
+        complete = method.complete(({"trials": trials} if takes_trials else {}) | cell.parameters)
+        if trials_in(complete) > MOST_TRIALS:
+            raise CoarticError(
+                f"{name} x {cell.label}: {trials_in(complete):_} trials a run; "
+                f"at most {MOST_TRIALS:_} are kept"
+            )
+        count = (runs or cell.runs) if method.stochastic else 1
+        wanted = replace(cell, task=by_name[name], complete=complete, runs=count)
         # A cell that is written in two ways is performed once.
-        first = planned.setdefault(hash_of([name, cell.method.name, wanted.complete]), wanted)
-        if first.runs != wanted.runs:
+        first = planned.setdefault(hash_of([name, method.name, complete]), wanted)
+        if first.runs != count:
             raise CoarticError(
                 f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
-                f"then for {wanted.runs}; give one number"
+                f"then for {count}; give one number"
             )
     return Plan(
         suite=suite.name,
@@ -126,18 +129,3 @@ def plan_suite(
         trial_budget=trial_budget,
         cells=tuple(planned.values()),
     )
-
-
-def complete_cell(cell: Cell, trials: int | None, runs: int | None) -> Cell:
-    """A cell with all its parameters: the suite's go before ``trials``; ``runs`` go before the
-    suite's. Raises CoarticError for more trials than are kept."""
-    takes_trials = trials is not None and "trials" in cell.method.defaults
-    default_trials = {"trials": trials} if takes_trials else {}
-    complete = cell.method.complete(default_trials | cell.parameters)
-    if trials_in(complete) > MOST_TRIALS:
-        raise CoarticError(
-            f"{cell.task.name} x {cell.label}: {trials_in(complete):_} trials a run; "
-            f"at most {MOST_TRIALS:_} are kept"
-        )
-    count = (runs or cell.runs) if cell.method.stochastic else 1
-    return replace(cell, complete=complete, runs=count)

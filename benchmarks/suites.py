@@ -173,55 +173,63 @@ def select_cells(
     for unknown names, for a task file whose name is taken, for parameters that a method does not
     take, for more than :data:`MOST_CELLS` cells, and where nothing is left to run.
     """
+
+    def task_named(name: str) -> Task:
+        address = address_of(name)
+        if address is not None and address.family in families:
+            return instance_of(families[address.family], address)
+        return load_task(name)
+
     methods = [method for name in methods for method in methods_named(name, registered)]
-    user_tasks, wanted = resolve_tasks(suite, tasks, families)
-    cells = cells_of_suite(suite, registered, user_tasks, families)
-    extra, refusals = extra_cells(suite, cells, registered, methods, user_tasks)
-    cells += extra
-    task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    if wrong := [unknown("task", name, task_names) for name in wanted if name not in task_names]:
-        raise CoarticError("\n".join(wrong))
-    chosen = [
-        cell
-        for cell in cells
-        if (not wanted or cell.task.name in wanted) and (not methods or cell.method.name in methods)
-    ]
-    # A user's own task that nothing applies to is an error, not a silent gap.
-    busy = {cell.task.name for cell in chosen}
-    idle = [name for name in user_tasks if name not in busy]
-    if idle or not chosen:
-        of_task = [cell.label for cell in cells if not wanted or cell.task.name in wanted]
-        there = ", ".join(dict.fromkeys(of_task)) or "nothing there"
-        why = "; ".join(refusals) if refusals else f"suite {suite.name!r} has {there}"
-        what = f"task {idle[0]!r}" if idle else "what was asked for"
-        raise CoarticError(f"no method to run on {what}: {why}.")
-    return chosen
-
-
-def resolve_tasks(
-    suite: Suite, names: Sequence[str], families: Mapping[str, Family]
-) -> tuple[dict[str, Task], list[str]]:
-    """The user's tasks by name, and the names of all tasks that were asked for.
-
-    The user's tasks are those of files, and the instances that ``names`` has and the suite has
-    not.
-    """
-    user_tasks = read_tasks(Path(name) for name in names if name.endswith(".toml"))
-    wanted = [*itertools.chain(*(named_by(name) for name in names if not name.endswith(".toml")))]
+    user_tasks = read_tasks(Path(name) for name in tasks if name.endswith(".toml"))
+    wanted = [each for name in tasks if not name.endswith(".toml") for each in named_by(name)]
     wanted += user_tasks
     in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
     for name in wanted:
         if name not in in_suite and address_of(name):
-            user_tasks.setdefault(name, task_named(name, families))
-    return user_tasks, wanted
-
-
-def task_named(name: str, families: Mapping[str, Family]) -> Task:
-    """A task by its name, which can be that of an instance of one's own family."""
-    address = address_of(name)
-    if address is not None and address.family in families:
-        return instance_of(families[address.family], address)
-    return load_task(name)
+            user_tasks.setdefault(name, task_named(name))
+    every = (
+        cell
+        for block in suite.cells
+        for name in block.task_names(user_tasks)
+        # Goals are not moved in the user's tasks unless they are named.
+        if block.move is None or WILDCARD not in block.tasks or name not in user_tasks
+        for cell in cells_on(user_tasks.get(name) or task_named(name), suite, block, registered)
+    )
+    cells = list(itertools.islice(every, MOST_CELLS + 1))
+    if len(cells) > MOST_CELLS:
+        raise CoarticError(
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
+            "(tasks x moves x methods x grid)"
+        )
+    # What named methods and the user's tasks add.
+    there = {(cell.task.name, cell.label) for cell in cells}
+    of_suite = list(dict.fromkeys(cell.method.name for cell in cells))
+    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
+    pairs = [
+        *itertools.product(shipped.values(), [name for name in methods if name not in of_suite]),
+        *itertools.product(user_tasks.values(), methods or of_suite),
+    ]
+    refusals = []
+    for task, method in pairs:
+        if (reason := registered[method].why_not(task)) is not None:
+            refusals.append(reason)
+        elif (task.name, method) not in there:
+            cells.append(Cell(task, registered[method], runs=suite.runs))
+    known = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
+    if wrong := [unknown("task", name, known) for name in wanted if name not in known]:
+        raise CoarticError("\n".join(wrong))
+    of_tasks = [cell for cell in cells if not wanted or cell.task.name in wanted]
+    chosen = [cell for cell in of_tasks if not methods or cell.method.name in methods]
+    # A user's own task that nothing applies to is an error, not a silent gap.
+    busy = {cell.task.name for cell in chosen}
+    idle = [name for name in user_tasks if name not in busy]
+    if idle or not chosen:
+        there_is = ", ".join(dict.fromkeys(cell.label for cell in of_tasks)) or "nothing there"
+        why = "; ".join(refusals) or f"suite {suite.name!r} has {there_is}"
+        what = f"task {idle[0]!r}" if idle else "what was asked for"
+        raise CoarticError(f"no method to run on {what}: {why}.")
+    return chosen
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
@@ -252,134 +260,54 @@ def read_tasks(paths: Iterable[Path]) -> dict[str, Task]:
     return tasks
 
 
-def extra_cells(
-    suite: Suite,
-    cells: Sequence[Cell],
-    registered: Registry,
-    methods: Sequence[str],
-    user_tasks: Mapping[str, Task],
-) -> tuple[list[Cell], list[str]]:
-    """Cells that named methods and the user's tasks add, and why they do not add more."""
-    there = {(cell.task.name, cell.label) for cell in cells}
-    of_suite = list(dict.fromkeys(cell.method.name for cell in cells))
-    others = [name for name in methods if name not in of_suite]
-    shipped = {cell.task.name: cell.task for cell in cells if cell.task.name not in user_tasks}
-    wanted = [(task, name) for task in shipped.values() for name in others]
-    wanted += [(task, name) for task in user_tasks.values() for name in methods or of_suite]
-    extra, refusals = [], []
-    for task, name in wanted:
-        reason = registered[name].why_not(task)
-        if reason is not None:
-            refusals.append(reason)
-        elif (task.name, name) not in there:
-            extra.append(Cell(task, registered[name], runs=suite.runs))
-    return extra, refusals
-
-
-def cells_of_suite(
-    suite: Suite,
-    registered: Registry,
-    user_tasks: Mapping[str, Task],
-    families: Mapping[str, Family],
-) -> list[Cell]:
-    """The cells of all blocks. Raises CoarticError for more than :data:`MOST_CELLS`."""
-    blocks = (
-        cells_of_block(suite, block, registered, user_tasks, families) for block in suite.cells
-    )
-    cells = list(itertools.islice(itertools.chain.from_iterable(blocks), MOST_CELLS + 1))
-    if len(cells) > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
-            "(tasks x moves x methods x grid)"
-        )
-    return cells
-
-
-def cells_of_block(
-    suite: Suite,
-    block: Block,
-    registered: Registry,
-    user_tasks: Mapping[str, Task],
-    families: Mapping[str, Family],
-) -> Iterator[Cell]:
-    """The cells of a block; goals are not moved in the user's tasks unless they are named."""
+def cells_on(task: Task, suite: Suite, block: Block, registered: Registry) -> Iterator[Cell]:
+    """The cells of a block on one of its tasks."""
+    if block.goals is not None and len(task.goals) not in block.goals:
+        return
     methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-    for name in block.task_names(user_tasks):
-        if block.move is not None and WILDCARD in block.tasks and name in user_tasks:
-            continue
-        task = user_tasks.get(name) or task_named(name, families)
-        if block.goals is not None and len(task.goals) not in block.goals:
-            continue
-        if block.free_base:
-            task = with_free_base(suite, task)
-        variants = [task] if block.move is None else with_goal_moved(suite, task, block.move)
-        for variant, method in itertools.product(variants, methods):
-            reason = registered[method].why_not(variant, block.parameters)
-            if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
-                raise CoarticError(f"suite {suite.name!r}: {reason}")
-            if reason is not None:
-                continue  # "all that applies"
-            for values in itertools.product(*block.grid.values()):
-                point = dict(zip(block.grid, values, strict=True))
-                parameters = {**block.parameters, **point}
-                registered[method].complete(parameters)
-                yield Cell(variant, registered[method], parameters, runs=block.runs or suite.runs)
+    for variant, method in itertools.product(variants(task, suite, block), methods):
+        reason = registered[method].why_not(variant, block.parameters)
+        if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
+            raise CoarticError(f"suite {suite.name!r}: {reason}")
+        if reason is not None:
+            continue  # "all that applies"
+        for values in itertools.product(*block.grid.values()):
+            parameters = block.parameters | dict(zip(block.grid, values, strict=True))
+            registered[method].complete(parameters)
+            yield Cell(variant, registered[method], parameters, runs=block.runs or suite.runs)
 
 
-def with_goal_moved(suite: Suite, task: Task, move: Move) -> list[Task]:
-    """The variants of a task with one goal moved."""
-    if move.goal > len(task.goals):
-        raise CoarticError(
-            f"suite {suite.name!r}: task {task.name!r} has no goal {move.goal} to move"
+def variants(task: Task, suite: Suite, block: Block) -> list[Task]:
+    """The task as a block has it: without its lock, or once for each place of the goal that it
+    moves."""
+    source = f"suite {suite.name!r}"
+
+    def changed(name: str, difference: str, **changes: Any) -> Task:
+        named = {"name": f"{task.name}.{name}", "description": f"{task.name} with {difference}"}
+        return parse_task(task.model_dump(mode="json") | named | changes, source)
+
+    if block.free_base:
+        if not task.locked_base:
+            raise CoarticError(f"{source}: free_base: the base of task {task.name!r} is free")
+        why = {"status": "chosen", "source": f"not that of {task.name}, to see what its lock does"}
+        task = changed(
+            "free-base",
+            "a base that moves in both directions",
+            title=f"{task.title}, base free",
+            locked_base=[],
+            provenance=task.provenance | {"locked_base": why},
         )
-    variants = []
-    for by in move.by:
-        dx, dy = map(exact, by)
+    if block.move is None:
+        return [task]
+    number = block.move.goal
+    if number > len(task.goals):
+        raise CoarticError(f"{source}: task {task.name!r} has no goal {number} to move")
+    moved = []
+    for x, y in block.move.by:
+        # In few digits, or in all of them where few would name another number.
+        dx, dy = (f"{d:g}" if float(f"{d:g}") == d else repr(d) for d in (x, y))
         goals = [list(goal) for goal in task.goals]
-        goals[move.goal - 1][0] += by[0]
-        goals[move.goal - 1][1] += by[1]
-        variants.append(
-            variant_task(
-                suite,
-                task,
-                f"goal{move.goal}_{dx}_{dy}",
-                f"goal {move.goal} moved by ({dx}, {dy})",
-                goals=goals,
-            )
-        )
-    return variants
-
-
-def variant_task(suite: Suite, task: Task, name: str, difference: str, **changes: Any) -> Task:
-    """A task with changes, by a name that ends in ``name``."""
-    content = {
-        **task.model_dump(mode="json"),
-        "name": f"{task.name}.{name}",
-        "description": f"{task.name} with {difference}",
-        **changes,
-    }
-    return parse_task(content, f"suite {suite.name!r}")
-
-
-def with_free_base(suite: Suite, task: Task) -> Task:
-    """The task without its lock, by a name of its own."""
-    if not task.locked_base:
-        raise CoarticError(
-            f"suite {suite.name!r}: free_base: the base of task {task.name!r} is free"
-        )
-    why = {"status": "chosen", "source": f"not that of {task.name}, to see what its lock does"}
-    return variant_task(
-        suite,
-        task,
-        "free-base",
-        "a base that moves in both directions",
-        title=f"{task.title}, base free",
-        locked_base=[],
-        provenance=task.provenance | {"locked_base": why},
-    )
-
-
-def exact(value: float) -> str:
-    """A number in few digits, or in all of them where few would name another number."""
-    short = f"{value:g}"
-    return short if float(short) == value else repr(value)
+        goals[number - 1] = [goals[number - 1][0] + x, goals[number - 1][1] + y]
+        name, difference = f"goal{number}_{dx}_{dy}", f"goal {number} moved by ({dx}, {dy})"
+        moved.append(changed(name, difference, goals=goals))
+    return moved
