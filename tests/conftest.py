@@ -4,6 +4,7 @@ import gc
 import os
 import shutil
 import signal
+import sys
 
 import pytest
 from hypothesis import settings
@@ -51,6 +52,35 @@ def in_this_process(monkeypatch):
 
     for module in (pool, reproduce, run):
         monkeypatch.setattr(module, "Local", InProcess)
+
+
+@pytest.fixture(scope="session")
+def commands():
+    """The command line, put together once."""
+    from typer.main import get_command
+
+    from coartic.cli import app
+
+    return get_command(app)
+
+
+@pytest.fixture
+def coartic(commands, monkeypatch, capsys):
+    """Calls the command line in this process: exit code, standard output, standard error."""
+    from coartic import cli
+
+    monkeypatch.setattr(cli, "app", commands)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["coartic", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            code = stop.code or 0
+        return code, *capsys.readouterr()
+
+    return call
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,6 @@ from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.tasks.families import read_family
 from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
-from tests.support.commands import call
 from tests.support.suites import KNOWN
 
 FAMILY = """
@@ -241,9 +240,9 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["draw", "ascending", "--out", "x.bmp"], ".bmp"),
     ],
 )
-def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, capsys):
+def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
     monkeypatch.chdir(tmp_path)
-    code, text, error = call(monkeypatch, capsys, *command)
+    code, text, error = coartic(*command)
     (line,) = error.splitlines()
     assert (code, text) == (2, "")
     assert line.startswith("Error: ")

@@ -20,7 +20,6 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.run import perform
 from coartic.benchmarks.suites import Cell
 from coartic.runs.store import RUNS_FILE, open_store, writing
-from tests.support.commands import call
 from tests.support.suites import KNOWN, InProcess, planned, run_and_write, same_results
 
 EC1, ALONE, PLAN = "dual-process/EC1", "corrective-alone/given", "nullspace-qp/none"
@@ -230,13 +229,10 @@ def shipped(parts, tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_command(shipped, parts, tmp_path, monkeypatch, capsys):
+def test_command(shipped, parts, tmp_path, coartic):
     """A method is written by a command, run beside the released results, and there when that is
     repeated; a colleague puts the folder beside another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
-
-    def coartic(*arguments):
-        return call(monkeypatch, capsys, *arguments)
 
     assert coartic("new", "method", "my-search", "--out", mine)[0] == 0
     command = ("run", "paper", "--method-file", mine, "--beside", "released", "--out", out)

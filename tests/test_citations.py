@@ -21,7 +21,6 @@ from coartic.benchmarks.registry import NAMES, built_in, registry
 from coartic.benchmarks.suites import Cell
 from coartic.runs.card import MethodCard
 from coartic.runs.store import RUNS_FILE
-from tests.support.commands import call
 from tests.support.suites import BROKEN, run_and_write
 
 ROOT = Path(__file__).parent.parent
@@ -119,7 +118,7 @@ def test_methods_of_others_cite_themselves():
     assert not any("@" in comment for comment in comments)  # BibTeX would read on there
 
 
-def test_command(tmp_path, monkeypatch, capsys):
+def test_command(tmp_path, coartic):
     methods = registry([BROKEN])
     cells = [
         Cell(load_task("ascending"), methods[name])
@@ -132,7 +131,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     ) as plain_sql:
         change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
         plain_sql.execute(change, (commit,))
-    code, text, _ = call(monkeypatch, capsys, "cite", tmp_path / "results")
+    code, text, _ = coartic("cite", tmp_path / "results")
     assert code == 0
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]

@@ -21,17 +21,10 @@ from coartic.cli.terminal import Display
 from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
-from tests.support.commands import call
 from tests.support.processes import all_end
 from tests.support.suites import BROKEN, ROOT, InProcess
 
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
-
-
-@pytest.fixture
-def coartic(monkeypatch, capsys):
-    """Calls the command line; exit code, standard output, standard error."""
-    return lambda *arguments: call(monkeypatch, capsys, *arguments)
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -28,7 +28,6 @@ from coartic.tasks.families import (
     task_text,
 )
 from coartic.tasks.task import Address, address_of, beyond_reach
-from tests.support.commands import call
 from tests.support.suites import ROOT
 
 # What the shipped families draw, by the hash of the task's file. A family is never changed: what
@@ -250,9 +249,9 @@ def test_a_family_that_cannot_be_met_ends():
         first_good(of_family(apart=99_000), address_of("two-armed/v1/i000"), most=20)
 
 
-def test_command_draws_and_writes_instances(monkeypatch, capsys, tmp_path):
+def test_command_draws_and_writes_instances(coartic, tmp_path):
     out = tmp_path / "tasks"
-    code, _, error = call(monkeypatch, capsys, "draw", "long/v1/i000..i001", "--out", out)
+    code, _, error = coartic("draw", "long/v1/i000..i001", "--out", out)
     assert (code, error) == (0, "")
     for name in named_by("long/v1/i000..i001"):
         path = out / f"{name}.toml"

@@ -18,7 +18,6 @@ from coartic import (
     Movement,
     NotApplicableError,
     SolutionError,
-    corrective_trial,
     execute,
     learn,
     learn_many,
@@ -34,7 +33,6 @@ from tests.support import reference
 from tests.support.strategies import (
     PAPER_CELLS,
     make_trials,
-    shipped_optima,
     tiny_task,
     uneven_task,
 )
@@ -168,20 +166,6 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away):
     for made, wanted in zip(run.initial, due.movements, strict=True):
         np.testing.assert_array_equal(made.target, wanted.target)
         assert (made.goal, made.hand, made.ticks) == (wanted.goal, wanted.hand, wanted.ticks)
-
-
-def test_from_the_optimum_nothing_gets_worse():
-    """The learner cannot better it and does not lose it."""
-    task = load_task("ascending")
-    optima = (each for each in shipped_optima() if each.task == task.name)
-    (best,) = (each for each in optima if (each.base, each.other_arm) == ("task", "free"))
-    assert best.reward == best.bound
-    columns = task.robot.joint_names
-    targets = [[row[name] for name in columns] for row in best.solution]
-    start = planned([row["hand"] for row in best.solution], np.array(targets))
-    for run in learn_many(task, "EC1", seeds=range(3), trials=200, start=start):
-        assert (run.best_trial, run.reward) == (0, best.reward)
-        assert run.rewards.max() == run.execute().reward == best.reward
 
 
 def test_a_first_solution_that_breaks_the_rules_is_refused():
@@ -360,23 +344,6 @@ def test_methods_of_the_learner():
         session = Session(load_task("ascending"), 0, method.told, trial_budget=budget, trusted=True)
         method(parameters(trials=20)).solve(session)
         assert session.meter.trials == trials
-
-
-@pytest.mark.parametrize("discount", [0.0, 0.5, 1.0])
-def test_a_subtask_is_credited_with_its_return(discount):
-    """After trial 0: r_g + γ r_{g+1} + γ² r_{g+2}, or the overall reward for every goal."""
-    task = load_task("ascending")
-    rewards = [-ticks for ticks in corrective_trial(task, "RRR").ticks_by_goal()]
-    condition = replace(VARIANTS["EC1-subtask"], discount=discount)
-    run = learn(task, condition, seed=0, trials=1)
-    assert [run.values[0, 2, 1], *run.values[1:, 1, 1]] == [
-        rewards[0] + discount * rewards[1] + discount**2 * rewards[2],
-        rewards[1] + discount * rewards[2],
-        rewards[2],
-    ]
-    assert sum(rewards) == run.rewards[0] == -319
-    overall = learn(task, "EC1", seed=0, trials=1)
-    assert set(overall.values[np.isfinite(overall.values)]) == {-319.0}
 
 
 def test_a_learned_replay_is_the_replay():

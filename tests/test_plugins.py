@@ -6,7 +6,6 @@ import shutil
 import signal
 import sys
 import tomllib
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +14,11 @@ import pytest
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
-from tests.support.commands import call
 from tests.support.suites import ROOT
 
 EXAMPLE = ROOT / "tests" / "example_plugin"
 METHOD = EXAMPLE / "coartic_example" / "__init__.py"
 TEXT = METHOD.read_text(encoding="utf-8")
-
-
-@pytest.fixture
-def coartic(monkeypatch, capsys):
-    """The command line: exit code, standard output, standard error."""
-    monkeypatch.setenv("COLUMNS", "200")
-    return partial(call, monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -24,7 +24,6 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
-from tests.support.commands import call
 from tests.support.suites import KNOWN, run_and_write
 
 
@@ -67,9 +66,7 @@ def test_numbers_are_made_again_from_the_runs(traced, tables_by_name, name):
     assert checked >= 3
 
 
-def test_trace_goes_from_a_row_to_its_runs(
-    traced, tables_by_name, report, monkeypatch, capsys, tmp_path
-):
+def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coartic, tmp_path):
     results = tmp_path / "results"
     shutil.copytree(report, results / "report")
     shutil.copy(traced.folder / RUNS_FILE, results)
@@ -79,21 +76,21 @@ def test_trace_goes_from_a_row_to_its_runs(
     names, runs = list(frame.index), frame.run_ids.iloc[0].split()
     method = tables_by_name["methods"].method[names[0]]
     assert set(traced.runs.set_index("run_id").method[runs]) == {method}
-    code, text, _ = call(monkeypatch, capsys, "trace", "methods", names[0], "--in", results)
+    code, text, _ = coartic("trace", "methods", names[0], "--in", results)
     assert code == 0
     stored = traced.runs.set_index("run_id").loc[runs]
     for run, seed, reward in zip(runs, stored.seed, stored.reward, strict=True):
         line = [line for line in text.splitlines() if run[:SHORT_ID] in line][-1]
         assert {str(seed), f"−{-reward}"} <= set(line.split())
     people = f"{frame.task.iloc[0]}, {name_of(method)}".replace(" †", "")
-    assert call(monkeypatch, capsys, "trace", "methods", people, "--in", results)[1] == text
+    assert coartic("trace", "methods", people, "--in", results)[1] == text
     delete(results / RUNS_FILE, runs[0])
     for command, said in (
         (("trace", "methods", "nothing", "--in", results), "no row 'nothing'"),
         (("trace", "methods", names[0], "--in", results), "the report is older than the runs of"),
         (("report", tmp_path), f"did you mean {results}?"),
     ):
-        code, _, error = call(monkeypatch, capsys, *command)
+        code, _, error = coartic(*command)
         assert (code, said in error) == (2, True), error
 
 

@@ -195,18 +195,6 @@ def test_the_cheapest_plan_that_converged_is_kept():
     assert session.meter.hessians == 6
 
 
-def test_given_lengths_are_kept():
-    task = load_task("ascending")
-    instance = Instance.of(task, ("right",) * 3, still=True, radius=task.radius)
-    problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
-    plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
-    lengths = np.array([1.7, math.nan, 0.9])
-    given = problem.solve(instance, plan.configurations, lengths=lengths)
-    assert given.converged
-    assert np.all(given.lengths()[[0, 2]] <= [1.7 + 1e-7, 0.9 + 1e-7])
-    assert given.cost > plan.cost
-
-
 def test_a_solve_that_fails_says_so():
     task = changed("ascending", goals=[[9, 9]], locked_base=["x", "y"], initial_hands="R")
     problem = trajectory_problem(task.robot, task.hands, 1, "path-length")
