@@ -7,7 +7,6 @@ study, in the packages beside this file; :func:`cached` makes such a function co
 from __future__ import annotations
 
 import json
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
@@ -17,7 +16,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numpy as np
 import pandas as pd
 
-from coartic import Execution, NotApplicableError, Task, hand_sequences
+from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.frames import gaps
 from coartic.analysis.optima import best_known, known_optima
 from coartic.analysis.solutions import Solutions
@@ -26,7 +25,7 @@ from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.plan import Plan, label_of
-from coartic.runs.run import execute_all, movements_from
+from coartic.runs.run import execute_all
 from coartic.runs.store import explain_errors, open_store
 from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of
@@ -192,7 +191,7 @@ class Study:
     def solutions(self) -> pd.DataFrame:
         """One row a movement of each run's solution."""
         with open_store(self.folder) as store:
-            return store.movements("solution")
+            return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs that made trials, each with the reward of every trial, NaN where it failed."""
@@ -219,22 +218,18 @@ class Study:
         CoarticError
             The stored movements cannot be executed or do not do what is stored of them.
         """
-        ids = list(map(str, self.cells[task, label].good.run_id[:MOST_EXECUTED]))
-        rows, paths = (
-            rows_by_run(frame[frame.run_id.isin(ids)])
-            for frame in (self._stored("replay" if replay else "solution"), self._stored("paths"))
-        )
+        stored = self._movements("replay" if replay else "solution")
+        ids = map(str, self.cells[task, label].good.run_id[:MOST_EXECUTED])
+        solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
+        executed = []
         with explain_errors(self.folder):
-            ids = [run_id for run_id in ids if run_id in rows]
-            solutions = {i: movements_from(self.tasks[task], rows[i], paths[i]) for i in ids}
             runs = execute_all(self.tasks[task], list(solutions.values()))
-            executed = []
-            for run_id, run in zip(ids, runs, strict=True):
-                ticks = sum(movement.ticks or 0 for movement in solutions[run_id])
+            for (run_id, movements), run in zip(solutions.items(), runs, strict=True):
+                ticks = sum(movement.ticks or 0 for movement in movements)
                 if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 executed.append(run)
-        return Solutions(self.tasks[task], label, tuple(executed), tuple(ids))
+        return Solutions(self.tasks[task], label, tuple(executed), tuple(solutions))
 
     def postures(self, task: str, label: str, *, replay: bool = False) -> Array:
         """Postures in which the solved runs of a method hit the goals of a task.
@@ -291,12 +286,10 @@ class Study:
         return best_known(self.runs, self.tasks, self.optima)
 
     @cached
-    def _stored(self, part: str) -> pd.DataFrame:
-        """Movements of a part of the runs that are executed, or waypoints of their ``paths``."""
+    def _movements(self, part: str) -> dict[str, tuple[Movement, ...]]:
+        """Movements of a part of the runs that are executed, by their ids."""
         with open_store(self.folder) as store:
-            if part == "paths":
-                return store.waypoints(MOST_EXECUTED)
-            return store.movements(part, MOST_EXECUTED)
+            return store.movements(part, self.tasks, MOST_EXECUTED)
 
 
 @cached
@@ -308,11 +301,3 @@ def one_by_one(study: Study) -> set[str]:
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
-
-
-def rows_by_run(frame: pd.DataFrame) -> dict[str, list[Any]]:
-    """Rows of a frame by run id."""
-    rows: dict[str, list[Any]] = defaultdict(list)
-    for row in frame.to_dict("records"):
-        rows[row["run_id"]].append(row)
-    return rows

@@ -17,8 +17,11 @@ import sqlite3
 import time
 import warnings
 import zlib
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +30,13 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
-from coartic.inputs import MOST_RUNS, MOST_TRIALS, explain_inline
+from coartic.inputs import MOST_TRIALS, explain_inline
+from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.earlier import other_reading
 from coartic.runs.plan import Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
+from coartic.tasks.task import Task
 from coartic.text import one_line, plain
 
 if TYPE_CHECKING:
@@ -283,22 +288,34 @@ class Store:
         with explain_errors(self.folder):
             return check_runs(self._table("SELECT * FROM runs"))
 
-    def movements(self, part: str, most: int = MOST_RUNS) -> pd.DataFrame:
-        """Movements of one part (:data:`PARTS`), as view ``solutions``, of the first runs of each
-        cell that are ok, so many at most."""
-        query = f"""SELECT results.run_id, movements.* {_ASKED_FOR}
-            JOIN movements ON movements.result_id = results.id AND part = ?
-            WHERE {_FIRST} ORDER BY cells.position, results.run, "order" """
+    def solutions(self) -> pd.DataFrame:
+        """View ``solutions`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return self._table(query, part, most).drop(columns=["result_id", "part"])
+            return self._table("SELECT * FROM solutions").drop(columns=["result_id", "part"])
 
-    def waypoints(self, most: int) -> pd.DataFrame:
-        """View ``paths`` of the same runs."""
-        query = f"""SELECT results.run_id, waypoints.* {_ASKED_FOR}
-            JOIN waypoints ON waypoints.result_id = results.id
-            WHERE {_FIRST} ORDER BY cells.position, results.run, "order", waypoint"""
+    def movements(
+        self, part: str, tasks: Mapping[str, Task], most: int
+    ) -> dict[str, tuple[Movement, ...]]:
+        """Movements of one part (:data:`PARTS`) by the ids of the first runs of each cell that are
+        ok, so many at most. ``tasks`` are the plan's, by name."""
+        points: dict[str, list[Any]] = defaultdict(list)
+        order = 'ORDER BY cells.position, results.run, "order"'
         with explain_errors(self.folder):
-            return self._table(query, most).drop(columns="result_id")
+            for row in self._db.execute(
+                f"""SELECT run_id, waypoints.* {_ASKED_FOR} JOIN waypoints
+                ON result_id = results.id WHERE {_FIRST} {order}, waypoint""",
+                (most,),
+            ):
+                points[row["run_id"]].append(row)
+            rows = self._db.execute(
+                f"""SELECT run_id, settings.task, movements.* {_ASKED_FOR} JOIN movements
+                ON result_id = results.id AND part = ? WHERE {_FIRST} {order}""",
+                (part, most),
+            )
+            return {
+                run_id: movements_from(tasks[name], of_run, points[run_id])
+                for (run_id, name), of_run in groupby(rows, itemgetter("run_id", "task"))
+            }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Runs asked for that made trials, each with the reward of every trial, NaN where it
