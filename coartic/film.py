@@ -11,20 +11,20 @@ import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from coartic.drawing import box, draw_goals, draw_robot, fill_goals, number_goals
 from coartic.errors import CoarticError
 from coartic.files import check_output, write_output
-from coartic.robot import Array, Hand
-from coartic.tasks.task import Task
+
+if TYPE_CHECKING:
+    from coartic.trajectories import Trajectory
 
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
@@ -35,19 +35,6 @@ RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
 _WEIGHT = 1.5  # of lines
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
-
-
-class Panel(NamedTuple):
-    """A movement that hits all goals, and its title; see :class:`coartic.Trajectory`."""
-
-    title: str
-    task: Task
-    hands: tuple[Hand, ...]
-    """Hand chosen for each goal."""
-    configurations: Array
-    """A row each control tick, shape ``(ticks, dof)``."""
-    hits: NDArray[np.int64]
-    """Row at which each goal was hit, shape ``(G,)``."""
 
 
 def timing(ticks: int) -> tuple[int, float]:
@@ -62,13 +49,13 @@ def timing(ticks: int) -> tuple[int, float]:
 
 
 def write_film(
-    panels: Sequence[Panel],
+    movements: Sequence[tuple[str, Trajectory]],
     path: Path,
     *,
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Draw movements side by side, all from their first tick, into ``path``.
+    """Draw movements with their titles side by side, all from their first tick, into ``path``.
 
     Returns the number of frames that differ, and the ticks that are shown in a second.
 
@@ -77,13 +64,13 @@ def write_film(
     :data:`FILMS`, for MP4 without ffmpeg, and where the file cannot be written.
     """
     check_film(path, replace=replace)
-    ticks = max(len(panel.configurations) for panel in panels)
+    ticks = max(len(movement.configurations) for _, movement in movements)
     if ticks == 0:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
     stride, interval_s = timing(ticks)
     rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
     held = max(1, round(HOLD_S / interval_s))
-    figure, scenes = set_stage(panels, width)
+    figure, scenes = set_stage(movements, width)
     rate: Any = 1 / interval_s
     # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
     gif_rate: Any = 1000 / (1000 * interval_s + 0.5)
@@ -118,11 +105,11 @@ def check_film(path: Path, *, replace: bool = False) -> None:
 
 
 class Scene:
-    """What moves in one panel: updated, never drawn anew."""
+    """What moves in one picture: updated, never drawn anew."""
 
-    def __init__(self, axes: Axes, panel: Panel) -> None:
-        self._panel, task, place = panel, panel.task, panel.task.robot.forward_kinematics
-        self._paths = {hand: place(panel.configurations, hand) for hand in task.hands}
+    def __init__(self, axes: Axes, movement: Trajectory) -> None:
+        self._movement, task = movement, movement.task
+        self._paths = {hand: movement.hand_path(hand) for hand in task.hands}
         self._traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
         self._goals = draw_goals(axes, task, weight=_WEIGHT)
         self._move = draw_robot(axes, task, task.q0, weight=_WEIGHT)
@@ -132,37 +119,39 @@ class Scene:
 
     def show(self, row: int) -> None:
         """The state at a row of the movement, or at its last one."""
-        panel = self._panel
-        row = min(row, len(panel.configurations) - 1)
-        self._move(panel.configurations[row])
+        movement = self._movement
+        row = min(row, len(movement.configurations) - 1)
+        self._move(movement.configurations[row])
         for hand, trace in self._traces.items():
             trace.set_data(*self._paths[hand][: row + 1].T)
-        hit = panel.hits <= row
+        hit = movement.hits <= row
         fill_goals(self._goals, hit)
         state = "done"
         if not hit.all():
             goal = int(np.argmin(hit))
-            state = f"goal {goal + 1} with the {panel.hands[goal]} hand"
+            state = f"goal {goal + 1} with the {movement.hands[goal]} hand"
         self._status.set_text(f"reward −{row + 1}   {state}")
 
 
-def set_stage(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]:
-    """A figure ``width`` pixels wide with a scene per panel, all showing the same place."""
-    corners = np.array([box(panel.task, panel.configurations) for panel in panels])
+def set_stage(
+    movements: Sequence[tuple[str, Trajectory]], width: int
+) -> tuple[Figure, list[Scene]]:
+    """A figure ``width`` pixels wide with a scene per movement, all showing the same place."""
+    corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
-    inches, count = width / _DPI, len(panels)
+    inches, count = width / _DPI, len(movements)
     wide = inches / count - _LEFT - _RIGHT
     # Even in pixels, as MP4 wants it.
     height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
     figure = Figure(figsize=(inches, height), dpi=_DPI)
-    for index, panel in enumerate(panels):
+    for index, (title, movement) in enumerate(movements):
         left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        number_goals(axes, panel.task, weight=_WEIGHT, fontsize=9)
-        axes.set_title(panel.title, fontsize=9, loc="left", pad=18, parse_math=False)
+        number_goals(axes, movement.task, weight=_WEIGHT, fontsize=9)
+        axes.set_title(title, fontsize=9, loc="left", pad=18, parse_math=False)
         axes.tick_params(labelsize=8)
         axes.spines[["top", "right"]].set_visible(False)
     # What stands still takes most of the time of drawing: it is drawn once, as a picture.
@@ -174,4 +163,6 @@ def set_stage(panels: Sequence[Panel], width: int) -> tuple[Figure, list[Scene]]
         axes.set_title("", loc="left")
         for text in list(axes.texts):
             text.remove()
-    return figure, [Scene(*each) for each in zip(figure.axes, panels, strict=True)]
+    return figure, [
+        Scene(axes, movement) for axes, (_, movement) in zip(figure.axes, movements, strict=True)
+    ]

@@ -168,11 +168,10 @@ class Trajectory:
         CoarticError
             The file cannot be written.
         """
-        from coartic.film import Panel, write_film
+        from coartic.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"
-        panel = Panel(title, self.task, self.hands, self.configurations, self.hits)
-        write_film([panel], Path(path), width=width, replace=replace)
+        write_film([(title, self)], Path(path), width=width, replace=replace)
 
 
 def trajectory(
@@ -212,42 +211,25 @@ def trajectory(
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
-    return spell_out(task, execution, model)
-
-
-def spell_out(task: Task, execution: Execution, model: MotionModel = PAPER) -> Trajectory:
-    """Every control tick of an execution that has hit all goals."""
-    q = np.array(task.q0)
-    rows = [q[None, :][:0]]
+    q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
     elapsed = np.zeros(len(task.goals), dtype=np.int64)
     for movement in execution.movements:
-        assert movement.ticks is not None
-        assert movement.target is not None
-        if movement.kind == "path":
-            assert movement.waypoints is not None
-            points = path_points(task.robot, q, movement.waypoints, model)
-            points = points[: movement.ticks]
-        else:
-            points = line_points(q, movement.target, movement.ticks, model)
+        target, ticks = movement.target, movement.ticks
+        assert target is not None
+        assert ticks is not None
+        if movement.waypoints is not None:
+            points = path_points(task.robot, q, movement.waypoints, model)[:ticks]
+        else:  # summed and rounded as in the kernel
+            difference, square = target - q, 0.0
+            for value in difference.tolist():
+                square += value * value
+            distance = math.sqrt(square)
+            last, k = math.ceil(distance / model.step), np.arange(ticks)[:, None]
+            between = q + k * model.step / (distance or 1.0) * difference
+            points = np.where(k < last, between, target)
         if len(points):
             q = points[-1]
             rows.append(points)
-        elapsed[movement.goal - 1 :] += movement.ticks
+        elapsed[movement.goal - 1 :] += ticks
     hits = np.maximum(elapsed - 1, 0)
     return Trajectory(task, execution, np.concatenate(rows), hits)
-
-
-def line_points(q: Array, target: Array, count: int, model: MotionModel) -> Array:
-    """The first points of a movement, summed and rounded as its kernel does."""
-    difference = target - q
-    square = 0.0
-    for value in difference.tolist():
-        square += value * value
-    distance = math.sqrt(square)
-    last = math.ceil(distance / model.step)
-    k = np.arange(count)[:, None]
-    if not last:
-        return np.repeat(target[None, :], count, axis=0)
-    between = q + k * model.step / distance * difference
-    points: Array = np.where(k < last, between, target)
-    return points

@@ -76,7 +76,7 @@ def animate(
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import name_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
-    from coartic.film import Panel, check_film, write_film
+    from coartic.film import check_film, write_film
 
     check_film(out, replace=replace)
     if initial and other is not None:
@@ -91,6 +91,5 @@ def animate(
         on = movements[0][1].task
         initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
         movements.insert(0, (f"{on.label}: initial solution", initial_solution))
-    panels = [Panel(title, m.task, m.hands, m.configurations, m.hits) for title, m in movements]
-    frames, ticks_a_second = write_film(panels, out, width=width, replace=replace)
+    frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
