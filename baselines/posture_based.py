@@ -167,7 +167,7 @@ class PosturePlanner:
 
         Raises MethodError for a goal that no posture hits.
         """
-        movements, ticks = [], []
+        movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
             retrieved, seeds = self.retrieve(ahead), list[Neighbourhood]()
@@ -188,8 +188,15 @@ class PosturePlanner:
             _, (hand, *_), postures = min(self.generate(seeds, ahead), key=lambda chain: chain[0])
             self.store = np.vstack([self.store, postures])
             movements.append(Movement(goal + 1, hand, "planned", postures[0]))
-            self.q, expected = self.simulate(self.q, postures[0], hand, goal)
-            ticks.append(expected)
+            # Internal simulation: where the movement hits the goal, and the ticks until then.
+            distance = float(np.linalg.norm(postures[0] - self.q))
+            along = np.arange(math.ceil(distance / step))[:, None] * step
+            line = self.q + along / max(distance, step) * (postures[0] - self.q)
+            line = np.vstack([line, postures[0]])
+            miss = self.session.forward_kinematics(line, hand) - self.goals[goal]
+            hit = int(np.argmax(np.hypot(miss[:, 0], miss[:, 1]) <= self.session.radius))
+            self.q = line[hit]
+            ticks.append(hit + 1)
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
@@ -231,7 +238,16 @@ class PosturePlanner:
             noise = sd * np.stack([seed.noise[number] for seed in seeds])
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
-            accurate = self.correct_generated(postures, seeds, goals)
+            # Corrected goal by goal, the arm that is not chosen standing where it stood before.
+            accurate = np.ones(postures.shape[:2], bool)
+            before = np.broadcast_to(self.q, (*postures.shape[:2], postures.shape[-1])).copy()
+            for k, goal in enumerate(goals):
+                for hand in self.session.hands:
+                    chosen = [i for i, seed in enumerate(seeds) if seed.hands[k] == hand]
+                    if chosen:
+                        posture = np.where(self.free[hand], postures[chosen, :, k], before[chosen])
+                        accurate[chosen] &= self.correct(posture, goal, hand, _GENERATED)
+                        postures[chosen, :, k] = before[chosen] = posture
             lengths = np.where(accurate, path_length(self.q, postures), np.inf)
             order = np.argsort(lengths, axis=1, kind="stable")
             centre, best = centre.copy(), best.copy()
@@ -244,21 +260,6 @@ class PosturePlanner:
                 if lengths[k, better[0]] < costs[k]:
                     best[k], costs[k] = postures[k, better[0]], lengths[k, better[0]]
         return list(zip(costs.tolist(), (seed.hands for seed in seeds), best, strict=True))
-
-    def correct_generated(self, postures: Array, seeds: list[Neighbourhood], goals: range) -> Mask:
-        """Correct generated postures ``(seeds, PER_ROUND, goals, dof)`` in place.
-
-        True, shape ``(seeds, PER_ROUND)``, where all hands are there."""
-        accurate = np.ones(postures.shape[:2], bool)
-        before = np.broadcast_to(self.q, (*postures.shape[:2], postures.shape[-1])).copy()
-        for k, goal in enumerate(goals):
-            for hand in self.session.hands:
-                chosen = [i for i, seed in enumerate(seeds) if seed.hands[k] == hand]
-                if chosen:
-                    posture = np.where(self.free[hand], postures[chosen, :, k], before[chosen])
-                    accurate[chosen] &= self.correct(posture, goal, hand, _GENERATED)
-                    postures[chosen, :, k] = before[chosen] = posture
-        return accurate
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Feedforward correction of ``(..., dof)`` in place; True where the hand is there."""
@@ -284,16 +285,6 @@ class PosturePlanner:
         there = np.ones(len(flat), bool)
         there[far] = False
         return there.reshape(postures.shape[:-1])
-
-    def simulate(self, q: Array, target: Array, hand: Hand, goal: int) -> tuple[Array, int]:
-        """The configuration in which a movement hits its goal, and the ticks until then."""
-        distance = float(np.linalg.norm(target - q))
-        step = self.session.model.step
-        along = np.arange(math.ceil(distance / step))[:, None] * step
-        line = np.vstack([q + along / max(distance, step) * (target - q), target])
-        miss = self.session.forward_kinematics(line, hand) - self.goals[goal]
-        k = int(np.argmax(np.hypot(miss[:, 0], miss[:, 1]) <= self.session.radius))
-        return line[k], k + 1
 
 
 @entry
