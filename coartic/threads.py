@@ -77,29 +77,24 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 def begin_worker(folder: Path | None = None) -> None:
     """Leave the terminal, and lead a group of processes. It ends with this one or when the parent
     has ended, and then ``folder`` with it; the server of both lives as long as any worker."""
+
+    def end_with_parent() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            if folder is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+            end_group(os.getpid())
+
     nobody = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nobody, stream)
-    if hasattr(os, "setpgid"):
-        os.setpgid(0, 0)
-    if hasattr(signal, "pthread_sigmask"):  # see blocked_signals
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-    threading.Thread(target=end_with_parent, args=(folder,), daemon=True).start()
-
-
-def end_with_parent(folder: Path | None) -> None:
-    """Wait for the end of the process that this one works for."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        end_group(os.getpid())
+    os.setpgid(0, 0)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def end_group(pid: int) -> None:
     """End a worker, and all processes in its group, unless it does not lead one yet."""
-    for end in (getattr(os, "killpg", None), os.kill):
-        if end is not None:
-            with contextlib.suppress(OSError):
-                end(pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+    for end in (os.killpg, os.kill):
+        with contextlib.suppress(OSError):
+            end(pid, signal.SIGKILL)

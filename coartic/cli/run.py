@@ -21,7 +21,6 @@ from coartic.threads import MOST_JOBS
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import Law
     from coartic.benchmarks.registry import Registry
-    from coartic.runs.card import MethodCard
 
 
 def run(
@@ -142,10 +141,7 @@ def list_(
     from coartic.benchmarks.registry import registry
 
     registered = registry(method_file or [])
-    if name is None:
-        say_pairs(overview(registered))
-    else:
-        say_pairs(describe(name, registered))
+    say_pairs(overview(registered) if name is None else describe(name, registered))
 
 
 def overview(registered: Registry) -> Iterator[tuple[str, str]]:
@@ -171,6 +167,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     Raises CoarticError for another name.
     """
     from coartic import builtin_tasks, load_task
+    from coartic.analysis.methods import name_of
     from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
@@ -203,27 +200,18 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         try:
             methods = given.methods_meant([name], registered)
         except CoarticError as error:
-            names = dict.fromkeys([*suites(), *builtin_tasks(), *shipped_families()], "")
-            names |= given.method_names(registered)
+            names = [*suites(), *builtin_tasks(), *shipped_families(), *registered]
             raise CoarticError(unknown("task, suite, method or family", name, names)) from error
-        for method in methods:
-            yield from describe_method(registered[method])
-
-
-def describe_method(card: MethodCard) -> Iterator[tuple[str, str]]:
-    """Information and parameters of a method, and the tasks that it applies to."""
-    from coartic import builtin_tasks, load_task
-    from coartic.analysis.methods import name_of
-
-    parameters = [f"{k}={v}" for k, v in card.defaults.items()]
-    tasks = [name for name in builtin_tasks() if card.why_not(load_task(name)) is None]
-    yield "Method", f"{card.name}: {card.title}"
-    yield "Called", name_of(card.name)
-    yield "Told", ", ".join(card.told)
-    yield "Parameters", ", ".join(parameters) or "none"
-    yield "Tasks", ", ".join(tasks) or "none of the four"
-    yield "Runs", "differ by seed" if card.stochastic else "are all the same"
-    yield "Cites", card.citation or "nothing"
+        for card in map(registered.__getitem__, methods):
+            applies = (t for t in builtin_tasks() if card.why_not(load_task(t)) is None)
+            parameters = [f"{k}={v}" for k, v in card.defaults.items()]
+            yield "Method", f"{card.name}: {card.title}"
+            yield "Called", name_of(card.name)
+            yield "Told", ", ".join(card.told)
+            yield "Parameters", ", ".join(parameters) or "none"
+            yield "Tasks", ", ".join(applies) or "none of the four"
+            yield "Runs", "differ by seed" if card.stochastic else "are all the same"
+            yield "Cites", card.citation or "nothing"
 
 
 def reproduce(

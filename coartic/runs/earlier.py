@@ -1,9 +1,8 @@
-"""Columns that versions 1.0 and 1.1 stored, and this version does not have.
+"""Parameters and constants that versions 1.0 and 1.1 stored, and this version does not have.
 
 That is how they read the paper, which could then be read in several ways, and how null-space
-control stated its programmes. Runs that did as this version does count as its own. What they stored
-beside is dropped when they are read, and it is still a part of the hash with which the id of a run
-begins.
+control stated its programmes. They are still a part of the hash with which the id of a run begins;
+so runs that did as this version does count as its own, and others are refused.
 """
 
 from __future__ import annotations
@@ -42,19 +41,6 @@ def parameters_now(method: str, stored: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(stored, Mapping):
         raise TypeError(f"parameters are {stored!r}")
     return {name: value for name, value in stored.items() if name not in _fixed(method)}
-
-
-def other_reading(method: str, model: Mapping[str, Any], parameters: Mapping[str, Any]) -> str:
-    """In what a setting reads the paper otherwise than this version, as ``ties=right``; nothing
-    where it does not. Raises KeyError where a constant of movement is missing."""
-    for name, value in MODEL.items():
-        stored = model[name] if name in PAPER._fields else model.get(name, value)
-        if stored != value:
-            return f"{name}={stored}"
-    for name, value in _fixed(method).items():
-        if parameters.get(name, value) != value:
-            return f"{name}={parameters[name]}"
-    return ""
 
 
 def _fixed(method: str) -> dict[str, Any]:

@@ -112,8 +112,9 @@ class Setting:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any], source: str) -> Setting:
-        """A setting from its row. Raises TaskError, which names the ``source``."""
-        return cls(
+        """A setting from its row. Raises TaskError, which names the ``source``, and ValueError as
+        :meth:`check`."""
+        setting = cls(
             task=parse_task(json.loads(row["definition"]), source),
             method=row["method"],
             code=row["code"],
@@ -121,6 +122,16 @@ class Setting:
             parameters=parameters_now(row["method"], json.loads(row["parameters"])),
             trial_budget=row["trial_budget"],
         )
+        setting.check(row["asked"])
+        return setting
+
+    def check(self, asked: str) -> None:
+        """Raises ValueError where it was stored with another hash."""
+        if asked != self.asked:
+            raise ValueError(
+                f"{self.method} on {self.task.name} was another setting when it was run: the "
+                "version of coartic that ran it reads it"
+            )
 
     def key(self, suite_seed: int, number: int) -> RunKey:
         """The key of a run. Its id is a hash of setting, seed and number, then that of the code."""
@@ -215,8 +226,7 @@ class Plan:
         for row, cell, setting in zip(rows["cells"], plan.cells, plan.settings, strict=True):
             if row["variant"] != cell.variant:
                 raise ValueError(f"variant {row['variant']!r} is not that of its parameters")
-            if json.loads(row["definition"]) != setting.definition:
-                raise ValueError(f"task {setting.task.name} is not the one of its runs")
+            setting.check(row["asked"])
         if len({row["setting"] for row in rows["cells"]}) < len(plan.cells):
             raise ValueError("two cells have one setting")
         return plan

@@ -33,7 +33,6 @@ from coartic.errors import CoarticError
 from coartic.inputs import MOST_TRIALS, explain_inline
 from coartic.motion.solution import Movement
 from coartic.robot import Array
-from coartic.runs.earlier import other_reading
 from coartic.runs.plan import Plan, Setting, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import Task
@@ -170,7 +169,7 @@ class Store:
         """The plan of the folder. Raises CoarticError where there is none yet."""
         queries = {table: f"SELECT * FROM {table}" for table in ("suite", "tasks", "methods")}
         queries["cells"] = (
-            "SELECT cells.*, settings.task, method, definition, settings.parameters AS complete "
+            "SELECT cells.*, settings.task, method, asked, settings.parameters AS complete "
             "FROM cells JOIN settings ON settings.id = setting ORDER BY position"
         )
         with explain_errors(self.folder):
@@ -436,7 +435,6 @@ def open_store(folder: Path) -> Iterator[Store]:
             connection.execute("PRAGMA query_only = ON")
             if not has_tables(connection, folder):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
-            check_reading(connection)
             with lock(folder, shared=True):  # or somebody is writing
                 pass
         yield Store(folder, connection)
@@ -481,18 +479,14 @@ def writing(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Have a folder in this block alone, or with others that share it, where the system and the
-    disk have such locks. What other programs read there is no matter.
+    """Have a folder in this block alone, or with others that share it, where the disk has such
+    locks. What other programs read there is no matter.
 
     Raises CoarticError where another process has it.
     """
-    try:
-        import fcntl
+    import fcntl
 
-        opened = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
-        yield
-        return
+    opened = os.open(folder, os.O_RDONLY)
     end = time.monotonic() + (0 if shared else WAIT_S)  # somebody may just be looking
     try:
         while True:
@@ -522,24 +516,6 @@ def connect(where: str, timeout_s: float) -> sqlite3.Connection:
     connection.execute("PRAGMA trusted_schema = OFF")
     connection.execute("PRAGMA cell_size_check = ON")
     return connection
-
-
-def check_reading(connection: sqlite3.Connection) -> None:
-    """Raises CoarticError for results of another reading of the paper, which versions 1.0 and 1.1
-    had."""
-    readings = [
-        reading
-        for (texts,) in connection.execute("SELECT readings FROM suite")
-        for reading in json.loads(texts)
-    ]
-    for method, *texts in connection.execute("SELECT method, model, parameters FROM settings"):
-        readings += filter(None, [other_reading(method, *map(json.loads, texts))])
-    if readings:
-        version = "1.0.0" if readings[0].startswith("arrival_tick") else "1.1.0"
-        raise CoarticError(
-            f"it has results of another reading of the paper, {plain(readings[0], 80)}: "
-            f"version {version} of coartic reads them"
-        )
 
 
 def check_files(folder: Path) -> None:
