@@ -160,14 +160,14 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
             run = source.run(run_id)
             if changes := compare_runs(target.run(run_id), run):  # beyond trials not kept
                 raise CoarticError(
-                    f"run {run.key.number} of {run.setting.method} on {run.setting.task.name} "
+                    f"run {run.number} of {run.setting.method} on {run.setting.task.name} "
                     f"differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
                 )
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != RELEASED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
         target.write(runs)
-        origin |= {run.key.id: name for run in runs}
+        origin |= {run.id: name for run in runs}
 
 
 def check_scores(
@@ -191,7 +191,9 @@ def check_scores(
         )
         for run in runs
     ]
-    again = score(Job(setting, method, tuple(run.key for run in runs)), stated)
+    again = score(
+        Job(setting, method, runs[0].suite_seed, tuple(run.number for run in runs)), stated
+    )
     for run, scored in zip(runs, again, strict=True):
         before, after = run.to_row(), scored.to_row()
         wrong = [
@@ -199,13 +201,9 @@ def check_scores(
             for column in _SCORED
             if before[column] != after[column]
         ]
-        if {run.result, scored.result} != {results[run.key.id]}:
+        if {run.result, scored.result} != {results[run.id]}:
             wrong.append("a joint, a tick or a trial was changed")
-        if run.key != setting.key(run.key.suite_seed, run.key.number):
-            wrong.append("it is not the run that its id says")
         if not math.isclose(run.other_arm_travel or 0, scored.other_arm_travel or 0, abs_tol=1e-9):
             wrong.append("the travel of the other arm is not as stored")
         if wrong:
-            raise CoarticError(
-                f"{name}: run {run.key.id} does not do what is stored of it: {wrong[0]}"
-            )
+            raise CoarticError(f"{name}: run {run.id} does not do what is stored of it: {wrong[0]}")

@@ -51,7 +51,7 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
     """The solution of a run of a folder tick by tick. Raises CoarticError where it has none, or
     none that can be shown."""
     if "solution" not in run.scores:
-        raise CoarticError(f"run {run.key.id} has no solution to show: {run.status}, {run.reason}")
+        raise CoarticError(f"run {run.id} has no solution to show: {run.status}, {run.reason}")
     task, movements = run.setting.task, run.scores["solution"].movements
     try:
         (execution,) = execute_all(task, [movements])
@@ -59,7 +59,7 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
             raise execution
         return trajectory(task, movements)
     except (SolutionError, ValueError) as error:
-        raise CoarticError(f"{folder}: run {run.key.id} cannot be shown: {error}") from None
+        raise CoarticError(f"{folder}: run {run.id} cannot be shown: {error}") from None
 
 
 def perform_in_order(jobs: Sequence[Job]) -> Iterator[Run]:
@@ -81,11 +81,12 @@ def perform_again(run: Run, registered: Registry) -> Run:
     except CoarticError as error:
         version = plain(str(run.environment.get("coartic")), 20)
         raise CoarticError(
-            f"run {run.key.id} cannot be performed here: {error}. Version {version} of coartic "
-            "made it."
+            f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
     setting = replace(run.setting, code=method.code, told=method.told)
-    return next(perform_in_order([Job(setting, method, (run.key,), run.time_limit_s)]))
+    return next(
+        perform_in_order([Job(setting, method, run.suite_seed, (run.number,), run.time_limit_s)])
+    )
 
 
 def perform_some_again(
@@ -97,7 +98,7 @@ def perform_some_again(
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
-            plan.key(position, number).id
+            plan.run_id(position, number)
             for position, cell in enumerate(plan.cells)
             if cell.method.name in registered
             and registered[cell.method.name].code == cell.method.code
@@ -108,7 +109,7 @@ def perform_some_again(
         step = max(1, len(ids) // count)
         chosen = [store.run(run_id) for run_id in ids[::step][:count]]
     for run in chosen:
-        yield run.key.id, compare_runs(run, perform_again(run, registered))
+        yield run.id, compare_runs(run, perform_again(run, registered))
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:

@@ -188,7 +188,7 @@ def perform(
         progress = Progress(folder, plan.size, stale=store.stale())
         missing = missing_jobs(plan, store, progress)
         for job in missing:
-            progress.waiting[job.setting.method] += len(job.keys)
+            progress.waiting[job.setting.method] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, "")
         jobs = in_order(missing, executor.workers)
@@ -198,8 +198,8 @@ def perform(
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
                     if len(runs) > 1:  # a run that failed may have failed because of the others
-                        again = [run.key for run in runs if run.status not in _SURE]
-                        alone += [replace(job, keys=(key,)) for key in again]
+                        again = [run.number for run in runs if run.status not in _SURE]
+                        alone += [replace(job, numbers=(number,)) for number in again]
                         runs = [run for run in runs if run.status in _SURE]
                     store.write(runs)
                     for run in runs:
@@ -225,9 +225,9 @@ def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
             progress.count(status)
     jobs = []
     for p, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
-        keys = tuple(plan.key(p, number) for number in range(cell.runs) if (p, number) not in there)
-        if keys:
-            jobs.append(Job(setting, cell.method, keys, plan.time_limit_s))
+        numbers = tuple(number for number in range(cell.runs) if (p, number) not in there)
+        if numbers:
+            jobs.append(Job(setting, cell.method, plan.seed, numbers, plan.time_limit_s))
     return jobs
 
 
@@ -242,10 +242,10 @@ def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
     """
 
     def divide(job: Job, size: int) -> Iterator[Job]:
-        for first in range(0, len(job.keys), size):
-            yield replace(job, keys=job.keys[first : first + size])
+        for first in range(0, len(job.numbers), size):
+            yield replace(job, numbers=job.numbers[first : first + size])
 
-    share = max(math.ceil(sum(len(job.keys) for job in jobs) / workers), LEAST_BATCH)
+    share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
         is_ours, parameters = job.method.is_ours, job.setting.parameters
@@ -254,9 +254,9 @@ def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
     rest = len(parts) % workers
     jobs_planned, last = parts[: len(parts) - rest], parts[len(parts) - rest :]
     for job in last:
-        jobs_planned += divide(job, max(math.ceil(len(job.keys) * rest / workers), LEAST_BATCH))
+        jobs_planned += divide(job, max(math.ceil(len(job.numbers) * rest / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
-        return trials_in(job.setting.parameters) * len(job.keys) or math.inf
+        return trials_in(job.setting.parameters) * len(job.numbers) or math.inf
 
     return sorted(jobs_planned, key=trials, reverse=True)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.benchmarks.worker import Job, Outcome
 from coartic.motion.solution import Execution, other_arm_travel
-from coartic.runs.plan import RunKey
 from coartic.runs.run import Run, Score, execute_all
 from coartic.tasks.task import hands_of
 from coartic.text import LONGEST_REASON, plain
@@ -25,10 +24,10 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     by_run: list[dict[str, Execution | Exception]] = [{} for _ in outcomes]
     for (n, part), execution in zip(parts, executions, strict=True):
         by_run[n][part] = execution
-    return [score_run(job, *each) for each in zip(job.keys, outcomes, by_run, strict=True)]
+    return [score_run(job, *each) for each in zip(job.numbers, outcomes, by_run, strict=True)]
 
 
-def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run:
+def score_run(job: Job, number: int, outcome: Outcome, parts: Executions) -> Run:
     """A run with the scores of its parts, of which it has none unless it is ok."""
     status, reason = final_status(outcome, parts)
     is_ok = status == "ok"
@@ -39,8 +38,9 @@ def score_run(job: Job, key: RunKey, outcome: Outcome, parts: Executions) -> Run
         corrections = solution.corrections
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
     return Run(
-        key=key,
         setting=job.setting,
+        suite_seed=job.suite_seed,
+        number=number,
         status=status,
         reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
         environment=outcome.environment or current_environment(),

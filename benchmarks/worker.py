@@ -30,7 +30,7 @@ from coartic.method import (
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
-from coartic.runs.plan import SEARCH, RunKey, Setting
+from coartic.runs.plan import SEARCH, Setting, run_seed
 from coartic.runs.run import PARTS, Times
 from coartic.text import error_line
 
@@ -41,7 +41,9 @@ class Job:
 
     setting: Setting
     method: MethodCard
-    keys: tuple[RunKey, ...]
+    suite_seed: int
+    numbers: tuple[int, ...]
+    """Numbers of the runs within their cell."""
     time_limit_s: float | None = None
     """CPU time of all its runs together."""
 
@@ -92,9 +94,9 @@ def fail(
     cpu_s: float | None = None,
 ) -> list[Outcome]:
     """The outcomes of a job whose worker gave none: ``timeout`` or ``crashed``."""
-    runs = len(job.keys)
+    runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
-    return [Outcome(status, reason, times=times) for _ in job.keys]
+    return [Outcome(status, reason, times=times) for _ in job.numbers]
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
@@ -123,9 +125,9 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     """The outcomes of a job from :func:`answer_of`, or that it crashed."""
     try:
         outcomes = _OUTCOMES.validate_python(json.loads(answer))
-        if len(outcomes) == len(job.keys):
+        if len(outcomes) == len(job.numbers):
             return outcomes
-        why = f"{len(outcomes)} for {len(job.keys)} runs"
+        why = f"{len(outcomes)} for {len(job.numbers)} runs"
     except (ValueError, TypeError, RecursionError) as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
@@ -137,13 +139,13 @@ def perform_job(job: Job) -> list[Outcome]:
     sessions = [
         Session(
             setting.task,
-            key.seed,
+            run_seed(job.suite_seed, setting.task.name, number),
             map(Information, setting.told),  # as declared, whatever became of the class since
             trial_budget=setting.trial_budget,
             trusted=job.method.is_ours,
             of_run=True,
         )
-        for key in job.keys
+        for number in job.numbers
     ]
     warm = setting.method in _seen
     _seen.add(setting.method)

@@ -11,7 +11,7 @@ from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
-from coartic.runs.plan import RunKey, Setting
+from coartic.runs.plan import Setting
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import shipped_optima, tiny_task
@@ -108,7 +108,7 @@ def test_methods_that_keep_every_law(methods, name):
 def test_what_a_session_shows_cannot_be_written(methods):
     card = methods["test/forger"]
     asked = Setting(load_task("ascending"), card.name, card.code, card.told, {}, None)
-    (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
+    (outcome,) = perform_job(Job(asked, card, 0, (0,)))
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
     assert "a method cannot set counter 'trials'" in outcome.details["said"]
@@ -120,7 +120,7 @@ def test_trials_outside_the_session_are_noticed(methods, means):
     card, task = methods["test/outsider"], load_task("ascending")
     asked = Setting(task, card.name, card.code, card.told, {"means": means}, None)
     for _ in range(2):
-        (outcome,) = perform_job(Job(asked, card, (RunKey("", 0, 0, 0),)))
+        (outcome,) = perform_job(Job(asked, card, 0, (0,)))
         assert outcome.status == "crashed"
         assert "trials outside its session" in outcome.reason
 

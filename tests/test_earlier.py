@@ -58,6 +58,12 @@ def ask(folder, column, name, value):
             asked = hashlib.sha256(text.encode()).hexdigest()
             values = json.dumps(read[column]), asked, row["id"]
             db.execute(f"UPDATE settings SET {column} = ?, asked = ? WHERE id = ?", values)
+            for run in db.execute(
+                "SELECT * FROM results WHERE setting = ?", [row["id"]]
+            ).fetchall():
+                text = f"{asked} {run['suite_seed']} {run['run']}"
+                run_id = f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{row['code']}"
+                db.execute("UPDATE results SET run_id = ? WHERE id = ?", [run_id, run["id"]])
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +81,7 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     assert check_runs(then).wrong == []
     run_id = load(now).runs.run_id[0]
     with open_store(then) as store:
-        assert store.run(run_id).key.id == run_id
+        assert store.run(run_id).id == run_id
     select = {"tasks": ["ascending"], "methods": ["NAME"], "method_files": [template.__file__]}
     plan = plan_suite("paper", runs=2, trials=20, **select)
     put_beside(plan, [then], tmp_path / "out")
@@ -108,7 +114,7 @@ def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
 def test_ids_begin_as_in_1_1(method, parameters, begins):
     """Those of suites quick, with 60 trials, and comparison; an id ends with the hash of code."""
     setting = Setting(load_task("ascending"), method, "", (), parameters, None)
-    assert setting.key(0, 0).id == begins
+    assert setting.run_id(0, 0) == begins
     row = setting.to_row()
     again = Setting.from_row(row | {"definition": json.dumps(row["definition"])}, "")
     assert again == setting  # told nothing

@@ -26,7 +26,7 @@ from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
 from coartic.benchmarks.worker import Job, Outcome, fail
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.method import Information, Meter, Session
-from coartic.runs.plan import RunKey, Setting, run_seed
+from coartic.runs.plan import Setting, run_seed
 from coartic.runs.run import Times, movements_from, too_long
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
@@ -83,7 +83,7 @@ def test_long_runs_begin_first(tmp_path):
         workers = 2
 
         def perform(self, jobs):
-            begun.extend((job.setting.method, len(job.keys)) for job in jobs)
+            begun.extend((job.setting.method, len(job.numbers)) for job in jobs)
             return super().perform(jobs)
 
     cells = suite_of(
@@ -126,7 +126,7 @@ def test_seeds_are_paired_by_task_and_run(results):
 def test_run_ids_name_what_the_run_depends_on():
     def first(cells=None, **changes):
         plan = planned(cells or paper_cells()[:1], **{"runs": 1, "trials": 10, **changes})
-        return plan.key(0, 0).id
+        return plan.run_id(0, 0)
 
     (cell, other), base = paper_cells()[:2], first()
     assert base == first()
@@ -271,7 +271,6 @@ def test_the_runs_of_a_batch_are_scored():
     task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
     setting = Setting(task, card.name, card.code, card.told, {}, None)
-    keys = tuple(RunKey(f"run-{k}", 0, k, 10 + k) for k in range(4))
     times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
     told = {"parts": {"solution": movements}, "times": times}
@@ -282,18 +281,18 @@ def test_the_runs_of_a_batch_are_scored():
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
     ]  # fmt: skip
-    job = Job(setting, card, keys, 60.0)
+    job = Job(setting, card, 5, (0, 1, 2, 3), 60.0)
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
-    columns = ["run_id", "run", "seed", "status", "reward", "hands", "best_trial",
+    columns = ["run", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
                "replay_reward", "proven_bound", "together", "wall_s", "cpu_s"]  # fmt: skip
     nothing = [None] * 9
     assert [[run.to_row()[name] for name in columns] for run in runs] == [
-        ["run-0", 0, 10, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, -300, 4, 2.0, 1.0],
-        ["run-1", 1, 11, "ok", -319, "RRR", None, None, None, 3, 0.0, None, None, 4, 2.0, 1.0],
-        ["run-2", 2, 12, "solver-failed", *nothing, 4, 2.0, 1.0],
-        ["run-3", 3, 13, "solver-failed", *nothing, 1, None, None],
-        ["run-0", 0, 10, "timeout", *nothing, 4, 2.0, None],
+        [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, -300, 4, 2.0, 1.0],
+        [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, None, 4, 2.0, 1.0],
+        [2, "solver-failed", *nothing, 4, 2.0, 1.0],
+        [3, "solver-failed", *nothing, 1, None, None],
+        [0, "timeout", *nothing, 4, 2.0, None],
     ]
     reasons = ["", "", "it reported ok, but returned no solution", runs[3].reason, "too slow"]
     assert [run.reason for run in runs] == reasons
@@ -309,7 +308,7 @@ def test_a_solution_that_misses_a_goal_is_infeasible():
     )  # fmt: skip
     card = KNOWN["corrective-alone/given"]
     setting = Setting(stuck, card.name, card.code, card.told, {}, None)
-    job = Job(setting, card, (RunKey("run", 0, 0, 1),), 60.0)
+    job = Job(setting, card, 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.status, run.scores) == ("infeasible", {})
 

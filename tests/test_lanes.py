@@ -61,7 +61,7 @@ class Nobody(InProcess):
 
     def perform(self, jobs):
         for job, outcomes in super().perform(jobs):
-            lost = len(job.keys) > 1
+            lost = len(job.numbers) > 1
             yield job, fail(job, "crashed", "exit code 9", 1.0) if lost else outcomes
 
 

@@ -245,7 +245,7 @@ def test_other_methods_and_the_parent_notice_nothing(folder, runs):
 def test_workers_that_cannot_begin_get_a_sentence():
     plan = planned([Cell(load_task("ascending"), KNOWN["dual-process/EC1"])])
     task = load_task("ascending").model_copy(update={"goals": ()})
-    job = Job(replace(plan.settings[0], task=task), plan.cells[0].method, (plan.key(0, 0),))
+    job = Job(replace(plan.settings[0], task=task), plan.cells[0].method, 0, (0,))
     with pytest.raises(CoarticError, match="processes cannot begin"):
         list(Local(1).perform([job] * 10))
 

@@ -56,7 +56,7 @@ def written(tmp_path_factory):
     handed, write_runs = {}, Store.write
 
     def write(store, runs):
-        handed.update((run.key.id, run) for run in runs)
+        handed.update((run.id, run) for run in runs)
         write_runs(store, runs)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -132,7 +132,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         with pytest.raises(CoarticError, match="cannot be stored: UNIQUE"):
             store.write([unlike])  # paths of two parts
     with open_store(tmp_path) as store:
-        assert plain(store.run(run.key.id)) == plain(run)
+        assert plain(store.run(run.id)) == plain(run)
 
 
 def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):

@@ -53,8 +53,7 @@ def run_of(setting, number, parts, **more):
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
         more |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
     scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
-    key = setting.key(0, number)
-    return Run(key, setting, **{"status": "ok"} | more, reason="", environment={}, date="",
+    return Run(setting, 0, number, **{"status": "ok"} | more, reason="", environment={}, date="",
                scores=scores)  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def animate(
     movements = []
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
-        movement, number = trajectory_of(place, found), found.key.number
+        movement, number = trajectory_of(place, found), found.number
         title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
         movements.append((title, movement))
     if initial:

@@ -224,14 +224,14 @@ def reproduce(
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
     _, run = find_run(run_id, folder)
-    key, asked, registered = run.key, run.setting, registry(method_file or [])
+    asked, registered = run.setting, registry(method_file or [])
     if asked.method not in registered:
         raise CoarticError(f"unknown method {asked.method!r}: pass --method-file FILE")
     result = f"reward {run.reward}, hands {run.hands}"
     say_pairs(
         [
-            ("Run", f"{key.id}: {asked.method} on {asked.task.name}, run {key.number}"),
-            ("Seed", str(key.seed)),
+            ("Run", f"{run.id}: {asked.method} on {asked.task.name}, run {run.number}"),
+            ("Seed", str(run.seed)),
             ("Parameters", ", ".join(f"{k}={v}" for k, v in asked.parameters.items())),
             ("Result", result if run.status == "ok" else f"{run.status}: {run.reason}"),
         ]

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, TypeAdapter
@@ -20,7 +20,6 @@ from coartic.tasks.task import Task, parse_task
 
 SEARCH = "optimum/"
 """Ids of the searches for the optimum begin so; they alone may state a bound."""
-_KEY = 16  # digits of a hash
 
 
 @dataclass(frozen=True)
@@ -49,16 +48,6 @@ class Cell:
     def label(self) -> str:
         """The method with its variant."""
         return label_of(self.method.name, self.variant)
-
-
-class RunKey(NamedTuple):
-    """Which run it is."""
-
-    id: str
-    suite_seed: int
-    number: int
-    """From 0, within its cell."""
-    seed: int
 
 
 @dataclass(frozen=True)
@@ -133,11 +122,10 @@ class Setting:
                 "version of coartic that ran it reads it"
             )
 
-    def key(self, suite_seed: int, number: int) -> RunKey:
-        """The key of a run. Its id is a hash of setting, seed and number, then that of the code."""
+    def run_id(self, suite_seed: int, number: int) -> str:
+        """The id of a run: a hash of setting, seed and number, then that of the code."""
         text = f"{self.asked} {suite_seed} {number}"
-        run_id = f"{hashlib.sha256(text.encode()).hexdigest()[:_KEY]}-{self.code}"
-        return RunKey(run_id, suite_seed, number, run_seed(suite_seed, self.task.name, number))
+        return f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{self.code}"
 
 
 @dataclass(frozen=True)
@@ -231,9 +219,9 @@ class Plan:
             raise ValueError("two cells have one setting")
         return plan
 
-    def key(self, position: int, number: int) -> RunKey:
-        """The key of a run of the cell at this position."""
-        return self.settings[position].key(self.seed, number)
+    def run_id(self, position: int, number: int) -> str:
+        """The id of a run of the cell at this position."""
+        return self.settings[position].run_id(self.seed, number)
 
 
 _OF_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")

@@ -20,7 +20,7 @@ from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import Execution, Movement, execute_many
-from coartic.runs.plan import RunKey, Setting
+from coartic.runs.plan import Setting, run_seed
 from coartic.tasks.task import Task
 
 RESULTS = {
@@ -99,8 +99,10 @@ class Times:
 class Run:
     """One run."""
 
-    key: RunKey
     setting: Setting
+    suite_seed: int
+    number: int
+    """From 0, within its cell."""
     status: str
     """One of :data:`STATUSES`."""
     reason: str
@@ -126,6 +128,16 @@ class Run:
     """Declared information that the method used."""
     details: dict[str, Any] = field(default_factory=dict)
     """Whatever the method keeps beside its solution."""
+
+    @cached_property
+    def id(self) -> str:
+        """A hash of setting, seed of the suite and number, then that of the code."""
+        return self.setting.run_id(self.suite_seed, self.number)
+
+    @property
+    def seed(self) -> int:
+        """The seed of its random numbers."""
+        return run_seed(self.suite_seed, self.setting.task.name, self.number)
 
     @property
     def reward(self) -> int | None:
@@ -193,10 +205,10 @@ class Run:
             prefix = PREFIXES[part]
             row |= {f"{prefix}reward": score.reward, f"{prefix}hands": score.hands}
         return row | {
-            "run_id": self.key.id,
-            "suite_seed": self.key.suite_seed,
-            "run": self.key.number,
-            "seed": self.key.seed,
+            "run_id": self.id,
+            "suite_seed": self.suite_seed,
+            "run": self.number,
+            "seed": self.seed,
             "status": self.status,
             "reason": self.reason,
             "best_trial": self.best_trial,
@@ -221,13 +233,17 @@ class Run:
         movements: Mapping[str, tuple[Movement, ...]],
         rewards: list[int | None],
     ) -> Run:
-        """A run from its columns, its movements by part, and the rewards of its trials."""
+        """A run from its columns, its movements by part, and the rewards of its trials.
+
+        Raises ValueError where it is not the run of its id.
+        """
         made_trials = row["trials"] is not None
         times = {each.name: row[each.name] for each in fields(Times)}
         warm = None if row["warm"] is None else bool(row["warm"])
-        return cls(
-            key=RunKey(row["run_id"], row["suite_seed"], row["run"], row["seed"]),
+        run = cls(
             setting=setting,
+            suite_seed=row["suite_seed"],
+            number=row["run"],
             status=row["status"],
             reason=row["reason"],
             environment=environment,
@@ -247,6 +263,9 @@ class Run:
             used=tuple(filter(None, row["used"].split(", "))),
             details=json.loads(row["details"]),
         )
+        if (run.id, run.seed) != (row["run_id"], row["seed"]):
+            raise ValueError(f"run {row['run_id']} is not the run that its id says")
+        return run
 
 
 def movements_from(

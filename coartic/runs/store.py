@@ -252,7 +252,7 @@ class Store:
                     self._write_run(run)
                 except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
                     raise CoarticError(
-                        f"run {run.key.id} of method {run.setting.method} cannot be stored: {error}"
+                        f"run {run.id} of method {run.setting.method} cannot be stored: {error}"
                     ) from None
 
     def run(self, run_id: str) -> Run:
@@ -331,7 +331,7 @@ class Store:
 
     def _write_run(self, run: Run) -> None:
         """Put a run into the tables, in place of an earlier one of its id."""
-        if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.key.id):
+        if earlier := self._one("SELECT id FROM results WHERE run_id = ?", run.id):
             for table in ("movements", "waypoints", "learning"):
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
