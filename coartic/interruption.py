@@ -59,6 +59,9 @@ def end_if_interrupted() -> None:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """A process that begins meanwhile is not told to end: Ctrl-C tells all that a terminal has."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         yield

@@ -88,13 +88,15 @@ def begin_worker(folder: Path | None = None) -> None:
     nobody = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nobody, stream)
-    os.setpgid(0, 0)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def end_group(pid: int) -> None:
     """End a worker, and all processes in its group, unless it does not lead one yet."""
-    for end in (os.killpg, os.kill):
-        with contextlib.suppress(OSError):
-            end(pid, signal.SIGKILL)
+    for end in (getattr(os, "killpg", None), os.kill):
+        if end is not None:
+            with contextlib.suppress(OSError):
+                end(pid, getattr(signal, "SIGKILL", signal.SIGTERM))

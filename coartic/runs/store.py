@@ -479,14 +479,18 @@ def writing(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Have a folder in this block alone, or with others that share it, where the disk has such
-    locks. What other programs read there is no matter.
+    """Have a folder in this block alone, or with others that share it, where the system and the
+    disk have such locks. What other programs read there is no matter.
 
     Raises CoarticError where another process has it.
     """
-    import fcntl
+    try:
+        import fcntl
 
-    opened = os.open(folder, os.O_RDONLY)
+        opened = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield
+        return
     end = time.monotonic() + (0 if shared else WAIT_S)  # somebody may just be looking
     try:
         while True:
