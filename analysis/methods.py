@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
 
 from coartic import Task
-from coartic.analysis.words import read_beside
 from coartic.inputs import FileData
 from coartic.learner import conditions
 from coartic.learner.conditions import METHOD_PREFIX
@@ -55,7 +56,7 @@ class KnownMethod(FileData):
 
 
 KNOWN_METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
-    read_beside(__file__)
+    tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 )
 """Rows of the built-in methods by id, in the order of lists and figures."""
 HEADLINES = tuple(name for name, row in KNOWN_METHODS.items() if row.headline)

@@ -158,8 +158,7 @@ SECTIONS = (
         sentence=coarticulation.joints_or_hand,
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
-        "hand nearer: share of the way to its next goal that a hand covers while waiting. The CSV "
-        "file has tests against random guesses.",
+        "hand nearer: share of the way to its next goal that a hand covers while waiting.",
     ),
     Section(
         "families",

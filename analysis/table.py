@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterator
 from functools import wraps
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 
 from coartic.analysis.settings import names_of_settings
 from coartic.analysis.study import CellRuns, Study, cached
-from coartic.analysis.words import marked, read_beside
+from coartic.analysis.words import marked
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -30,7 +32,10 @@ class Column(NamedTuple):
     page: bool = True
 
 
-COLUMNS = {name: Column(**row) for name, row in read_beside(__file__, "columns").items()}
+COLUMNS = {
+    name: Column(**row)
+    for name, row in tomllib.loads(Path(__file__).with_name("columns.toml").read_text()).items()
+}
 """Headers and formats of columns; other columns go by their names."""
 
 

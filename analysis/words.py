@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coartic.text import one_line
@@ -31,16 +29,6 @@ _LATEX = str.maketrans(
 )
 LONGEST_SLUG = 80
 """Characters of a slug before its number, since names of files must not be too long."""
-
-
-def read_beside(module: str, name: str = "") -> dict[str, Any]:
-    """The TOML file beside a module, of the module's name or another.
-
-    ``module``: its ``__file__``.
-    """
-    path = Path(module)
-    file = path.with_name(f"{name}.toml") if name else path.with_suffix(".toml")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def id_of(function: Callable[..., Any]) -> str:

@@ -146,8 +146,14 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
         more = min(does.mean() - of_placebo.mean(), does.mean() - margins.FEW)
         tests.append(Estimate(more, p=p, n=(total, len(of_placebo))))
         against.append(share_test(count, total, margins.FEW, "less"))
-        seen = gained_by_slower(read.cell(task, label), chosen[label])
-        parts.append(f"{task} {who_is(label)}: {count} of {total} runs{seen}")
+        parts.append(f"{task} {who_is(label)}: {count} of {total} runs")
+        if count:
+            ticks = number(chosen[label][does].mean(), 0)
+            parts[-1] += f", slower for these goals by {ticks} ticks"
+        if 0 < count < total:
+            rewards = np.array([run.reward for run in read.cell(task, label).runs], dtype=float)
+            better = estimate(difference_of_means(rewards[does], rewards[~does]), 1)
+            parts[-1] += f", which end with {better} ticks more reward than the others"
     parts.append(f"{methods.name_of(placebo)}: {of_placebo.sum()} of {len(of_placebo)} runs")
     best = min(tests, key=lambda test: (test.value <= 0, test.p))
     test = replace(best, p=min(1.0, best.p * len(tests)))
@@ -163,19 +169,6 @@ def chosen_slower(cell: Solutions, initial: str) -> Array:
     first = [HANDS.index(hand) for hand in hands_of(initial)]
     slower = np.where(cell.hands != first, ticks_slower(cell), 0.0)
     return np.asarray(slower[:, :-1].sum(axis=1))
-
-
-def gained_by_slower(cell: Solutions, slower: Array) -> str:
-    """By how many ticks such runs are slower, and how much better they end than the others."""
-    rewards = np.array([run.reward for run in cell.runs], dtype=float)
-    with_it, without_it = rewards[slower > 0], rewards[slower == 0]
-    if not len(with_it):
-        return ""
-    words = f", slower for these goals by {number(slower[slower > 0].mean(), 0)} ticks"
-    if len(without_it):
-        better = difference_of_means(with_it, without_it)
-        words += f", which end with {estimate(better, 1)} ticks more reward than the others"
-    return words
 
 
 CLAIMS_OF_COARTICULATION = [

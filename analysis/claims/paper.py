@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from statistics import mode
 
 import numpy as np
 from scipy import optimize, stats
@@ -252,26 +253,17 @@ def no_reversal(read: Reader) -> Finding:
     runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
         raise MissingError(f"no run of EC2 on {TASK_1} learned RRLR")
-    rightward = [bool((base_steps(q0, run.configurations) > 0).all()) for run in runs]
+    along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # the base, length unit
+    rightward = [bool((np.diff(x) > 0).all()) for x in along]
     words = runs_that(TASK_1, EC2, "RRLR rightward", rightward, learned)
     return most_do(words, rightward)
-
-
-def base_steps(start: Array, configurations: Array) -> Array:
-    """How far the base moves along x from goal to goal, length unit, shape ``(G,)``."""
-    return np.diff(np.append(start[0], configurations[:, 0]))
 
 
 def ec4_mixed(read: Reader) -> Finding:
     """Runs learn different hands."""
     learned = read.hands(TASK_2, EC4)
-    others = [hands != commonest(learned) for hands in learned]
+    others = [hands != mode(learned) for hands in learned]
     return Finding(any(others), runs_that(TASK_2, EC4, "not commonest", others, learned))
-
-
-def commonest(learned: list[str]) -> str:
-    """The sequence that most runs learned."""
-    return Counter(learned).most_common(1)[0][0]
 
 
 def proficiency_rises(read: Reader) -> Finding:
@@ -289,7 +281,7 @@ def rail(read: Reader) -> Finding:
     findings = []
     for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
         learned = read.hands(task, EC3)
-        does = [hands == commonest(learned) for hands in learned]
+        does = [hands == mode(learned) for hands in learned]
         words = runs_that(task, EC3, "commonest", does, learned)
         findings.append(most_do(words, does, claimed=consistent))
     return all_of(*findings)

@@ -66,5 +66,5 @@ def claims_hold(study: Study) -> str:
     judged = papers_claims(study)
     if judged.empty:
         return ""
-    failed = (cell for cells in judged.failed for cell in cells)
-    return verdicts_in_words(judged) + failed_runs(study, failed, ", which leaves claims undecided")
+    failed = (study.cells[key] for keys in judged.failed for key in keys)
+    return verdicts_in_words(judged) + failed_runs(failed, ", which leaves claims undecided")

@@ -86,12 +86,9 @@ def list_contexts(study: Study) -> Rows:
             yield f"{first.name} {label} goal {shared.goal} {shared.hand}", row
 
 
-@table("task, method, runs, first, first_p, total, as_in_isolation, preshaping, preshaping_p")
+@table("task, method, runs, first, total, as_in_isolation, preshaping")
 def list_signatures(study: Study) -> Rows:
-    """The main signatures of every main method on every task, means over runs and goals.
-
-    ``first_p`` and ``preshaping_p`` are of the tests against the placebo.
-    """
+    """The main signatures of every main method on every task, means over runs and goals."""
     for task in (name for name in study.tasks if name in one_by_one(study)):
         labels = [label for name, label in study.cells if name == task]
         for label in in_order(shown_methods(study, labels)):
@@ -102,11 +99,9 @@ def list_signatures(study: Study) -> Rows:
                     "method": label,
                     "runs": len(cell.good),
                     "first": mean_of_goals(SIGNS["first"].each(runs)[:, None]),
-                    "first_p": placebo.sign_beyond_p(study, task, label, "first"),
                     "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
                     "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
                     "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
-                    "preshaping_p": placebo.sign_beyond_p(study, task, label, "other arm"),
                 }
                 yield f"{task} {label}", row | runs_of(cell)
 
@@ -188,8 +183,8 @@ def next_goal(study: Study) -> str:
     if shared is None:
         return ""
     # A method whose runs differ by chance takes a test, and one that selects needs a placebo.
-    cells = [(task.name, shared.method) for task in shared.tasks]
-    drawn = study.plan.methods[study.cells[cells[0]].method].stochastic
+    cells = [study.cells[task.name, shared.method] for task in shared.tasks]
+    drawn = study.plan.methods[cells[0].method].stochastic
     needed = placebo.selects(study, shared.method)
     guesses = placebo.placebo_of(study, shared) if needed else None
     beyond = math.nan if guesses is None else shared.p_beyond(guesses)
@@ -217,7 +212,7 @@ def next_goal(study: Study) -> str:
             f"Undecided: the {who} {apart}, and no placebo with as many trials ran. Add the method "
             "placebo/guesses."
         )
-    return text + failed_runs(study, cells, " and are not counted")
+    return text + failed_runs(cells, " and are not counted")
 
 
 def joints_or_hand(study: Study) -> str:

@@ -260,10 +260,10 @@ def what_it_costs(study: Study) -> str:
             f"trials; {names[1]} needs {theirs}. In the end they reach {ends[0]} and {ends[1]} of "
             "the reward targets."
         )
-    cells = [
-        (task, cell.label)
-        for method, of_method in scores.compared(study).items()
+    cells = (
+        cell
+        for method, by_task in scores.compared(study).items()
         if scores.groups(study)[method] == scores.BY_TRIAL
-        for task, cell in of_method.items()
-    ]
-    return text + failed_runs(study, cells, " and count as reaching nothing")
+        for cell in by_task.values()
+    )
+    return text + failed_runs(cells, " and count as reaching nothing")

@@ -6,21 +6,20 @@ from collections import Counter
 from collections.abc import Iterable
 
 from coartic.analysis.methods import name_of
-from coartic.analysis.study import CellKey, Study
+from coartic.analysis.study import CellRuns
 from coartic.analysis.words import number
 
 
-def failed_runs(study: Study, cells: Iterable[CellKey], consequence: str) -> str:
+def failed_runs(cells: Iterable[CellRuns], consequence: str) -> str:
     """A sentence with a leading space; empty where none of the cells' runs failed.
 
     It counts all runs of the methods of which some failed, and ends with the ``consequence``:
     `` 3 of 40 runs of hill climbing failed and are not counted.``
     """
     runs, failed = Counter[str](), Counter[str]()
-    for task, label in dict.fromkeys(cells):
-        cell = study.cells[task, label]
-        runs[label] += len(cell.runs)
-        failed[label] += len(cell.runs) - len(cell.good)
+    for cell in {(cell.task, cell.label): cell for cell in cells}.values():
+        runs[cell.label] += len(cell.runs)
+        failed[cell.label] += len(cell.runs) - len(cell.good)
     who = [label for label in failed if failed[label]]
     if not who:
         return ""

@@ -14,7 +14,6 @@ import numpy as np
 from coartic.analysis.methods import PLACEBOS
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.analysis.topics.scores import BY_TRIAL, groups
 from coartic.robot import Array
@@ -65,15 +64,3 @@ def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
         return math.nan
     placebo = placebo_of(study, contexts)
     return math.nan if placebo is None else contexts.p_beyond(placebo)
-
-
-def sign_beyond_p(study: Study, task: str, label: str, sign: str) -> float:
-    """Two-tailed p of the bootstrap test of a sign of coarticulation against the placebo's.
-
-    NaN for a method that selects nothing, and where one of both has fewer than two values.
-    """
-    if not selects(study, label):
-        return math.nan
-    ours, guesses = SIGNS[sign].of(study.executed(task, label)), of_placebo(study, task, sign)
-    several = min(len(ours), len(guesses)) > 1
-    return bootstrap_test(ours, guesses, "two-sided").p if several else math.nan

@@ -248,9 +248,8 @@ def nearest(study: Study) -> str:
         best = by_formula.iloc[0]
         text += f" The best planner that knows the reward as a formula ends {gap(best)} away"
         text += f"{declared(best.method)}."
-    cells = [(task, cell.label) for cells in scores.compared(study).values()
-             for task, cell in cells.items()]  # fmt: skip
-    failed = failed_runs(study, cells, ", which bars a method from the ranking")
+    cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
+    failed = failed_runs(cells, ", which bars a method from the ranking")
     return text + from_files(study) + failed
 
 
