@@ -167,16 +167,13 @@ SEQUENCES = {
 
 
 def planted_study(rows, sequences=SEQUENCES, tasks=()):
-    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    given = {task.name: task for task in tasks}
-    by_name = {
-        name: given[name] if name in given else load_task(name) for name in runs.task.unique()
-    } | given
+    by_name = {each["task"]: load_task(each["task"]) for each in rows if "." not in each["task"]}
+    by_name |= {task.name: task for task in tasks}
     tables = {
         name: pd.DataFrame(sequences.get(name, {}).items(), columns=["hands", "reward"])
         for name in by_name
     }
-    return MadeUp(study_of(runs, list(by_name.values())), sequences=tables.__getitem__)
+    return study_of(rows, by_name.values(), sequences=tables.__getitem__)
 
 
 def verdict_of(claim, study):

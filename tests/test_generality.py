@@ -15,7 +15,7 @@ from coartic.analysis.sections import TABLES
 from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
-from tests.support.made_up import MadeUp, made, row, study_of
+from tests.support.made_up import made, row, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -53,13 +53,11 @@ def rewarded(centres, *, families=FEW, split="i", optima=True, count=COUNT):
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
-    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
     sequences = {
         (task.name,): pd.DataFrame({"hands": [hands_of(task.name)], "reward": [ALONE]})
         for task in tasks
     }
-    parts = {"sequences": made(sequences)} | {"optima": best if optima else {}}
-    return MadeUp(study_of(runs, tasks), **parts)
+    return study_of(rows, tasks, sequences=made(sequences), optima=best if optima else {})
 
 
 RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}

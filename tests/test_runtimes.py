@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError
 from coartic.analysis import runtimes
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -32,10 +32,7 @@ def study():
     for task, reward in PLANNED.items():
         rows.append(row(PLAN, reward, task=task, run_id=f"{task}{PLAN}", trials=0, seed=0,
                         forward_kinematics=7, warm=True))  # fmt: skip
-    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    made_up = study_of(frame, [load_task(ONE), load_task(TWO)])
-    parts = {"optima": made_up_optima(ONE, TWO), "rewards": lambda: iter(rewards.items())}
-    return MadeUp(made_up, **parts)
+    return study_of(rows, optima=made_up_optima(ONE, TWO), rewards=lambda: iter(rewards.items()))
 
 
 def share_by_hand(tasks, method, targets, trials):

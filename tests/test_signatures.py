@@ -6,7 +6,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import linalg
 
@@ -24,7 +23,7 @@ from coartic.analysis.signatures.two_contexts import (
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.topics import coarticulation, placebo
 from coartic.robot import HANDS
-from tests.support.made_up import MadeUp, made, row, study_of
+from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
 
 
@@ -337,8 +336,7 @@ def study_with(*cells):
     ]  # fmt: skip
     executed = {(cell.task.name, cell.label): cell for cell in cells}
     executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
-    study = study_of(pd.DataFrame(rows), [cell.task for cell in cells])
-    return MadeUp(study, executed=made(executed))
+    return study_of(rows, [cell.task for cell in cells], executed=made(executed))
 
 
 def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):

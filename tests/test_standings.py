@@ -4,11 +4,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
-from coartic import load_task
 from coartic.analysis import frames
 from coartic.analysis.sections import TABLES
 from coartic.analysis.statistics import running_times
@@ -26,10 +24,7 @@ def study(rewards):
         for (task, method), of_method in rewards.items()
         for k, reward in enumerate(of_method)
     ]
-    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    names = list(dict.fromkeys(runs.task))
-    made_up = study_of(runs, [load_task(name) for name in names])
-    return MadeUp(made_up, optima=made_up_optima(*names))
+    return study_of(rows, optima=made_up_optima(*{each["task"] for each in rows}))
 
 
 def test_gaps_are_from_the_initial_solution_to_the_optimum():
@@ -119,8 +114,7 @@ def test_a_failed_run_reaches_nothing():
     failed = (seen.runs.method == other) & (seen.runs.run > 1)
     runs = seen.runs.assign(status=np.where(failed, "timeout", "ok"))
     runs["reward"] = runs.reward.mask(failed)
-    again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
-    vars(again)["rewards"] = lambda: iter(())
+    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
     assert ranking.main_gaps(again).method.tolist() == [learner]
     assert TABLES["against-learner"](again).empty
     assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
@@ -131,7 +125,7 @@ def test_a_failed_run_reaches_nothing():
 def test_a_locked_base_is_another_problem():
     seen = study({("ascending", name): [-300] * 3 for name in ("dual-process/EC1", "mine")})
     locked = seen.runs.assign(parameters=np.where(seen.runs.method == "mine", '{"base": ""}', "{}"))
-    again = MadeUp(study_of(locked, list(seen.tasks.values())), optima=seen.optima)
+    again = study_of(locked, optima=seen.optima)
     assert ranking.main_gaps(again).method.tolist() == ["dual-process/EC1"]
     assert list(costs.cells_compared(again)) == ["dual-process/EC1"]
 
@@ -190,8 +184,7 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     seen = study(rewards)
     learns = seen.runs.method.str.contains("/EC")
     runs = seen.runs.assign(variant=np.where(learns, "", "width=0.2"))
-    again = MadeUp(study_of(runs, list(seen.tasks.values())), optima=seen.optima)
-    vars(again)["rewards"] = lambda: iter(())
+    again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
     ranked = TABLES["ranking"](again)
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]
     assert not any("climbing" in name for name in ranked.index)

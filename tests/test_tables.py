@@ -10,11 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import load_task
 from coartic.analysis.sections import TABLES
 from coartic.analysis.topics import costs
 from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
-from tests.support.made_up import MadeUp, made_up_optima, row, study_of
+from tests.support.made_up import made_up_optima, row, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
@@ -53,10 +52,7 @@ def study():
     for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100)):
         rows.append(row(PLAN, reward, task=task, run_id=f"{task}-plan", trials=0, told=told,
                         forward_kinematics=500, movement_ticks=ticks, seed=0))  # fmt: skip
-    frame = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
-    made_up = study_of(frame, [load_task(ONE), load_task(TWO)])
-    parts = {"optima": made_up_optima(ONE, TWO), "rewards": lambda: iter(rewards.items())}
-    return MadeUp(made_up, **parts)
+    return study_of(rows, optima=made_up_optima(ONE, TWO), rewards=lambda: iter(rewards.items()))
 
 
 def same(table, expected):

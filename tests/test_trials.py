@@ -89,3 +89,15 @@ def test_no_number_of_threads_changes_a_trial(monkeypatch):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
         for one, other in zip(make_trials(task, hands, targets), alone, strict=True):
             np.testing.assert_array_equal(one, other)
+
+
+def test_until_the_first_that_is_better():
+    task = load_task("two-armed-2")
+    hands, targets = sample(task, 12)
+    rewards = Session(task, 0, TOLD).trials(hands, targets).rewards
+    until = np.full(12, np.inf)
+    until[[2, 5, 9]] = rewards[[2, 5, 9]] - [0.0, 1.0, 1.0]  # the first one is equalled
+    session, alone = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    np.testing.assert_array_equal(session.trials(hands, targets, until=until).rewards, rewards[:6])
+    alone.trials(hands[:6], targets[:6])
+    assert session.meter == alone.meter

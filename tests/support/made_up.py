@@ -1,9 +1,11 @@
 """Rows of runs that nobody ran, for what is computed of them."""
 
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+import pandas as pd
+
+from coartic import load_task
 from coartic.analysis.study import Study
 from coartic.runs.card import MethodCard
 from coartic.runs.plan import Cell, Plan
@@ -60,28 +62,24 @@ def declared(method):
     return MethodCard(method, method, "", (), (), stochastic, {}, "built in", "")
 
 
-def plan_for(tasks, runs=None, *, trials=10_000, **more):
+def plan_for(tasks, runs=None):
     """A plan with these tasks and the cells that the rows of runs are of."""
     keys = ["task", "method", "variant"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
     by_name = {task.name: task for task in tasks}
-    cells = [
-        Cell(by_name[row["task"]], declared(row["method"]), parameters_of(row["variant"]), runs=3)
-        for row in rows
-    ]
-    plan = Plan(
-        suite="paper", runs=3, seed=0, trials=trials, time_limit_s=None, trial_budget=None,
+    cells = []
+    for each in rows:
+        parameters = dict(item.split("=") for item in each["variant"].split(", ") if item)
+        cells.append(Cell(by_name[each["task"]], declared(each["method"]), parameters, runs=3))
+    return Plan(
+        suite="paper", runs=3, seed=0, trials=10_000, time_limit_s=None, trial_budget=None,
         cells=tuple(cells),
     )  # fmt: skip
-    return replace(plan, **more)
 
 
-def parameters_of(variant):
-    """Parameters that make a variant."""
-    return dict(item.split("=") for item in variant.split(", ") if item)
-
-
-def study_of(runs, tasks, *, folder="made-up", trials=10_000, **more):
-    """A study of rows of runs on tasks."""
-    plan = plan_for(tasks, runs, trials=trials, **more)
-    return Study(Path(folder), plan, MADE_WITH, runs)
+def study_of(rows, tasks=None, **parts):
+    """A study of rows of runs, with parts made up; tasks are those of the names unless given."""
+    runs = pd.DataFrame(rows).astype({"reward": "Int64", "proven_bound": "Int64"})
+    if tasks is None:
+        tasks = [load_task(name) for name in runs.task.unique()]
+    return MadeUp(Study(Path("made-up"), plan_for(tasks, runs), MADE_WITH, runs), **parts)
