@@ -28,15 +28,6 @@ _NOTED_EACH = 5  # generations: how often best and median are noted
 _MOST_NOTED = 20_000
 
 
-def expected_length(dim: int) -> float:
-    """Expected length of a standard normal vector of so many entries."""
-    if dim > 100:
-        return float(dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2)))
-    from scipy.special import gamma  # slow, and a command that names methods needs none
-
-    return float(2**0.5 * gamma((dim + 1) / 2) / gamma(dim / 2))
-
-
 class EvolutionStrategy:
     """One strategy: :meth:`ask`, then :meth:`tell`, until :meth:`has_ended`."""
 
@@ -81,7 +72,12 @@ class EvolutionStrategy:
         self._stalled = np.array([c_1 * (1 - self._c_path * (2 - self._c_path)), *of_points])
         narrow = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((selected - 1) / (dim + 1)) ** 0.5 - 1
         self._damping = 1 + 2 * max(0, narrow) + self._c_step  # of the step size, d_σ
-        self._length = expected_length(dim)
+        if dim > 100:  # expected length of a standard normal vector
+            self._length = dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2))
+        else:
+            from scipy.special import gamma  # slow, and a command that names methods needs none
+
+            self._length = float(2**0.5 * gamma((dim + 1) / 2) / gamma(dim / 2))
         self._gap = 1 / (c_1 + rate) / dim / 10  # generations between decompositions, at least
         self._patience = int(100 + 100 * dim**1.5 / size)  # generations that it may stagnate
         self._most_generations = 100 + 150 * (dim + 3) ** 2 // size**0.5

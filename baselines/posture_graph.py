@@ -126,7 +126,23 @@ class PostureGraph:
             longer = [more for beginning in kept for more in self.longer(beginning)]
             ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
             kept = [longer[i] for i in sorted(ranked[:most])]
-        return [self.chain_of(complete) for complete in kept]
+        chains: list[Chain] = []
+        for hands, cost, back in ((whole.hands, whole.cost, whole.back) for whole in kept):
+            i, j = np.unravel_index(cost.argmin(), cost.shape)
+            picked = []
+            for goal in reversed(range(len(hands))):
+                picked.append(self.layers[goal, hands[goal]][i])
+                came = back[goal][i, j]
+                same = goal == 0 or hands[goal - 1] == hands[goal]
+                i, j = (came, j) if same else (j, came)
+            configurations, q = [], np.array(self.task.q0)
+            for hand, node in zip(hands, reversed(picked), strict=True):
+                q = q.copy()
+                q[:BASE_DOF] = node[:BASE_DOF]
+                q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
+                configurations.append(q)
+            chains.append((hands, np.array(configurations)))
+        return chains
 
     def longer(self, begun: Beginning) -> Iterator[Beginning]:
         """Beginnings by one goal longer."""
@@ -149,24 +165,6 @@ class PostureGraph:
                 total = came_from[:, other, None] + ways
                 came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
             yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*begun.back, came))
-
-    def chain_of(self, complete: Beginning) -> Chain:
-        """The cheapest chain of a whole sequence."""
-        hands, cost, back = complete.hands, complete.cost, complete.back
-        i, j = np.unravel_index(cost.argmin(), cost.shape)
-        picked = []
-        for goal in reversed(range(len(hands))):
-            picked.append(self.layers[goal, hands[goal]][i])
-            came = back[goal][i, j]
-            same = goal == 0 or hands[goal - 1] == hands[goal]
-            i, j = (came, j) if same else (j, came)
-        configurations, q = [], np.array(self.task.q0)
-        for hand, node in zip(hands, reversed(picked), strict=True):
-            q = q.copy()
-            q[:BASE_DOF] = node[:BASE_DOF]
-            q[self.task.robot.joints(hand)] = node[self.task.robot.joints(hand)]
-            configurations.append(q)
-        return hands, np.array(configurations)
 
 
 def cheapest_chains(

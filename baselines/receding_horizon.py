@@ -35,7 +35,7 @@ from coartic.baselines.shortest_paths import (
 )
 from coartic.baselines.trajectory_problem import segment_lengths, trajectory_problem
 from coartic.method import Method, Parameters, Result, Session
-from coartic.robot import BASE_DOF, HANDS, Array
+from coartic.robot import BASE_DOF, HANDS
 from coartic.tasks.task import MOST_GOALS, Start
 
 
@@ -53,11 +53,6 @@ class RecedingHorizonParameters(Parameters):
     starts: Annotated[int, Field(ge=1)] = 24
     """Starts of each window that are polished, the shortest: all chains, and all of them with the
     other arm spread out, are ranked by length."""
-
-
-def length_of(q0: Array, configurations: Array) -> float:
-    """Joint-space distance from a start ``(dof,)`` through configurations ``(G, dof)``."""
-    return float(segment_lengths(np.vstack([q0, configurations])).sum())
 
 
 class RecedingHorizon(Method):
@@ -99,7 +94,10 @@ class RecedingHorizon(Method):
                     chains=parameters.chains,
                     spread=len(ahead) > 1,  # with one goal it is the chain itself
                 )
-                ranked = sorted(chains, key=lambda chain: length_of(window.q0, chain[1]))
+                ranked = sorted(
+                    chains,
+                    key=lambda chain: segment_lengths(np.vstack([q, chain[1]])).sum(),
+                )
                 starts = ranked[: parameters.starts]
                 plans = shortest_plans(session, window, problem, starts, still=False)
                 best = fewest_ticks(session, window, problem, plans)

@@ -66,6 +66,9 @@ def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED,
         < slow.movement_ticks + (2 * slow.corrective_iterations + 8 * trials * len(task.goals))
     )
     np.testing.assert_array_equal(fast.completed, slow.completed)
+    if slow.completed.any():  # the first of the best
+        rewards = np.where(slow.completed, slow.rewards, -math.inf)
+        assert fast.best_trial == rewards.argmax()
     stored = 0
     for goal, before, chosen in np.ndindex(fast.values.shape):
         pair = ((goal, (*("left", "right"), None)[before]), ("left", "right")[chosen])
@@ -151,15 +154,19 @@ def planned(hands, configurations):
     return [Movement(goal, hand, "planned", q) for goal, (hand, q) in rows]
 
 
-@pytest.mark.parametrize("away", [0.0, 0.5])
-def test_from_a_first_solution_it_equals_the_slow_learner(away):
-    """From one that hits its goals, and from one that misses them and is corrected."""
+@pytest.mark.parametrize(
+    ("away", "condition"), [(0.0, "EC4"), (0.5, "EC4"), (0.5, "EC4-uncorrected")]
+)
+def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
+    """From one that hits its goals, and from one that misses them and is corrected: in trial 0 also
+    where no later trial is."""
     hits = learn("two-armed-2", "EC4", seed=1, trials=50).execute().configurations
     start = planned(["right", "left", "right", "right"], hits + away)
     task = load_task("two-armed-2")
-    slow = assert_equals_reference(task, CONDITIONS["EC4"], trials=5, seed=3, start=start)
+    rules = (CONDITIONS | VARIANTS)[condition]
+    slow = assert_equals_reference(task, rules, trials=5, seed=3, start=start)
     assert slow.corrections_by_trial[0] == (4 if away else 1)
-    run = learn(task, "EC4", seed=3, trials=1, start=start)
+    run = learn(task, condition, seed=3, trials=1, start=start)
     assert run.first_hands == "RLRR"
     due = execute(task, start)
     assert (run.initial_reward, len(run.initial)) == (due.reward, len(due.movements))

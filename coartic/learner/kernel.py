@@ -340,21 +340,6 @@ def find_returns(n: int, rules: Any, log: Any) -> None:
 
 
 @inlined
-def update_tables(n: int, reward: float, rules: Any, tables: Any, log: Any) -> None:
-    """Credit visited states and hands with the reward of the trial, or each with its return."""
-    if rules.by_subtask:
-        find_returns(n, rules, log)
-    for number in range(log.hits.shape[1]):
-        hit = log.hits[n, number]
-        credit = hit.credit if rules.by_subtask else reward
-        before = log.hits[n, number - 1].hand if number > 0 else NO_HAND
-        learned = tables[n, number, before, hit.hand]
-        if credit > learned.value:
-            learned.value = credit
-            fill_row(learned.target, hit.q)
-
-
-@inlined
 def copy_movements(n: int, source: Any, destination: Any) -> None:
     """Copy the logged movements of run ``n``."""
     for row in range(source.count[n]):
@@ -364,7 +349,8 @@ def copy_movements(n: int, source: Any, destination: Any) -> None:
 
 @inner
 def learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: Any) -> None:
-    """Keep the rewards of a trial; where it was completed, update Q and q*."""
+    """Keep the rewards of a trial; where it was completed, update Q and q*: credit visited states
+    and hands with the reward of the trial, or each with its return."""
     others = max(1, kept.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(work.trials)):
@@ -377,7 +363,16 @@ def learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: 
             continue
         if number == 0:
             copy_movements(n, log, kept.first)
-        update_tables(n, float(reward), rules, tables, log)
+        if rules.by_subtask:
+            find_returns(n, rules, log)
+        for goal in range(log.hits.shape[1]):
+            hit = log.hits[n, goal]
+            credit = hit.credit if rules.by_subtask else float(reward)
+            before = log.hits[n, goal - 1].hand if goal > 0 else NO_HAND
+            learned = tables[n, goal, before, hit.hand]
+            if credit > learned.value:
+                learned.value = credit
+                fill_row(learned.target, hit.q)
         best = kept.best_trial[n]
         if best < 0 or reward > kept.rewards[n, best]:
             kept.best_trial[n] = number
