@@ -48,7 +48,7 @@ STATED = {  # of table results: what is said of each solution that is stored of 
 MODEL = {  # how the paper is read: versions 1.0 and 1.1 stored it, and ids are hashes with it
     "arrival_tick": 1, "corrective_arrival": False, "first_step": False, "whole_last_step": False,
 }  # fmt: skip
-LEARNER = {
+LEARNER_RULES = {
     "equal_distance": "random", "first_trial": "learns", "state": "previous-hand", "ties": "left",
     "unknown_target": "corrects",
 }  # fmt: skip
@@ -304,7 +304,7 @@ def fixed(method: str) -> dict[str, Any]:
     """Parameters of a method that versions 1.0 and 1.1 stored, and that have one value now."""
     if method.startswith("nullspace-qp/"):
         return {"modelling": "none"}
-    return LEARNER if method.startswith("dual-process/") else {}
+    return LEARNER_RULES if method.startswith("dual-process/") else {}
 
 
 def other_reading(db: sqlite3.Connection) -> str:

@@ -12,8 +12,7 @@ import pytest
 
 from coartic import corrective_trial, load_task
 from coartic.analysis.claims import verdicts
-from coartic.analysis.claims.claim import Claim
-from coartic.analysis.claims.comparisons import Higher, all_higher
+from coartic.analysis.claims.claim import Claim, Higher, all_higher
 from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, some_of

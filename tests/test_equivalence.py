@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from coartic.analysis.statistics.equivalence import difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import Estimate
+from coartic.analysis.statistics.hypotheses import difference_to_printed, equivalence
 
 
 def test_interval_against_an_exact_value_is_students():
@@ -33,7 +33,7 @@ def test_interval_against_an_exact_value_is_students():
     ],
 )
 def test_verdicts(low, high, expected):
-    assert verdict(Estimate(0.0, low, high), 5.0) == expected
+    assert equivalence(Estimate(0.0, low, high), 5.0) == expected
 
 
 def test_interval_of_two_samples_is_welchs():

@@ -11,8 +11,7 @@ from scipy import stats
 
 from coartic.analysis import methods
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim
-from coartic.analysis.claims.comparisons import Higher, all_higher
+from coartic.analysis.claims.claim import Claim, Higher, all_higher
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO

@@ -7,8 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim
-from coartic.analysis.claims.comparisons import Higher, all_positive, no_trial_fails
+from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
 from coartic.analysis.claims.judging import Finding, tests_over_tasks
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring

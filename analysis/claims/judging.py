@@ -41,16 +41,6 @@ class Finding:
     """Tests over tasks again, each without the task that speaks most for the claim."""
 
     @property
-    def p(self) -> float:
-        """Largest p-value of the tests, which must all hold; NaN where nothing is tested."""
-        return largest_p(self.tests)
-
-    @property
-    def p_without(self) -> float:
-        """Largest p-value, where each test over tasks lacks the task that speaks most for it."""
-        return largest_p((*self.tests, *self.without))
-
-    @property
     def opposite_p(self) -> float:
         """Smallest p-value of the opposites times their number (Bonferroni); NaN without any.
 
@@ -79,7 +69,7 @@ class Finding:
 
 
 def largest_p(tests: Iterable[Estimate]) -> float:
-    """Largest p-value of tests that have one; NaN where none has."""
+    """Largest p-value of tests that must all hold; NaN where none has one."""
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
@@ -191,8 +181,10 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     {'saves': 'supported'}
     """
     findings = [finding for _, _, finding in claims.values()]
-    p = holm([finding.p for finding in findings], len(findings))
-    without = holm([finding.p_without for finding in findings], len(findings))
+    p = holm([largest_p(finding.tests) for finding in findings], len(findings))
+    without = holm(
+        [largest_p(finding.tests + finding.without) for finding in findings], len(findings)
+    )
     opposite = holm([finding.opposite_p for finding in findings], len(findings))
     rows = {}
     for (name, (statement, test, finding)), *adjusted in zip(

@@ -15,7 +15,7 @@ from scipy import optimize, stats
 
 from coartic import Execution, Hand, Task
 from coartic.analysis.claims import margins
-from coartic.analysis.claims.claim import Claim
+from coartic.analysis.claims.claim import Claim, Higher, all_higher, all_positive, no_trial_fails
 from coartic.analysis.claims.coarticulation import (
     CLAIMS_OF_COARTICULATION,
     ONE_ARMED,
@@ -24,7 +24,6 @@ from coartic.analysis.claims.coarticulation import (
     TEST_OF_MEANS,
     TWO_ARMED,
 )
-from coartic.analysis.claims.comparisons import Higher, all_higher, all_positive, no_trial_fails
 from coartic.analysis.claims.judging import Finding, all_of
 from coartic.analysis.claims.reader import Measurement, MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4

@@ -1,11 +1,10 @@
 """Figures of your own, which look like those of the report.
 
 :func:`panels` and :func:`means` draw within ``styled``, a decorator; :func:`picture` gives the
-file. ``coartic.analysis.sections.FIGURES["ranking"](study)`` draws a figure of the report, which
-:func:`save` writes as files.
+file. ``coartic.analysis.sections.FIGURES["ranking"](study)`` draws a figure of the report.
 """
 
-from coartic.analysis.figures.plot import Plot, picture, save
+from coartic.analysis.figures.plot import Plot, picture
 from coartic.analysis.figures.style import (
     COVERAGE,
     GREY,
@@ -21,5 +20,5 @@ from coartic.analysis.figures.style import (
 
 __all__ = [
     "COVERAGE", "GREY", "ONE", "PALETTE", "TWO", "Plot", "legend", "letters", "means", "panels",
-    "picture", "save", "styled",
+    "picture", "styled",
 ]  # fmt: skip

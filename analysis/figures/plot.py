@@ -8,14 +8,13 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from coartic import CoarticError, Task
+from coartic import Task
 from coartic.analysis.figures.style import (
     BACKGROUND,
     BLUE,
@@ -31,7 +30,6 @@ from coartic.analysis.figures.style import (
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED, id_of
-from coartic.files import write_atomically
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
@@ -116,21 +114,6 @@ def picture(drawing: Figure, ending: str) -> bytes:
     with rc_context(RC):
         drawing.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
     return stream.getvalue()
-
-
-def save(plot: Plot, folder: Path) -> list[Path]:
-    """Write the figure as SVG, PDF and PNG into ``folder``, over files of these names.
-
-    The folder is made if it is not there. Raises CoarticError where they cannot be written.
-    """
-    paths = [folder / f"{plot.id}{ending}" for ending in FORMATS]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in paths:
-            write_atomically(path, picture(plot.figure, path.suffix))
-    except OSError as error:
-        raise CoarticError(f"cannot write to {folder}: {error.strerror or error}") from None
-    return paths
 
 
 def for_page(plot: Plot) -> dict[str, Any]:

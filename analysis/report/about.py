@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from shlex import quote
 from typing import Any
 
 from coartic.analysis.methods import LEARNER, LEARNERS
@@ -61,7 +60,7 @@ def limits(study: Study) -> dict[str, Any]:
         "seed": study.plan.seed,
         "unproven": [marked(task) for task, best in optima if best and not best.proven],
         "unknown": [task.label for task, best in optima if best is None],
-        "side_by_side": bool(runs.together.fillna(1).max() > 1) if "together" in runs else False,
+        "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],
         "cores": made_with["cores"],
@@ -90,19 +89,3 @@ def notes_on_tables(study: Study) -> str:
         "run_ids: the runs behind a row; the beginning of an id names a run.",
     ]
     return "\n".join(lines) + "\n"
-
-
-@cached
-def provenance(study: Study) -> dict[str, Any]:
-    """Title of the report; suite, folder, number, seed, version, commit and date of the runs."""
-    made_with = study.made_with
-    return {
-        "title": f"Coarticulation of a simulated robot: suite {study.suite}",
-        "suite": study.suite,
-        "folder": quote(str(study.folder)),
-        "runs": len(study.runs),
-        "seed": study.plan.seed,
-        "version": made_with["coartic"],
-        "commit": made_with["commit"]["id"][:12] if made_with["commit"] else "",
-        "date": made_with["date"][:10],
-    }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
+from shlex import quote
 from typing import Any, get_args
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -17,16 +18,12 @@ from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, html_table, latex_table
 from coartic.analysis.sections import SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
-from coartic.analysis.words import NONE, id_of, listed, number
+from coartic.analysis.words import id_of, listed, number
 from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 HERE = Path(__file__).parent
 PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
-SEARCHED = 12
-"""Rows of a table above which it has a field to search them."""
-LONG = 20
-"""Rows of a table above which it scrolls in a box of its own."""
 
 
 def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
@@ -76,27 +73,23 @@ def plots(study: Study) -> dict[str, Plot]:
 def sections(study: Study) -> list[dict[str, Any]]:
     """Sections that the runs allow, as the template wants them.
 
-    With their ``finding``; figure or table is None where the runs do not allow it.
+    With their ``finding`` and the number of ``rows``; ``figure`` is None where the runs do not
+    allow it.
     """
     allowed = []
     for section in about.visible_sections(study):
         name, frame = id_of(section.table), section.table(study)
         plot = plots(study).get(id_of(section.figure)) if section.figure else None
-        if plot is None and not len(frame):
-            continue
-        rows = {
-            "html": html_table(frame, name, section.caption),
-            "searched": len(frame) > SEARCHED,
-            "long": len(frame) > LONG,
-            "example": f"'{frame.index[0]}'",
-        } if len(frame) else None  # fmt: skip
-        words = {
-            "table": name,
-            "finding": about.sentences(study).get(section.id, ""),
-            "rows": rows,
-            "figure": plot and for_page(plot),
-        }
-        allowed.append(vars(section) | words)
+        if plot or len(frame):
+            words = {
+                "table": name,
+                "rows": len(frame),
+                "html": html_table(frame, name, section.caption) if len(frame) else "",
+                "example": f"'{frame.index[0]}'" if len(frame) else "",
+                "finding": about.sentences(study).get(section.id, ""),
+                "figure": plot and for_page(plot),
+            }
+            allowed.append(vars(section) | words)
     return allowed
 
 
@@ -116,36 +109,26 @@ def page(study: Study) -> str:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
         links = []
-    answers = about.answers(study)
+    verdicts, claims = list(get_args(Verdict)), TABLES["claims"](study).reset_index(names="id")
+    claims = claims.sort_values("verdict", key=lambda each: each.map(verdicts.index), kind="stable")
+    made_with, answers = study.made_with, about.answers(study)
     return environment.get_template("page.html.jinja").render(
+        title=f"Coarticulation of a simulated robot: suite {study.suite}",
         description=" ".join(text for _, text in answers),
         styles=(HERE / "page.css").read_text("utf-8") + text_of("play.css"),
         player=player(study),
         script=(HERE / "page.js").read_text("utf-8"),
         answers=answers,
         sections=sections(study),
-        claims=claims_for_page(study),
-        verdicts=get_args(Verdict),
-        provenance=about.provenance(study),
+        claims=claims.to_dict("records"),
+        verdicts=verdicts,
+        tones=TONES,
+        suite=study.suite,
+        folder=quote(str(study.folder)),
+        version=made_with["coartic"],
+        commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
+        date=made_with["date"][:10],
         limits=about.limits(study),
         paper_link=PAPER_LINK,
         links=dict(link.split(", ", 1) for link in links),
     )
-
-
-def claims_for_page(study: Study) -> list[dict[str, str]]:
-    """Claims as the template wants them, by verdict."""
-    order = get_args(Verdict)
-    rows = TABLES["claims"](study).reset_index(names="id")
-    return [
-        {
-            **{
-                key: str(row[key])
-                for key in ("id", "statement", "verdict", "evidence", "test", "place", "quote")
-            },
-            "tone": TONES[row["verdict"]],
-            "sets": row["sets"] or NONE,
-            "p": "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3),
-        }
-        for row in sorted(rows.to_dict("records"), key=lambda row: order.index(row["verdict"]))
-    ]

@@ -9,9 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from coartic import Execution, Movement, Task, execute
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
 from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation import shared_goal
@@ -93,23 +90,6 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
             "kind": movement.kind,
             "target": None if movement.target is None else movement.target.tolist(),
         }
-        for movement in shortened(solutions.task, solutions.runs[k])
+        for movement in solutions.runs[k].movements
     ]
     return {"run": solutions.run_ids[k], "ticks": solutions.runs[k].ticks, "movements": movements}
-
-
-def shortened(task: Task, made: Execution) -> tuple[Movement, ...]:
-    """The movements of a run with as few digits as give each goal the same ticks.
-
-    Joints that keep their start value stay exact.
-    """
-    for digits in range(2, 7):
-        shorter = []
-        for movement in made.movements:
-            q = movement.target
-            rounded = None if q is None else np.where(q == task.q0, q, np.round(q, digits))
-            shorter.append(replace(movement, target=rounded))
-        again = execute(task, shorter)
-        if again.completed and again.ticks_by_goal() == made.ticks_by_goal():
-            return tuple(shorter)
-    return made.movements

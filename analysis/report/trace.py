@@ -14,7 +14,7 @@ from coartic.analysis.report.render import columns_of, texts_of
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
 from coartic.runs.plan import label_of
-from coartic.text import did_you_mean, id_named, plain
+from coartic.text import plain
 
 
 def tables_of(folder: Path) -> dict[str, Path]:
@@ -43,28 +43,6 @@ def rows_of(table: Path) -> pd.DataFrame:
     except ValueError as error:
         raise CoarticError(f"{table} is no table of a report: {plain(str(error))}") from None
     return frame
-
-
-def names_of(frame: pd.DataFrame) -> dict[str, str]:
-    """People's names of the rows of a table, as the page has them, by row."""
-    if {"task", "method"} <= {*frame}:
-        pairs = zip(frame.index, frame.task, frame.method, strict=True)
-        return {row: f"{task}, {name_of(method)}".replace(" †", "") for row, task, method in pairs}
-    return {row: name_of(row) for row in map(str, frame.index)}
-
-
-def row_named(table: str, frame: pd.DataFrame, name: str) -> str:
-    """The row of a table that goes by a name, its own or people's.
-
-    Raises CoarticError where there is none.
-    """
-    called = names_of(frame)
-    row = id_named(name, called)
-    if row not in called:
-        hint = did_you_mean(name, [*called, *called.values()])
-        hint = hint or "; without a row, the command lists them"
-        raise CoarticError(f"table {table} has no row {name!r}{hint}")
-    return row
 
 
 def values_of(frame: pd.DataFrame, row: str, tasks: Mapping[str, Task]) -> list[tuple[str, str]]:

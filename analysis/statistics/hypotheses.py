@@ -23,6 +23,7 @@ from coartic.analysis.statistics.estimates import (
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
+    TAILS,
     Estimate,
     centred,
     samples_of,
@@ -31,6 +32,9 @@ from coartic.analysis.statistics.estimates import (
 )
 
 Alternative = Literal["greater", "less", "two-sided"]
+MARGIN = 0.01
+"""Differences up to this share of the published reward count as equivalent."""
+Equivalence = Literal["equivalent", "different", "undecided"]
 IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 
@@ -142,3 +146,43 @@ def holm(p_values: Sequence[float], family: int | None = None) -> list[float]:
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(1.0, steps)
     return list(map(float, adjusted))
+
+
+def equivalence(estimate: Estimate, margin: float) -> Equivalence:
+    """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
+    (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
+
+    Equivalent where the interval lies within the margin, different where it lies outside,
+    undecided where it does neither or there is none.
+    """
+    if -margin <= estimate.low and estimate.high <= margin:
+        return "equivalent"
+    if estimate.low > margin or estimate.high < -margin:
+        return "different"
+    return "undecided"
+
+
+def difference_to_printed(
+    ours: ArrayLike, published: float, sd: float | None, runs: int
+) -> Estimate:
+    """Our mean less the published mean, with Welch's interval by the printed SD and number of runs.
+
+    Where no SD is printed (None) the published mean is taken as exact, and the interval is
+    Student's. No interval for a single run; a point where no sample has any spread.
+    """
+    values = vector(ours)
+    n, value = len(values), float(values.mean()) - published
+    if n < 2:
+        return Estimate(value, n=(n,))
+    parts = [(float(np.var(centred(values), ddof=1)) / n, n - 1)]
+    if sd is not None and runs > 1:
+        parts.append((sd**2 / runs, runs - 1))
+    total = sum(part for part, _ in parts)
+    sizes = tuple(free + 1 for _, free in parts)
+    if total == 0.0:
+        return Estimate(value, value, value, n=sizes)
+    freedom = total**2 / sum(part**2 / free for part, free in parts)
+    from scipy import special  # as in estimates
+
+    half = float(special.stdtrit(freedom, TAILS[1])) * math.sqrt(total)
+    return Estimate(value, value - half, value + half, n=sizes)

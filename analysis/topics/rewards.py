@@ -11,8 +11,8 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
-from coartic.analysis.statistics.equivalence import MARGIN, difference_to_printed, verdict
 from coartic.analysis.statistics.estimates import standard_deviation
+from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_printed, equivalence
 from coartic.analysis.study import CellRuns, Study, cached
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.topics.published import (
@@ -83,7 +83,7 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
                 apart = difference_to_printed(rewards, summary.mean, summary.sd, summary.runs)
                 row |= apart.columns("difference")
                 if (cell.good.trials == TRIALS).all():
-                    row["verdict"] = verdict(apart, row["margin"])
+                    row["verdict"] = equivalence(apart, row["margin"])
             rows.append(row)
     return rows
 

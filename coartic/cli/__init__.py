@@ -52,7 +52,7 @@ COMMANDS = (
     (run.check, "EC4"),
     (run.reproduce, "1a2b3c --in results/quick"),
     (read.report, "results/quick --for-paper"),
-    (read.trace, "ranking CMA-ES --in results/comparison"),
+    (read.trace, "ranking cma-es/bandit --in results/comparison"),
     (read.verify, "results/quick --again 3"),
     (read.cite, "results/comparison --analysis"),
     (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),

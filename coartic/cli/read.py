@@ -92,10 +92,10 @@ def trace(
         raise CoarticError(unknown("table", table, tables))
     frame = traced.rows_of(tables[table])
     if row is None:
-        names = traced.names_of(frame).items()
-        say(*(each if each == words else f"{each} ({words})" for each, words in names))
+        say(*frame.index)
         return
-    row = traced.row_named(table, frame, row)
+    if row not in frame.index:
+        raise CoarticError(unknown("row", row, frame.index))
     ids = str(frame.run_ids.fillna("")[row]).split()
     results = tables[table].parents[2]
     if not (results / RUNS_FILE).is_file():  # the report lies elsewhere
@@ -161,7 +161,7 @@ def cite(
         typer.Argument(
             parser=folder_named,
             metavar="FOLDER",
-            help="Results folder; without, all methods and the shipped results.",
+            help="Results folder; without, all methods.",
         ),
     ] = None,
     analysis: Annotated[
@@ -171,11 +171,10 @@ def cite(
     """Print what to cite, as BibTeX."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
-    from coartic.benchmarks.released import released_hashes
     from coartic.runs.store import open_store
 
     if folder is None:
-        text = bibliography(built_in(), analysis=analysis, released=released_hashes())
+        text = bibliography(built_in(), analysis=analysis)
     else:
         with open_store(folder) as store:
             declared, made_with = store.plan().methods, store.made_with()

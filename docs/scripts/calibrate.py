@@ -21,10 +21,10 @@ from coartic.analysis.claims import margins
 from coartic.analysis.methods import PLACEBO
 from coartic.analysis.signatures.context_tests import beyond_p, context_dependence, permutation_p
 from coartic.analysis.statistics import estimates
-from coartic.analysis.statistics.equivalence import difference_to_printed
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
+    difference_to_printed,
     share_test,
     sign_flip_test,
 )
