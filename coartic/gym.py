@@ -48,8 +48,13 @@ Rows = NDArray[np.int64] | slice
 ALL = slice(None)
 
 
-class Robots:
-    """N robots side by side, each at a goal of its own trial: what the environments share.
+class TaskVectorEnv(VectorEnv):
+    """N robots side by side, which takes a fraction of the time of N :class:`TaskEnv`.
+
+    An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
+    process fails, which costs ``coartic.optimisers.FAILED``. A trial that has ended begins anew in
+    the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info`` are what
+    it ended with. Nothing is random but which instance of a family is drawn.
 
     Parameters
     ----------
@@ -92,6 +97,8 @@ class Robots:
     takes the place of its result. Entries of joints that a robot does not have do nothing.
     """
 
+    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
+
     def __init__(
         self,
         num_envs: int,
@@ -105,7 +112,8 @@ class Robots:
     ) -> None:
         check_limits("num_envs", num_envs, 1, MOST_ROBOTS)
         check_limits("ahead", ahead, 0, MOST_GOALS)
-        self.model = check_model(model)
+        self.num_envs, self.model = num_envs, check_model(model)
+        self.options = {"task": task, "ahead": ahead, "model": model}
         if isinstance(task, str) and task in shipped_families():
             family = shipped_families()[task]
             instances = instance_names(task, split or "development", count, year)
@@ -130,10 +138,13 @@ class Robots:
         entries, view = len(hands) - 1 + len(joints), ahead + 1
         self.starts = np.zeros((number, widest.dof))
         self.kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
-        self.action_space = Box(-1.0, 1.0, (entries,), np.float32)
+        self.single_action_space = Box(-1.0, 1.0, (entries,), np.float32)
         sizes = [view, 2 * view + len(joints), len(joints) * differ]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
-        self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
+        self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._rngs: list[Any] = [None] * num_envs
         self.fleet = Fleet(
             task=np.zeros(num_envs, np.int64),
             goal=np.zeros(num_envs, np.int64),
@@ -195,7 +206,7 @@ class Robots:
         fleet.q[rows] = self.starts[fleet.task[rows]]
         look(self.fleet)
 
-    def step(self, actions: ArrayLike, rows: Rows = ALL) -> None:
+    def move(self, actions: ArrayLike, rows: Rows = ALL) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
@@ -214,24 +225,66 @@ class Robots:
         task = self.fleet.task
         return {"task": self.names[task], "is_success": self.fleet.goal == self.fleet.counts[task]}
 
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin all trials, with a seed for each robot, or for the first, which others follow."""
+        check_no_options(options)
+        if seed is None or isinstance(seed, int):
+            seed = [None if seed is None else seed + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
+        for row, each in enumerate(seed):
+            if each is not None or self._rngs[row] is None:
+                self._rngs[row] = seeding.np_random(each)[0]
+        self._begin(np.ones(self.num_envs, np.bool_))
+        return self.fleet.seen.copy(), self._infos()
+
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Reach for the next goal of each trial, and begin anew those that have ended."""
+        fleet = self.fleet
+        if not fleet.going.all():
+            raise ResetNeeded("no trial goes on: reset first")
+        self.move(actions)
+        final, ended = {}, ~fleet.going
+        if ended.any():
+            last = np.full(self.num_envs, None, dtype=object)
+            for row in np.flatnonzero(ended).tolist():
+                last[row] = fleet.seen[row].copy()
+            final = {"final_obs": last, "final_info": self._infos(ended)}
+            final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
+            self._begin(ended)
+        infos = self._infos() | final
+        return fleet.seen.copy(), fleet.rewards.copy(), ended, np.zeros_like(ended), infos
+
+    def _begin(self, ended: NDArray[np.bool_]) -> None:
+        number, rows = len(self.tasks), np.flatnonzero(ended)
+        drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
+        self.begin(rows, drawn)
+
+    def _infos(self, there: NDArray[np.bool_] | None = None) -> dict[str, Any]:
+        infos = self.infos()
+        there = np.ones(self.num_envs, np.bool_) if there is None else there
+        return infos | {f"_{name}": there.copy() for name in infos}
+
 
 class TaskEnv(gymnasium.Env):
-    """One robot: an episode is a trial, of as many steps as there are goals.
-
-    It ends earlier where the corrective process fails, which costs ``coartic.optimisers.FAILED``.
-    Nothing is random but which instance of a family is drawn. Options, observations and actions
-    are those of :class:`Robots`; ``render_mode`` may be ``"rgb_array"``.
-    """
+    """One robot. Options, observations, actions and rewards are those of :class:`TaskVectorEnv`,
+    without new beginnings; ``render_mode`` may be ``"rgb_array"``."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
     def __init__(
         self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
     ) -> None:
-        self.options = {"task": task, **options}
-        self.robots = Robots(1, **self.options)
-        self.action_space = self.robots.action_space
-        self.observation_space = self.robots.observation_space
+        self.robots = TaskVectorEnv(1, task, **options)
+        self.action_space = self.robots.single_action_space
+        self.observation_space = self.robots.single_observation_space
         self.render_mode = render_mode
 
     def reset(
@@ -250,7 +303,7 @@ class TaskEnv(gymnasium.Env):
         fleet = self.robots.fleet
         if not fleet.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
-        self.robots.step(np.asarray(action)[None])
+        self.robots.move(np.asarray(action)[None])
         return fleet.seen[0].copy(), fleet.rewards.item(), not fleet.going[0], False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -277,73 +330,6 @@ class TaskEnv(gymnasium.Env):
         return {name: values.item() for name, values in self.robots.infos().items()}
 
 
-class TaskVectorEnv(VectorEnv):
-    """N robots side by side, which takes a fraction of the time; see :class:`TaskEnv`.
-
-    A trial that has ended begins anew in the same step, as in Gymnasium's mode ``SAME_STEP``:
-    ``final_obs`` and ``final_info`` are what it ended with.
-    """
-
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.SAME_STEP}
-
-    def __init__(self, num_envs: int, task: Task | str | Path, **options: Any) -> None:
-        self.options = {"task": task, **options}
-        self.robots = Robots(num_envs, **self.options)
-        self.num_envs = num_envs
-        self.single_action_space = self.robots.action_space
-        self.single_observation_space = self.robots.observation_space
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._rngs: list[Any] = [None] * num_envs
-
-    def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin all trials, with a seed for each robot, or for the first, which others follow."""
-        check_no_options(options)
-        if seed is None or isinstance(seed, int):
-            seed = [None if seed is None else seed + row for row in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
-        for row, each in enumerate(seed):
-            if each is not None or self._rngs[row] is None:
-                self._rngs[row] = seeding.np_random(each)[0]
-        self._begin(np.ones(self.num_envs, np.bool_))
-        return self.robots.fleet.seen.copy(), self._infos()
-
-    def step(
-        self, actions: ArrayLike
-    ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Reach for the next goal of each trial, and begin anew those that have ended."""
-        fleet = self.robots.fleet
-        if not fleet.going.all():
-            raise ResetNeeded("no trial goes on: reset first")
-        self.robots.step(actions)
-        final, ended = {}, ~fleet.going
-        if ended.any():
-            last = np.full(self.num_envs, None, dtype=object)
-            for row in np.flatnonzero(ended).tolist():
-                last[row] = fleet.seen[row].copy()
-            final = {"final_obs": last, "final_info": self._infos(ended)}
-            final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
-            self._begin(ended)
-        infos = self._infos() | final
-        return fleet.seen.copy(), fleet.rewards.copy(), ended, np.zeros_like(ended), infos
-
-    def _begin(self, ended: NDArray[np.bool_]) -> None:
-        number, rows = len(self.robots.tasks), np.flatnonzero(ended)
-        drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
-        self.robots.begin(rows, drawn)
-
-    def _infos(self, there: NDArray[np.bool_] | None = None) -> dict[str, Any]:
-        infos = self.robots.infos()
-        there = np.ones(self.num_envs, np.bool_) if there is None else there
-        return infos | {f"_{name}": there.copy() for name in infos}
-
-
 def check_no_options(options: Mapping[str, Any] | None) -> None:
     """Raises ValueError for options of a reset: there are none."""
     if options:
@@ -360,7 +346,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
     num_envs : int
         Number of robots.
     **options
-        Those of :class:`Robots`.
+        Those of :class:`TaskVectorEnv`.
 
     Returns
     -------
@@ -412,7 +398,7 @@ def score(
     seed : int
         Of random actions and of methods.
     **options
-        Those of :class:`Robots`.
+        Those of :class:`TaskVectorEnv`.
 
     Returns
     -------
@@ -432,18 +418,17 @@ def score(
     check_limits("episodes", episodes, 1, MOST_CELLS)
     if isinstance(env, str):
         given = known_env(env)
-    elif isinstance(unwrapped := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
-        given = unwrapped.options
+    elif isinstance(own := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+        given = (own.robots if isinstance(own, TaskEnv) else own).options
     else:
         raise TypeError(
             f"env is {brief_value(env)}; it must be an environment of coartic or its id"
         )
-    given = {name: value for name, value in given.items() if name not in ("split", "count", "year")}
-    given |= options
+    given = given | options
     if given.get("task") in shipped_families():
         given = {"split": "test", **given}
-    setting = Robots(1, **given)
-    model, shape = setting.model, setting.action_space.shape
+    setting = TaskVectorEnv(1, **given)
+    model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
     policies = {name: each for name, each in policies.items() if each is not None}
@@ -457,10 +442,10 @@ def score(
     def run(act: Any, trials: int = 1) -> Array:
         """Rewards of trials on each task, ``(K, trials)``; NaN where one failed."""
         rows = np.arange(trials * len(tasks))
-        robots, totals = Robots(len(rows), **given), np.zeros(len(rows))
+        robots, totals = TaskVectorEnv(len(rows), **given), np.zeros(len(rows))
         robots.begin(rows, rows // trials)
         while len(rows):
-            robots.step(act(robots.fleet.seen[rows]), rows)
+            robots.move(act(robots.fleet.seen[rows]), rows)
             totals[rows] += robots.fleet.rewards[rows]
             rows = np.flatnonzero(robots.fleet.going)
         return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)

@@ -49,7 +49,7 @@ class RobotEnvs(VecEnv):
 
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Make the next subtask of all trials."""
-        costs = np.array([self._cost(task) for task in self._envs.robots.fleet.task.tolist()])
+        costs = np.array([self._cost(task) for task in self._envs.fleet.task.tolist()])
         observations, rewards, ended, _, seen = self._envs.step(self._actions)
         self._lost += rewards
         self._steps += 1
@@ -82,7 +82,7 @@ class RobotEnvs(VecEnv):
     def _cost(self, number: int) -> float:
         """Ticks of the corrective process alone on a task, or of a failure."""
         if number not in self._costs:
-            task, model = self._envs.robots.task_at(number), self._envs.robots.model
+            task, model = self._envs.task_at(number), self._envs.model
             reward = corrective_trial(task, initial_hands(task, model=model), model=model).reward
             self._costs[number] = float(FAILED if reward is None else -reward)
         return self._costs[number]
