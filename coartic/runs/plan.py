@@ -13,9 +13,9 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from coartic.inputs import MOST_RUNS
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.model import PAPER
 from coartic.runs.card import MethodCard
-from coartic.runs.earlier import MODEL, parameters_now, parameters_then
 from coartic.tasks.task import Task, parse_task
 
 SEARCH = "optimum/"
@@ -50,6 +50,39 @@ class Cell:
         return label_of(self.method.name, self.variant)
 
 
+_MODEL_THEN = {
+    "arrival_tick": 1,
+    "corrective_arrival": False,
+    "first_step": False,
+    "whole_last_step": False,
+}
+_LEARNER_THEN = {
+    "equal_distance": "random",
+    "first_trial": "learns",
+    "state": "previous-hand",
+    "ties": "left",
+    "unknown_target": "corrects",
+}
+"""Readings of the paper that versions 1.0 and 1.1 stored, with the values that are the rule now.
+They are a part of the hash with which the id of a run begins, so that runs of then count as runs of
+now."""
+
+
+def dropped(method: str) -> dict[str, Any]:
+    """Parameters of a method that earlier versions stored, and this version does not have."""
+    if method.startswith("nullspace-qp/"):
+        return {"modelling": "none"}
+    return _LEARNER_THEN if method.startswith(METHOD_PREFIX) else {}
+
+
+def parameters_from(method: str, text: str) -> dict[str, Any]:
+    """Stored parameters of a method that it still has. Raises ValueError for what is no table."""
+    stored = json.loads(text)
+    if not isinstance(stored, dict):
+        raise ValueError(f"parameters are {stored!r}")
+    return {name: value for name, value in stored.items() if name not in dropped(method)}
+
+
 @dataclass(frozen=True)
 class Setting:
     """Everything that the results of a run depend on, apart from its seed."""
@@ -79,8 +112,8 @@ class Setting:
             {
                 "task": self.definition,
                 "method": self.method,
-                "parameters": parameters_then(self.method, self.parameters),
-                "model": MODEL,
+                "parameters": self.parameters | dropped(self.method),
+                "model": PAPER._asdict() | _MODEL_THEN,
                 "trial_budget": self.trial_budget,
             }
         )
@@ -108,7 +141,7 @@ class Setting:
             method=row["method"],
             code=row["code"],
             told=tuple(filter(None, row["told"].split(", "))),
-            parameters=parameters_now(row["method"], json.loads(row["parameters"])),
+            parameters=parameters_from(row["method"], row["parameters"]),
             trial_budget=row["trial_budget"],
         )
         setting.check(row["asked"])
@@ -177,15 +210,21 @@ class Plan:
     def to_rows(self) -> dict[str, list[dict[str, Any]]]:
         """Its rows by table; that of a cell has the setting itself in place of its number."""
         cells = [
-            {"setting": setting, **{name: getattr(cell, name) for name in _OF_CELL}}
-            for cell, setting in zip(self.cells, self.settings, strict=True)
+            {
+                "position": position,
+                "setting": setting,
+                "variant": cell.variant,
+                "parameters": cell.parameters,
+                "runs": cell.runs,
+            }
+            for position, (cell, setting) in enumerate(zip(self.cells, self.settings, strict=True))
         ]
         definitions = {setting.task.name: setting.definition for setting in self.settings}
         return {
             "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
             "tasks": [{"name": name, "definition": d} for name, d in definitions.items()],
             "methods": [{n: getattr(m, n) for n in _OF_METHOD} for m in self.methods.values()],
-            "cells": [{"position": position, **row} for position, row in enumerate(cells)],
+            "cells": cells,
         }
 
     @classmethod
@@ -204,10 +243,7 @@ class Plan:
         asked = {"suite": suite["name"], **{name: suite[name] for name in _OF_SUITE}}
         asked["cells"] = [
             {"task": tasks[row["task"]], "method": methods[row["method"]], "runs": row["runs"]}
-            | {
-                n: parameters_now(row["method"], json.loads(row[n]))
-                for n in ("parameters", "complete")
-            }
+            | {n: parameters_from(row["method"], row[n]) for n in ("parameters", "complete")}
             for row in rows["cells"]
         ]
         plan: Plan = TypeAdapter(cls).validate_python(asked)
@@ -225,7 +261,6 @@ class Plan:
 
 
 _OF_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
-_OF_CELL = ("variant", "parameters", "runs")
 _OF_METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
 _JSON = ("told", "secondary", "defaults")  # of methods
 

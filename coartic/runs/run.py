@@ -72,6 +72,13 @@ PARTS = tuple(PREFIXES)
 greedy trial with what it has learned."""
 
 
+_AS_THEY_ARE = (
+    *("suite_seed", "status", "reason", "date", "time_limit_s"),
+    *("solution_corrections", "other_arm_travel"),
+)
+"""Columns that are attributes of a run."""
+
+
 class Score(NamedTuple):
     """One part of a run as the harness executed it."""
 
@@ -206,19 +213,13 @@ class Run:
             row |= {f"{prefix}reward": score.reward, f"{prefix}hands": score.hands}
         return row | {
             "run_id": self.id,
-            "suite_seed": self.suite_seed,
             "run": self.number,
             "seed": self.seed,
-            "status": self.status,
-            "reason": self.reason,
             "best_trial": self.best_trial,
+            **{name: getattr(self, name) for name in _AS_THEY_ARE},
             **(vars(self.meter) if self.meter else {}),
-            "solution_corrections": self.solution_corrections,
-            "other_arm_travel": self.other_arm_travel,
             "proven_bound": self.bound,
             **asdict(self.times),
-            "time_limit_s": self.time_limit_s,
-            "date": self.date,
             "used": ", ".join(self.used),
             "details": json.dumps(self.details),
             "result": self.result,
@@ -241,14 +242,10 @@ class Run:
         times = {each.name: row[each.name] for each in fields(Times)}
         warm = None if row["warm"] is None else bool(row["warm"])
         run = cls(
+            **{name: row[name] for name in _AS_THEY_ARE},
             setting=setting,
-            suite_seed=row["suite_seed"],
             number=row["run"],
-            status=row["status"],
-            reason=row["reason"],
             environment=environment,
-            date=row["date"],
-            time_limit_s=row["time_limit_s"],
             scores={
                 part: Score(row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"], solution)
                 for part, solution in movements.items()
@@ -257,8 +254,6 @@ class Run:
             rewards=rewards,
             meter=Meter(**{name: row[name] for name in vars(Meter())}) if made_trials else None,
             times=Times(**times | {"warm": warm}),
-            solution_corrections=row["solution_corrections"],
-            other_arm_travel=row["other_arm_travel"],
             bound=row["proven_bound"],
             used=tuple(filter(None, row["used"].split(", "))),
             details=json.loads(row["details"]),

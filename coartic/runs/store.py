@@ -366,7 +366,7 @@ class Store:
         """Id of the row of an environment, which is inserted where there is none."""
         commit = content.get("commit")
         row = {
-            "content": to_json(content, sort_keys=True),
+            "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
             "commit_id": commit and commit["id"] + "+" * commit["dirty"],
             "packages": hash_of([content.get("python"), content.get("packages")])[:8],
         }
@@ -383,7 +383,12 @@ class Store:
         """Insert a row, lists and tables as JSON; its id."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
-        values = [to_json(v) if isinstance(v, dict | list | tuple) else v for v in row.values()]
+        values = [
+            json.dumps(value, ensure_ascii=False)
+            if isinstance(value, dict | list | tuple)
+            else value
+            for value in row.values()
+        ]
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
         return int(self._db.execute(text, values).lastrowid or 0)
 
@@ -433,7 +438,7 @@ def open_store(folder: Path) -> Iterator[Store]:
     with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
-            if not has_tables(connection, folder):
+            if not has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
             with lock(folder, shared=True):  # or somebody is writing
                 pass
@@ -469,7 +474,7 @@ def writing(folder: Path) -> Iterator[Store]:
         check_files(folder)
         with closing(connect(str(folder / RUNS_FILE), WAIT_S)) as connection:
             with explain_errors(folder):
-                is_there = has_tables(connection, folder)  # or the file is left as it is
+                is_there = has_tables(connection)  # or the file is left as it is
                 # No write-ahead log: it is unsafe on network disks, and a second file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
@@ -538,39 +543,33 @@ def check_files(folder: Path) -> None:
                     raise CoarticError(f"{path} was not written by coartic, and names another file")
 
 
-def has_tables(connection: sqlite3.Connection, folder: Path) -> bool:
-    """Whether the file has our tables; False for an empty one."""
+def has_tables(connection: sqlite3.Connection) -> bool:
+    """Whether the file has our tables; False for an empty one. Raises CoarticError for others."""
+
+    def schema(of: sqlite3.Connection) -> set[tuple[str, str, str]]:
+        rows = of.execute("SELECT type, name, sql FROM sqlite_master")
+        return {(kind, name, " ".join((sql or "").split())) for kind, name, sql in rows}
+
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    if application == _APPLICATION and version != FORMAT:
-        do = "update coartic" if version > FORMAT else "run the suite again with another --out"
-        raise CoarticError(
-            f"{folder / RUNS_FILE} has format {version}; "
-            f"this version of coartic reads {FORMAT}: {do}"
-        )
+    there = schema(connection)
     if application != _APPLICATION:
-        tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        if tables:
-            raise CoarticError(f"{folder / RUNS_FILE} is not a file of coartic; move it away")
+        if there:
+            raise CoarticError("it is not a file of coartic; move it away")
         return False
+    if version != FORMAT:
+        do = "update coartic" if version > FORMAT else "run the suite again with another --out"
+        raise CoarticError(f"it has format {version}; this version of coartic reads {FORMAT}: {do}")
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(f"{_SCHEMA}{_VIEWS}")
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
         add_joints(ours, filter(_JOINT.fullmatch, columns))
-        changed = sorted(schema(connection).items() ^ schema(ours).items())
-    if changed:
-        (kind, name), _ = changed[0]
-        raise CoarticError(
-            f"{folder / RUNS_FILE} is not as coartic makes it: {kind} {plain(name, 80)} is missing "
-            "or is not ours. Restore a copy, or run the suite again with another --out."
-        )
+        for kind, name, _ in sorted(there ^ schema(ours)):
+            raise CoarticError(
+                f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
+                "ours. Restore a copy, or run the suite again with another --out."
+            )
     return True
-
-
-def schema(connection: sqlite3.Connection) -> dict[tuple[str, str], str]:
-    """The text of each table, view, index and trigger, by kind and name."""
-    rows = connection.execute("SELECT type, name, sql FROM sqlite_master")
-    return {(kind, name): " ".join((sql or "").split()) for kind, name, sql in rows}
 
 
 def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
@@ -628,11 +627,6 @@ def explain(path: Path, error: Exception) -> str:
             "restore a copy."
         )
     return f"{path} holds what coartic does not write ({wrong})"
-
-
-def to_json(content: Any, *, sort_keys: bool = False) -> str:
-    """Plain data as JSON with its own letters."""
-    return json.dumps(content, ensure_ascii=False, sort_keys=sort_keys)
 
 
 def unpack(blob: bytes, trials: int | None) -> NDArray[np.int32]:
