@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,24 +28,13 @@ if TYPE_CHECKING:
 
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
-"""Seconds that the longest movement takes."""
+"""Seconds that the longest movement takes; one of fewer ticks than frames takes less."""
 HOLD_S = 2.0
 """Seconds that the last frame stands."""
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
 _WEIGHT = 1.5  # of lines
 _LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
-
-
-def timing(ticks: int) -> tuple[int, float]:
-    """Ticks from one frame to the next, and seconds that a frame stands, in whole hundredths as
-    GIF has them, of a movement of ``ticks`` rows.
-
-    It lasts :data:`LASTS_S`, or less where that would be slower than a tick a frame.
-    """
-    speed = max(ticks / LASTS_S, RATE)
-    stride = max(1, math.ceil(speed / RATE - 1e-9))
-    return stride, max(2, round(100 * stride / speed)) / 100
 
 
 def write_film(
@@ -67,7 +56,10 @@ def write_film(
     ticks = max(len(movement.configurations) for _, movement in movements)
     if ticks == 0:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    stride, interval_s = timing(ticks)
+    # A frame shows a tick or more, and stands for whole hundredths of a second, as GIF has them.
+    speed = max(ticks / LASTS_S, RATE)
+    stride = max(1, math.ceil(speed / RATE - 1e-9))
+    interval_s = max(2, round(100 * stride / speed)) / 100
     rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
     held = max(1, round(HOLD_S / interval_s))
     figure, scenes = set_stage(movements, width)
@@ -81,8 +73,8 @@ def write_film(
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
                 for row in [*rows, *[rows[-1]] * held]:
-                    for scene in scenes:
-                        scene.show(row)
+                    for show in scenes:
+                        show(row)
                     writer.grab_frame()
             write_output(path, film.read_bytes(), replace=replace)
     except OSError as error:
@@ -104,39 +96,42 @@ def check_film(path: Path, *, replace: bool = False) -> None:
     check_output(path, replace=replace)
 
 
-class Scene:
-    """What moves in one picture: updated, never drawn anew."""
+def set_scene(axes: Axes, movement: Trajectory) -> Callable[[int], None]:
+    """Draw what moves in one picture.
 
-    def __init__(self, axes: Axes, movement: Trajectory) -> None:
-        self._movement, task = movement, movement.task
-        self._paths = {hand: movement.hand_path(hand) for hand in task.hands}
-        self._traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
-        self._goals = draw_goals(axes, task, weight=_WEIGHT)
-        self._move = draw_robot(axes, task, task.q0, weight=_WEIGHT)
-        self._status = axes.text(
-            0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
-        )
+    Returns a function that shows the state at a row of the movement, or at its last one: artists
+    are updated, never drawn anew.
+    """
+    task = movement.task
+    paths = {hand: movement.hand_path(hand) for hand in task.hands}
+    traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
+    goals = draw_goals(axes, task, weight=_WEIGHT)
+    move = draw_robot(axes, task, task.q0, weight=_WEIGHT)
+    status = axes.text(
+        0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
+    )
 
-    def show(self, row: int) -> None:
-        """The state at a row of the movement, or at its last one."""
-        movement = self._movement
+    def show(row: int) -> None:
         row = min(row, len(movement.configurations) - 1)
-        self._move(movement.configurations[row])
-        for hand, trace in self._traces.items():
-            trace.set_data(*self._paths[hand][: row + 1].T)
+        move(movement.configurations[row])
+        for hand, trace in traces.items():
+            trace.set_data(*paths[hand][: row + 1].T)
         hit = movement.hits <= row
-        fill_goals(self._goals, hit)
+        fill_goals(goals, hit)
         state = "done"
         if not hit.all():
             goal = int(np.argmin(hit))
             state = f"goal {goal + 1} with the {movement.hands[goal]} hand"
-        self._status.set_text(f"reward −{row + 1}   {state}")
+        status.set_text(f"reward −{row + 1}   {state}")
+
+    return show
 
 
 def set_stage(
     movements: Sequence[tuple[str, Trajectory]], width: int
-) -> tuple[Figure, list[Scene]]:
-    """A figure ``width`` pixels wide with a scene per movement, all showing the same place."""
+) -> tuple[Figure, list[Callable[[int], None]]]:
+    """A figure ``width`` pixels wide with a scene per movement, all showing the same place, and
+    the functions that show their rows."""
     corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
@@ -164,5 +159,6 @@ def set_stage(
         for text in list(axes.texts):
             text.remove()
     return figure, [
-        Scene(axes, movement) for axes, (_, movement) in zip(figure.axes, movements, strict=True)
+        set_scene(axes, movement)
+        for axes, (_, movement) in zip(figure.axes, movements, strict=True)
     ]

@@ -43,9 +43,7 @@ if TYPE_CHECKING:
 
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
-MOST_ROBOTS = 1_000_000
 Rows = NDArray[np.int64] | slice
-ALL = slice(None)
 
 
 class TaskVectorEnv(VectorEnv):
@@ -110,7 +108,7 @@ class TaskVectorEnv(VectorEnv):
         ahead: int = 1,
         model: MotionModel = PAPER,
     ) -> None:
-        check_limits("num_envs", num_envs, 1, MOST_ROBOTS)
+        check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
         self.num_envs, self.model = num_envs, check_model(model)
         self.options = {"task": task, "ahead": ahead, "model": model}
@@ -206,7 +204,7 @@ class TaskVectorEnv(VectorEnv):
         fleet.q[rows] = self.starts[fleet.task[rows]]
         look(self.fleet)
 
-    def move(self, actions: ArrayLike, rows: Rows = ALL) -> None:
+    def move(self, actions: ArrayLike, rows: Rows = slice(None)) -> None:
         """Let the robots whose trial goes on reach for their next goal, by the actions ``(N, A)``
         of these rows.
 
@@ -293,7 +291,7 @@ class TaskEnv(gymnasium.Env):
         """Begin a trial."""
         super().reset(seed=seed)
         check_no_options(options)
-        self.robots.begin(ALL, self.np_random.integers(len(self.robots.tasks), size=1))
+        self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks), size=1))
         return self.robots.fleet.seen[0].copy(), self._info()
 
     def step(

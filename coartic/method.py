@@ -1,4 +1,4 @@
-"""What a method is: its declaration, and the session through which it works.
+"""The base of methods, and the session through which a method works.
 
 A learner, planner or controller is a :class:`Method`. It states its citation, its
 parameters and what it is **told**. Given a :class:`Session` (one task, one seed, one
