@@ -21,7 +21,7 @@ from coartic.cli.terminal import Display
 from coartic.runs.plan import run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
-from tests.support.processes import all_end
+from tests.support.processes import comes, folders_of_session
 from tests.support.suites import BROKEN, ROOT, InProcess
 
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
@@ -204,7 +204,7 @@ def call_apart(place, command):
     )  # fmt: skip
     _, words = done.communicate()
     assert not list((place / "temporary").iterdir())
-    assert all_end(done.pid)
+    assert comes(lambda: not folders_of_session(done.pid))
     return done.returncode, words
 
 

@@ -23,10 +23,10 @@ def folders_of_session(number):
     return [folder for _, session, folder, _ in processes().values() if session == number]
 
 
-def all_end(number):
-    """Whether all processes of a session end, within a minute."""
-    for _ in range(600):
-        if not folders_of_session(number):
+def comes(condition):
+    """Whether a condition comes true, for which a busy machine has ten minutes."""
+    for _ in range(6000):
+        if condition():
             return True
         time.sleep(0.1)
     return False
