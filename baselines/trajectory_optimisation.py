@@ -80,11 +80,6 @@ def cheapest_plan(
     return min(converged, key=lambda plan: plan.cost) if converged else plans[-1]
 
 
-def sure_to_hit(session: Session, task: Task) -> float:
-    """A target that is so near to a goal's centre is sure to hit, length unit."""
-    return task.radius - session.model.arrival_tolerance
-
-
 class TrajectoryOptimisation(Method):
     """The cheapest plan by one cost."""
 
@@ -98,9 +93,10 @@ class TrajectoryOptimisation(Method):
         task = session.hand_over(*self.told - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
-        radius = task.radius  # rounded to whole control ticks, a plan goes through the rims
-        if self.cost != "path-length":
-            radius = sure_to_hit(session, task)
+        # A target so near to a goal's centre is sure to hit; rounded to whole control ticks, a plan
+        # goes through the rims.
+        inside = task.radius - session.model.arrival_tolerance
+        radius = task.radius if self.cost == "path-length" else inside
         plans, failed, parameters = list[PathPlan](), dict[str, str](), self.parameters
         with session.solving():
             for hands, starts in self.starts(session, task).items():
@@ -118,11 +114,27 @@ class TrajectoryOptimisation(Method):
                 raise MethodError(
                     "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
                 )
-            plan = min(plans, key=lambda plan: plan.cost)
-            solution = self.movements_of(session, task, problem, plan)
+            best = plan = min(plans, key=lambda plan: plan.cost)
+            rounded, aimed = None, plan.instance
+            if self.cost == "path-length":
+                rounded = Rounding(session, problem, aimed).nearest(plan)
+                if rounded is None:  # aimed inside the discs it is a plan all the same
+                    aimed = replace(aimed, radius=inside)
+                    plan = problem.solve(aimed, plan.configurations)
+                    session.spend(**plan.spent)
+                    if not plan.converged:
+                        reason = f"IPOPT, aimed inside the discs: {plan.reason}"
+                        raise MethodError("solver-failed", reason)
+            if self.cost in ("acceleration", "jerk"):
+                solution = path_movements(session, task, aimed, spline(plan, SAMPLES))
+            elif rounded is not None:
+                configurations, steps = rounded.configurations, rounded.steps
+                solution = movements(session, task, aimed, configurations, steps)
+            else:
+                solution = movements(session, task, aimed, plan.configurations)
         details = {
-            "cost": plan.cost,
-            "path_length": float(plan.lengths().sum()),
+            "cost": best.cost,
+            "path_length": float(best.lengths().sum()),
             "costs": {letters_of(p.instance.hands): p.cost for p in plans},
             "failed": failed,
         }
@@ -156,12 +168,6 @@ class TrajectoryOptimisation(Method):
                 starts_of_hands.append(first + spread * rng.standard_normal(first.shape))
         return starts
 
-    def movements_of(
-        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
-    ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session counts the effort."""
-        return movements(session, task, plan.instance, plan.configurations)
-
 
 class PathLength(TrajectoryOptimisation):
     """The reward itself: the shortest path in joint space."""
@@ -174,20 +180,6 @@ class PathLength(TrajectoryOptimisation):
     )
     told = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
-
-    def movements_of(
-        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
-    ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session counts the effort."""
-        rounded = Rounding(session, problem, plan.instance).nearest(plan)
-        if rounded is None:  # aimed inside the discs it is a plan all the same
-            inside = replace(plan.instance, radius=sure_to_hit(session, task))
-            plan = problem.solve(inside, plan.configurations)
-            session.spend(**plan.spent)
-            if not plan.converged:
-                raise MethodError("solver-failed", f"IPOPT, aimed inside the discs: {plan.reason}")
-            return super().movements_of(session, task, problem, plan)
-        return movements(session, task, plan.instance, rounded.configurations, rounded.steps)
 
 
 class SquaredChanges(TrajectoryOptimisation):
@@ -218,12 +210,6 @@ class Acceleration(TrajectoryOptimisation):
     secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
-
-    def movements_of(
-        self, session: Session, task: Task, problem: TrajectoryProblem, plan: PathPlan
-    ) -> tuple[Movement, ...]:
-        """The movements of a plan; the session counts the effort."""
-        return path_movements(session, task, plan.instance, spline(plan, SAMPLES))
 
 
 class Jerk(Acceleration):

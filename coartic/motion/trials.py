@@ -18,7 +18,7 @@ from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.reach import Bench, reach_all
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array
-from coartic.tasks.task import Task, check_hands, hands_misfit, hands_of
+from coartic.tasks.task import Task, check_hands, hands_of
 
 HandSequences = str | Sequence[str]
 """Hand sequences of N trials: one for all (``"RRLR"``), or one each."""
@@ -111,8 +111,9 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> NDArray[np.int64
     """
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
-    if not all(isinstance(sequence, str) for sequence in each):
-        raise ValueError(hands_misfit(task, hands))
+    for sequence in each:
+        if not isinstance(sequence, str):
+            check_hands(task, sequence)
     codes = {
         sequence: [HANDS.index(hand) for hand in hands_of(check_hands(task, sequence))]
         for sequence in dict.fromkeys(each)

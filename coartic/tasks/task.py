@@ -294,20 +294,15 @@ def as_task(task: TaskLike) -> Task:
     return load_task(task)
 
 
-def hands_misfit(task: Task, hands: object) -> str:
-    """The sentence on a hand sequence that does not fit a task."""
-    letters = " or ".join(letters_of(sorted(task.hands)))
-    return (
-        f"hands {brief_value(hands)} do not fit task {task.name!r}: needed is a text with "
-        f"{letters} for each of {counted(len(task.goals), 'goal')}"
-    )
-
-
 def check_hands(task: Task, hands: str) -> str:
     """The hand sequence itself; ValueError where it does not fit the task."""
+    allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
-    if not fits or not set(hands) <= set(letters_of(task.hands)):
-        raise ValueError(hands_misfit(task, hands))
+    if not fits or not set(hands) <= set(allowed):
+        raise ValueError(
+            f"hands {brief_value(hands)} do not fit task {task.name!r}: needed is a text with "
+            f"{' or '.join(allowed)} for each of {counted(len(task.goals), 'goal')}"
+        )
     return hands
 
 
