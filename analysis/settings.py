@@ -30,12 +30,12 @@ def varied(study: Study) -> dict[str, list[str]]:
 @cached
 def compares_settings(study: Study) -> bool:
     """Whether all methods but references have several settings."""
-    methods = {
-        method: names
+    several = [
+        names
         for method, names in varied(study).items()
         if method not in (INITIAL, *PLACEBOS) and not is_search(method)
-    }
-    return bool(methods) and all(methods.values())
+    ]
+    return bool(several) and all(several)
 
 
 @cached

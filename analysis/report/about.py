@@ -10,7 +10,7 @@ from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.published import RUNS
-from coartic.analysis.words import NO_BREAK, RECONSTRUCTED, listed, marked
+from coartic.analysis.words import NO_BREAK, listed, marked
 from coartic.learner.learning import TRIALS
 from coartic.text import one_line
 
@@ -73,19 +73,3 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
     if not unproven or not columns & {"gap", "optimum"}:
         return []
     return [f"The optimum of {listed(unproven)} is not proven: it is the best known reward."]
-
-
-def notes_on_tables(study: Study) -> str:
-    """Notes for readers of the CSV files, a line each."""
-    reconstructed = [
-        marked(task)
-        for name, task in study.tasks.items()
-        if name in one_by_one(study) and task.reconstructed
-    ]
-    lines = [
-        "Rewards are in ticks. Gaps are shares of the optimum, 0.05 being 5 %.",
-        *([f"{RECONSTRUCTED} ({listed(reconstructed)})"] if reconstructed else []),
-        *notes_of(study, ["gap"]),
-        "run_ids: the runs behind a row; the beginning of an id names a run.",
-    ]
-    return "\n".join(lines) + "\n"

@@ -42,10 +42,7 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
     make_folder(folder, ["report.html"])
-    files = {
-        "report.html": page(study).encode(),
-        "tables/notes.txt": about.notes_on_tables(study).encode(),
-    }
+    files = {"report.html": page(study).encode()}
     captions = {id_of(section.table): section.caption for section in SECTIONS}
     for name, table in TABLES.items():
         frame = table(study)

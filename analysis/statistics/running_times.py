@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,17 +60,25 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
         place = np.searchsorted(np.cumsum(weights), share - 1e-9)
         return float(values[place]) if place < len(values) else math.inf
 
-    sizes = list(map(len, times))
+    sizes = tuple(map(len, times))
     if min(sizes) < FEWEST:
         return Estimate(budget(weights))
-    rng = np.random.default_rng(SEED)
-    resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
-    # How often each run is drawn: a byte each, as there may be many runs; none is drawn 256 times.
-    drawn = np.empty((resamples, sum(sizes)), dtype=np.uint8)
-    for of_task in np.split(drawn, np.cumsum(sizes)[:-1], axis=1):
-        size = of_task.shape[1]
-        for row in of_task:
-            row[:] = rng.multinomial(size, np.full(size, 1 / size))
-    budgets = [budget(weights * counts[runs]) for counts in drawn]
+    budgets = [budget(weights * counts[runs]) for counts in draws(sizes)]
     low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
     return Estimate(budget(weights), float(low), float(high))
+
+
+@lru_cache(maxsize=1)  # the budgets of a method are mostly of the same runs
+def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
+    """How often each run is drawn within its task, a row for each resample.
+
+    A byte each, as there may be many runs; none is drawn 256 times.
+    """
+    rng = np.random.default_rng(SEED)
+    resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
+    drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]
+    for of_task, size in zip(drawn, sizes, strict=True):
+        even = np.full(size, 1 / size)
+        for row in of_task:
+            row[:] = rng.multinomial(size, even)
+    return np.hstack(drawn)
