@@ -231,10 +231,7 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert [test.value for test in finding.tests] == pytest.approx([3, 1 / 3, 11 / 3])
     assert finding.holds
     assert not all_higher([Higher(first, second, by=2)]).holds
-    assert finding.evidence.startswith("Ticks by which it is so: t, who: 5.0 [")
     assert finding.evidence.count("t, who: 5.0 [") == 1
-    assert "; t, who against 3.7 [" in finding.evidence
-    assert "(who), a difference of 1.3 [" in finding.evidence
     one_of = some_of(all_higher([Higher(second, first), Higher(first, second)]))
     least = bootstrap_test(first.numbers, second.numbers)
     assert one_of.holds

@@ -11,6 +11,7 @@ from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.methods import EC1, PLACEBO
+from coartic.analysis.sections import TABLES
 from coartic.analysis.signatures import context_tests, signs
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
 from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
@@ -390,6 +391,23 @@ def test_the_placebo_that_shows_most_of_a_sign_counts():
     assert placebo.placebo_of(study, coarticulation.shared_goal(study)).method == PLACEBO
     assert list(placebo.of_placebo(study, "ascending", "first")) == [2, 2, 2]
     assert not placebo.selects(study, drawn)
+
+
+def test_p_of_shared_goals_is_corrected_by_method():
+    """Of eight runs in two places 2 of 70 divisions are as far apart. Two tasks share two goals:
+    the learner, on three tasks, has six of them, and random guesses, on two, have two."""
+    tasks = [
+        tiny_task(name=name, goals=[[5.0, 1.0], [5.0, 2.0], [5.0, y]], initial_hands="RRR")
+        for name, y in (("a", 3.0), ("b", 3.5), ("c", 4.0))
+    ]
+    cells = [
+        posed(task, label, [posture(place + 0.01 * run) for run in range(4)])
+        for label, count in ((EC1, 3), (PLACEBO, 2))
+        for place, task in enumerate(tasks[:count])
+    ]
+    table = TABLES["contexts"](study_with(*cells)).set_index("method")
+    assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
+    assert table.p_holm[PLACEBO].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.5])
