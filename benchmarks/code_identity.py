@@ -32,7 +32,8 @@ def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
 
     Raises OSError or SyntaxError.
     """
-    content = sorted(code_text(path).encode() for path in [*files_of(method), *_AROUND])
+    modules = [path.read_bytes() for path in [*files_of(method), *_AROUND]]
+    content = sorted(syntax(text)[0].encode() for text in modules)
     content += [path.read_bytes() for path in data]
     return hashlib.sha256(b"".join(content)).hexdigest()[:12]
 
@@ -63,16 +64,14 @@ def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[
                         yield file
 
 
-def code_text(path: Path) -> str:
-    """The syntax tree of a module without docstrings and ``__version__``, as text."""
-    return syntax(path.read_bytes())[0]
-
-
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
-    """The syntax tree of a module as :func:`code_text`, and its imports: level, module, names."""
-    imports = []
-    for node in statements(tree := ast.parse(content)):
+    """The syntax tree of a module without docstrings and ``__version__``, as text, and its imports:
+    level, module, names."""
+    tree, imports = ast.parse(content), []
+    waiting = deque[ast.AST]([tree])
+    while waiting:
+        node, of_api = waiting.popleft(), list[str]()
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
             node.body = []
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
@@ -83,25 +82,14 @@ def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]],
             names = tuple(alias.name for alias in node.names)
             imports.append((0, "", names))
             if "coartic" in names:
-                used = re.findall(r"\bcoartic\.(\w+)", content.decode())
-                imports += [(0, home, ("",)) for home in homes(used)]
+                of_api = re.findall(r"\bcoartic\.(\w+)", content.decode())
         elif isinstance(node, ast.ImportFrom):
             names = tuple(alias.name for alias in node.names)
             imports.append((node.level, node.module or "", ("", *names)))
             if node.module == "coartic" and not node.level:
-                imports += [(0, home, ("",)) for home in homes(names)]
-    return ast.dump(tree), tuple(imports)
-
-
-def homes(names: Iterable[str]) -> set[str]:
-    """The modules of names of the API."""
-    return {coartic.HOME[name] for name in names if name in coartic.HOME}
-
-
-def statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of :func:`ast.walk` without expressions, which are most of a tree."""
-    waiting = deque([tree])
-    while waiting:
-        node = waiting.popleft()
-        yield node
+                of_api = [*names]
+        homes = {coartic.HOME[name] for name in of_api if name in coartic.HOME}
+        imports += [(0, home, ("",)) for home in homes]
+        # As ast.walk, but without expressions, which are most of a tree.
         waiting += [n for n in ast.iter_child_nodes(node) if isinstance(n, _WITHIN_STATEMENTS)]
+    return ast.dump(tree), tuple(imports)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import platform
@@ -39,6 +40,11 @@ _LIBRARIES = (
 @cache
 def current_environment() -> dict[str, Any]:
     """Versions, platform and commit of this process."""
+    processor = platform.processor()
+    with contextlib.suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        if named := re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE):
+            processor = named[1]
     return {
         "coartic": coartic.__version__,
         "model_code": FINGERPRINT,
@@ -46,7 +52,7 @@ def current_environment() -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
         "platform": plain(platform.platform(), LONGEST_LINE),
-        "processor": plain(f"{processor_name()} (arithmetic {arithmetic()})", LONGEST_LINE),
+        "processor": plain(f"{processor} (arithmetic {arithmetic()})", LONGEST_LINE),
         "cores": threads_for(-1),
         "threads": ONE_THREAD,
     }
@@ -76,27 +82,20 @@ def process_peak_mb() -> float | None:
 
 def commit_of_checkout() -> dict[str, Any] | None:
     """Commit of the checkout the code runs from and whether it was changed since."""
-    root = PACKAGE.parent
+    # A GIT_DIR of the caller's (a hook's, say) must not stand in for our checkout.
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
     def git(*arguments: str) -> str:
-        # A GIT_DIR of the caller's (a hook's, say) must not stand in for our checkout.
-        clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
-        return subprocess.run(
-            ["git", "-C", str(root), *arguments],
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=20,
-            env=clean,
-        ).stdout.strip()
+        command = ["git", "-C", str(PACKAGE.parent), *arguments]
+        return subprocess.check_output(
+            command, stderr=subprocess.DEVNULL, text=True, timeout=20, env=clean
+        ).strip()
 
     try:
-        if Path(git("rev-parse", "--show-toplevel")).resolve() != root.resolve():
+        if Path(git("rev-parse", "--show-toplevel")).resolve() != PACKAGE.parent.resolve():
             return None  # installed inside somebody else's repository
-        return {
-            "id": git("rev-parse", "HEAD"),
-            "dirty": bool(git("status", "--porcelain", "--untracked-files=no")),
-        }
+        changed = git("status", "--porcelain", "--untracked-files=no")
+        return {"id": git("rev-parse", "HEAD"), "dirty": bool(changed)}
     except (OSError, subprocess.SubprocessError):
         return None
 
@@ -108,13 +107,3 @@ def arithmetic() -> str:
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     computed = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix))
     return hashlib.sha256(b"".join(each.tobytes() for each in computed)).hexdigest()[:8]
-
-
-def processor_name() -> str:
-    """The processor's name, as the system has it."""
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    except OSError:
-        return platform.processor()
-    name = re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE)
-    return name.group(1) if name else platform.processor()

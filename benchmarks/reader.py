@@ -72,7 +72,11 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         try:
             said: Any
             if question == "cards":
-                module = import_file(Path(path), shown)
+                try:
+                    module = load_file(Path(path))
+                except BaseException as error:
+                    why = f"{shown}: cannot be imported: {error_line(error)}"
+                    raise CoarticError(why) from None
                 methods = {method.name: method for method in methods_in(module)}
                 cards = cards_of_module(module, methods.values(), shown, path)
                 said = [asdict(card) for card in cards]
@@ -84,14 +88,6 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         except BaseException as error:
             text = json.dumps({"error": f"{shown}: cannot be used: {error_line(error)}"})
         pipe.send_bytes(text.encode())
-
-
-def import_file(path: Path, shown: str) -> ModuleType:
-    """The module of a file. Raises CoarticError for whatever it raises."""
-    try:
-        return load_file(path)
-    except BaseException as error:
-        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
 
 
 def cards_of_module(

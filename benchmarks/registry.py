@@ -97,21 +97,17 @@ def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) ->
     """Add methods by id. Raises CoarticError for an id that is reserved or taken, and for
     one that differs from a name here in large and small letters alone."""
     for card in cards:
-        if card.name.startswith(RESERVED):
-            raise CoarticError(
-                f"{card.origin}: method id {card.name!r} is reserved: ids that begin with "
-                f"{' or '.join(map(repr, RESERVED))} are this project's"
-            )
-        if card.name in registered:
-            raise CoarticError(
-                f"{card.origin}: method id {card.name!r} is already taken "
-                f"({registered[card.name].origin})"
-            )
         names = (*registered, *CONDITIONS, *VARIANTS, *NAMES)
-        if card.name.casefold() in map(str.casefold, names):
-            raise CoarticError(
-                f"{card.origin}: method id {card.name!r} is a name of a method here: choose another"
-            )
+        why = ""
+        if card.name.startswith(RESERVED):
+            ours = " or ".join(map(repr, RESERVED))
+            why = f"is reserved: ids that begin with {ours} are this project's"
+        elif card.name in registered:
+            why = f"is already taken ({registered[card.name].origin})"
+        elif card.name.casefold() in map(str.casefold, names):
+            why = "is a name of a method here: choose another"
+        if why:
+            raise CoarticError(f"{card.origin}: method id {card.name!r} {why}")
         registered[card.name] = card
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
@@ -84,9 +84,8 @@ def perform_again(run: Run, registered: Registry) -> Run:
             f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
     setting = replace(run.setting, code=method.code, told=method.told)
-    return next(
-        perform_in_order([Job(setting, method, run.suite_seed, (run.number,), run.time_limit_s)])
-    )
+    job = Job(setting, method, run.suite_seed, (run.number,), run.time_limit_s)
+    return next(perform_in_order([job]))
 
 
 def perform_some_again(
@@ -124,21 +123,11 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     ]
     for part in PARTS:
         if a.movement_data(part) != b.movement_data(part):
-            changes.append(f"{part}: {describe_score(a, part)} against {describe_score(b, part)}")
+            found = [run.scores.get(part) for run in (a, b)]
+            words = [f"{each.reward} with {each.hands}" if each else "nothing" for each in found]
+            changes.append(f"{part}: {' against '.join(words)}")
     if a.rewards != b.rewards:
-        changes.append(f"rewards by trial differ{first_difference(a.rewards, b.rewards)}")
+        pairs = enumerate(zip_longest(a.rewards, b.rewards, fillvalue="no trial"))
+        trial, (x, y) = next((trial, pair) for trial, pair in pairs if pair[0] != pair[1])
+        changes.append(f"rewards by trial differ, first at trial {trial}: {x} against {y}")
     return changes
-
-
-def describe_score(run: Run, part: str) -> str:
-    """Reward and hands of a part in words."""
-    found = run.scores.get(part)
-    return f"{found.reward} with {found.hands}" if found else "nothing"
-
-
-def first_difference(a: Sequence[Any], b: Sequence[Any]) -> str:
-    """Where two lists of rewards differ first, in words."""
-    for index, (x, y) in enumerate(zip(a, b, strict=False)):
-        if x != y:
-            return f", first at trial {index}: {x} against {y}"
-    return f": {len(a)} trials against {len(b)}"

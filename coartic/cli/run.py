@@ -85,7 +85,8 @@ def run(
     from coartic.benchmarks.pool import Local
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.run import perform
-    from coartic.benchmarks.suites import load_suite, suites
+    from coartic.benchmarks.suites import load_suite, select_cells, suites
+    from coartic.tasks.families import own_families
 
     def named(text: str | None) -> list[str]:
         return [] if text is None else [name.strip() for name in text.split(",")]
@@ -100,13 +101,16 @@ def run(
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
     plan = plan_suite(
         chosen,
+        cells=select_cells(
+            chosen,
+            registered,
+            tasks=given.tasks_meant(named(tasks)),
+            methods=names,
+            families=own_families(family_file or ()),
+        ),
         runs=runs,
         trials=trials,
         seed=seed,
-        tasks=given.tasks_meant(named(tasks)),
-        methods=names,
-        method_files=method_file or (),
-        family_files=family_file or (),
         time_limit_s=time_limit,
         trial_budget=trial_budget,
     )
