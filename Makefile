@@ -56,7 +56,7 @@ release-check: $(READY)
 findings: $(READY)
 	@for suite in $(STORED); do \
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
-	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
+	  $(BIN)/coartic report $(OUT)/$$suite --for-paper || exit; \
 	done
 	$(BIN)/python docs/make_findings.py --from $(OUT)
 
