@@ -11,7 +11,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -98,17 +98,6 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     last = [each for each in words if words[each][-1:] == meant[-1:]]
     nearest = [*sorted(begin, key=len), *alike, *last]
     return f"; did you mean {nearest[0]!r}?" if nearest else ""
-
-
-def id_named(name: str, names: Mapping[str, str]) -> str:
-    """The id of what people call so, in small letters or large; ``name`` itself for none.
-
-    ``names`` by id; an id goes before a name.
-    """
-    lower = name.casefold()
-    called = [each for each, words in names.items() if words and words.casefold() == lower]
-    alike = [each for each in names if each.casefold() == lower]
-    return name if name in names else next(iter(alike + called), name)
 
 
 def unknown(kind: str, name: str, names: Iterable[str]) -> str:

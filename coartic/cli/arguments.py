@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.files import folder_named
-from coartic.text import id_named
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
@@ -31,6 +30,16 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
+
+
+def id_named(name: str, names: Mapping[str, str]) -> str:
+    """The id of what people call so, in small letters or large; ``name`` itself for none.
+
+    ``names`` are people's names by id; an id goes before a name.
+    """
+    called = {words.casefold(): each for each, words in names.items() if words}
+    ids = {each.casefold(): each for each in names}
+    return name if name in names else (called | ids).get(name.casefold(), name)
 
 
 def tasks_meant(names: Sequence[str]) -> list[str]:

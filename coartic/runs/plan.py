@@ -219,11 +219,13 @@ class Plan:
             }
             for position, (cell, setting) in enumerate(zip(self.cells, self.settings, strict=True))
         ]
+        names = [each.name for each in fields(MethodCard) if each.name != "where"]
+        of_methods = [{name: getattr(m, name) for name in names} for m in self.methods.values()]
         definitions = {setting.task.name: setting.definition for setting in self.settings}
         return {
             "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
             "tasks": [{"name": name, "definition": d} for name, d in definitions.items()],
-            "methods": [{n: getattr(m, n) for n in _OF_METHOD} for m in self.methods.values()],
+            "methods": of_methods,
             "cells": cells,
         }
 
@@ -236,7 +238,10 @@ class Plan:
             row["name"]: parse_task(json.loads(row["definition"]), source) for row in rows["tasks"]
         }
         methods = {
-            row["name"]: {**row, **{name: json.loads(row[name]) for name in _JSON}}
+            row["name"]: {
+                **row,
+                **{name: json.loads(row[name]) for name in ("told", "secondary", "defaults")},
+            }
             for row in rows["methods"]
         }
         (suite,) = rows["suite"]
@@ -261,8 +266,6 @@ class Plan:
 
 
 _OF_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
-_OF_METHOD = tuple(each.name for each in fields(MethodCard) if each.name != "where")
-_JSON = ("told", "secondary", "defaults")  # of methods
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:

@@ -55,7 +55,7 @@ _DTYPES: dict[str, Any] = {
     },
     **dict.fromkeys(("suite", "task", "method", "variant", "label", "hand", "kind"), "string"),
     **dict.fromkeys(("told", "parameters", "commit", "code", "packages", "part"), "string"),
-    **dict.fromkeys(("result_id", "order", "goal", "ticks", "waypoint"), "Int64"),
+    **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
     "warm": "boolean",
 }
 """Types with which columns of views are read; all have room for missing values."""
@@ -285,12 +285,12 @@ class Store:
     def runs(self) -> pd.DataFrame:
         """View ``runs`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return check_runs(self._table("SELECT * FROM runs"))
+            return check_runs(self._frame("runs"))
 
     def solutions(self) -> pd.DataFrame:
         """View ``solutions`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return self._table("SELECT * FROM solutions").drop(columns=["result_id", "part"])
+            return self._frame("solutions").drop(columns=["result_id", "part"])
 
     def movements(
         self, part: str, tasks: Mapping[str, Task], most: int
@@ -396,11 +396,11 @@ class Store:
         """The first row of a query, or None."""
         return self._db.execute(query, values).fetchone()
 
-    def _table(self, query: str, *values: object) -> pd.DataFrame:
-        """The rows of a query, with nullable types."""
+    def _frame(self, view: str) -> pd.DataFrame:
+        """A view as a data frame, with nullable types."""
         import pandas as pd
 
-        rows = self._db.execute(query, values)
+        rows = self._db.execute(f"SELECT * FROM {view}")
         names = [column[0] for column in rows.description]
         frame = pd.DataFrame(list(map(tuple, rows)), columns=names, dtype=object)
         with np.errstate(invalid="ignore"):  # of numbers that are too large, which it refuses
