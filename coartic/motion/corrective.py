@@ -20,6 +20,7 @@ from coartic.motion.lanes import (
     fill,
     lanes_for,
     leave,
+    near,
     padded_count,
     place,
     runs_for,
@@ -63,8 +64,7 @@ def find_fates(at: Any, count: int, square: float) -> None:
 
 @inlined
 def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tuple[int, bool]:
-    """q += α Jᵀ e in every lane that goes on; how many have ended, and whether all angles
-    are in the range of the fast cosine."""
+    """q += α Jᵀ e in every lane that goes on; how many have ended, and :func:`near`."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -100,7 +100,7 @@ def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
     at, model = lanes.at[0], setup.model
     gain, free_x, free_y = model.gain, setup.free_x, setup.free_y
     square = largest_square(model.correction_tolerance)
-    is_near, iteration = False, 0
+    is_near, iteration = near(at, count), 0
     while count > 0:
         place(at, count, is_near)
         find_fates(at, count, square)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.motion.compiled import chain_by, inlined, inner, record_type
-from coartic.motion.trigonometry import cosine, near_cosine, near_sine, sine
+from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, Arm, Robot
 
 LANES = 72
@@ -189,6 +189,15 @@ def padded_count(count: int) -> int:
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
+@inner
+def near(at: Any, count: int) -> bool:
+    """Whether bounds show that all angles are in the range of the fast cosine."""
+    far = 0
+    for i in range(padded_count(count)):
+        far += 0 if winding(at.q, i) < LARGEST else 1
+    return far == 0
+
+
 @inlined
 def winding(q: Any, lane: int) -> float:
     """Bound on the angle of every link of an arm, rad: all its joints' together."""
@@ -216,10 +225,7 @@ _far_chains = chains_by(cosine, sine)
 
 @inner
 def place(at: Any, count: int, is_near: bool) -> None:
-    """Forward kinematics of every lane: fill ``x`` and ``y``.
-
-    ``is_near``: bounds (:func:`winding`) show that all angles are in the range of the fast cosine.
-    """
+    """Forward kinematics of every lane: fill ``x`` and ``y``. ``is_near``: see :func:`near`."""
     if is_near:
         _near_chains(at, padded_count(count))
     else:

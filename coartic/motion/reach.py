@@ -35,7 +35,7 @@ class Reached(NamedTuple):
     """Results of N arms, or of N arms and G goals: then each shape is ``(N, G, ...)``."""
 
     q: Array
-    """Where each ended, shape ``(N, dof)``; NaN for a goal that was not attempted."""
+    """Where each ended, or stayed, shape ``(N, dof)``."""
     hit: NDArray[np.bool_]
     """Whether its hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
@@ -139,6 +139,7 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
             fill_row(run.goal, row_of(arms.goals, first + i)[g])
             run.hand, run.corrects = arms.hands[first + i, g], True
             run.hit, run.evaluations = False, 0
+            reached.ticks[first + i, g] = 0
         for m in range(arms.targets.shape[2]):
             for i in range(count):
                 run, target = batch.runs[i], arms.targets[first + i, g, m]
@@ -156,21 +157,19 @@ def reach_lot(first: int, count: int, arms: Any, setup: Any, reached: Any, batch
                         fill_row(target, run.target)
             attempt(count, setup, batch)
             for i in range(count):
-                if batch.runs[i].going:
-                    reached.moved[first + i, g, m] = batch.runs[i].ticks
-                    reached.ticks[first + i, g] += batch.runs[i].ticks
+                reached.moved[first + i, g, m] = batch.runs[i].ticks
+                reached.ticks[first + i, g] += batch.runs[i].ticks
         correct_missed(count, setup, batch)
         for i in range(count):
             n, run = first + i, batch.runs[i]
-            if run.going:
-                fill_row(reached.q[n, g], run.q)
-                reached.hit[n, g] = run.going = run.hit
-                reached.iterations[n, g] = run.iterations
-                reached.evaluations[n, g] = run.evaluations
-                if run.converged:
-                    reached.ticks[n, g] += run.ticks
-                    reached.corrections[n, g] = 1
-                    fill_row(reached.corrected[n, g], run.target)
+            fill_row(reached.q[n, g], run.q)
+            reached.hit[n, g] = run.going = run.hit
+            reached.ticks[n, g] += run.ticks
+            reached.corrections[n, g] = run.converged
+            reached.iterations[n, g] = run.iterations
+            reached.evaluations[n, g] = run.evaluations
+            for j in range(len(reached.corrected[n, g])):
+                reached.corrected[n, g, j] = run.target[j] if run.converged else math.nan
 
 
 @entry
@@ -190,18 +189,18 @@ ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
 
 
 def blank(arms: Requests) -> Reached:
-    """Results of arms that have not moved."""
+    """Empty arrays for the results of arms."""
     count, goals, moves, dof = arms.targets.shape
     shape = count, goals
     return Reached(
-        q=np.full((*shape, dof), np.nan),
-        hit=np.zeros(shape, np.bool_),
-        ticks=np.zeros(shape, np.int64),
-        moved=np.zeros((*shape, moves), np.int64),
-        corrected=np.full((*shape, dof), np.nan),
-        corrections=np.zeros(shape, np.int64),
-        iterations=np.zeros(shape, np.int64),
-        evaluations=np.zeros(shape, np.int64),
+        q=np.empty((*shape, dof)),
+        hit=np.empty(shape, np.bool_),
+        ticks=np.empty(shape, np.int64),
+        moved=np.empty((*shape, moves), np.int64),
+        corrected=np.empty((*shape, dof)),
+        corrections=np.empty(shape, np.int64),
+        iterations=np.empty(shape, np.int64),
+        evaluations=np.empty(shape, np.int64),
     )
 
 
