@@ -358,3 +358,11 @@ def test_a_learned_replay_is_the_replay():
     run = learn(task, replace(CONDITIONS["EC1"], learned="replay"), seed=3, trials=25)
     assert run.reward == run.replay_reward != max(run.rewards)
     assert run.execute().reward == run.reward
+
+
+def test_a_goal_where_the_hand_is_already_takes_no_tick():
+    """It is in the solution all the same, which says with which hand it is hit."""
+    task = tiny_task(goals=[[4.5, 0.1], [4.5, 0.15]], initial_hands="RR")
+    run = learn(task, "EC3", seed=0, trials=1)
+    assert (run.reward, run.hands, [m.ticks for m in run.solution]) == (0, "RR", [0, 0])
+    assert run.execute().reward == 0
