@@ -13,7 +13,7 @@
     return found.href;
   };
   const keep = (link) => { if (own) window.history.replaceState(null, "", address(link)); };
-  const figure = new Play(root, { first: {}, ...data, source, keep, address }, own ? here() : "");
+  const figure = new Play(root, { ...data, source, keep, address }, own ? here() : "");
   root.querySelector("[data-is=link]").hidden = data.page === null;
   if (own) window.addEventListener("hashchange", () => { if (figure.link !== here()) figure.restore(here()); });
   /* Cells of the ranking, which stands below, show their films. */

@@ -151,16 +151,15 @@ class Play {
     const learns = who === "learner" || who === "cma-es";
     const jobs = [];
     this.tasks.forEach((task, k) => {
-      const { model } = this.data;
       if (!this.alone[k].going) return; // a goal is out of reach
       if (learns && !this.stored(who) && !this.told) {
         const seeds = this.state.others ? SEEDS : 1;
         for (let seed = 0; seed < seeds; seed += 1) {
-          jobs.push({ key: `${k} run ${seed}`, task, model, rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 });
+          jobs.push({ key: `${k} run ${seed}`, task, rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 });
         }
       }
-      if (who === "plan") jobs.push({ key: `${k} plan`, task, model, horizon: this.state.ahead, trials: 1 });
-      else if (!this.stored(who)) jobs.push({ key: `${k} far`, task, model, horizon: MOST_GOALS, trials: 1, turn: 1 });
+      if (who === "plan") jobs.push({ key: `${k} plan`, task, horizon: this.state.ahead, trials: 1 });
+      else if (!this.stored(who)) jobs.push({ key: `${k} far`, task, horizon: MOST_GOALS, trials: 1, turn: 1 });
     });
     this.asked = jobs.length;
     if (!jobs.length) this.busy = false;

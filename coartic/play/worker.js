@@ -5,8 +5,8 @@ const REPORT_MS = 60;
 
 /* A run of the learner, of CMA-ES or of a planner, as an order names it. */
 class Job {
-  constructor({ key, task, model, rules, seed, horizon, trials, turn = 0 }) {
-    const problem = problem_of(task, model);
+  constructor({ key, task, rules, seed, horizon, trials, turn = 0 }) {
+    const problem = problem_of(task);
     Object.assign(this, { key, trials, turn, made: 0, due: 1, rewards: [], snapshots: [], done: false });
     if (rules === "cma-es") this.method = new Search(problem, seed, trials);
     else if (rules) this.method = new Learner(problem, rules, seed);
