@@ -172,32 +172,15 @@ SECTIONS = (
         single=False,
     ),
     Section(
-        "exploration",
-        "Exploration",
-        "Does more exploration pay on random tasks?",
-        table=random_tasks.list_exploration,
-        caption="More exploration against less, in per cent of the best known reward",
-        sentence=random_tasks.exploration_pays,
-        single=False,
-    ),
-    Section(
-        "signs",
-        "Signs",
-        "Does coarticulation show on random tasks?",
-        table=random_tasks.list_family_signs,
-        caption="Signs of coarticulation over instances",
-        single=False,
-    ),
-    Section(
         "tasks",
         "Tasks",
         "What are the tasks?",
         table=tasks.list_tasks,
-        caption="Tasks with their initial, learned and best possible rewards (ticks)",
+        caption="Tasks with their initial and best possible rewards (ticks)",
         figure=tasks.draw_tasks,
-        note="Initial: the corrective process alone, with the task's initial hands. Learned: the "
-        "learner's best condition. Best known: the optimum where the proven bound equals it. "
-        "Proven bound: a reward that no solution can exceed.",
+        note="Initial: the corrective process alone, with the task's initial hands. Best known: "
+        "the optimum where the proven bound equals it. Proven bound: a reward that no solution can "
+        "exceed.",
     ),
     Section(
         "methods",

@@ -76,8 +76,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 def estimate(value: Estimate, digits: int | None = None) -> str:
     """``2.1 % [1.3, 2.9]`` with its unit; without the brackets where there is no interval."""
-    interval = in_brackets(value.low, value.high, digits)
-    return f"{number(value.value, digits)} {interval}".strip()
+    return f"{number(value.value, digits)} {in_brackets(value.low, value.high, digits)}".strip()
 
 
 def interval(

@@ -33,7 +33,7 @@ KEPT = {
         "postures published ranking runtimes learning-curves",
     ),
     "ablations": ("methods signatures claims", ""),
-    "families": ("family-gaps exploration family-signs claims", "gaps-by-family"),
+    "families": ("family-gaps claims", "gaps-by-family"),
 }
 """Tables and figures that are kept of each suite's report."""
 

@@ -11,7 +11,6 @@ from coartic.analysis.claims import reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
-from coartic.analysis.sections import TABLES
 from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -91,22 +90,6 @@ def test_a_method_that_beats_the_search_makes_the_best_known():
     assert on(rewarded(RISING, optima=False), "long/v1/i002", EC4)[1] is None
 
 
-def test_planted_contrasts():
-    """EC4 over EC3: 10 of 500 on all instances but the last of each family, where it loses 20."""
-    study = rewarded({**RISING, EC4: lambda n: -540 if n < 4 else -570})
-    planted = TABLES["exploration"](study)
-    mixed = planted.loc["learner EC4 over learner EC3, long/v1"]
-    assert mixed.gain == pytest.approx((4 * 0.02 - 0.04) / 5)
-    assert (mixed.better, mixed.worse, mixed.instances) == (4, 1, 5)
-    assert mixed.gain_low < 0 < mixed.gain_high
-    rising = planted.loc["learner EC3 over learner EC2, all"]
-    assert rising.gain == pytest.approx(0.02)
-    assert (rising.instances, rising.better) == (10, 10)
-    initial = planted.loc["learner EC1 over the initial solution, one-armed/v1"]
-    assert initial.gain == pytest.approx(0.12)
-    assert "learner EC3 over learner EC2, one-armed/v1" not in planted.index
-
-
 def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
     """Signs of the learner, and of the placebo: that share of them, more by a little."""
     by_cell = {}
@@ -133,16 +116,6 @@ def with_signs(study, **values):
     """A study whose runs are not executed: their signs are made up."""
     study._computed[signs.__wrapped__, (), ()] = made_up_signs(study, **values)
     return study
-
-
-def test_presence():
-    study = with_signs(rewarded(RISING), waiting=0.07)
-    present = TABLES["family-signs"](study)
-    waiting = present.loc[f"other arm, {EC4}, long/v1"]
-    assert waiting["mean"] == pytest.approx(0.09)
-    assert (waiting.instances, waiting.there) == (5, 1)  # the last beyond a tenth of the way
-    assert present.there[f"hand, {EC4}, all"] == 10
-    assert f"hand, {EC1}, one-armed/v1" not in present.index
 
 
 def test_claims_of_generality(monkeypatch):

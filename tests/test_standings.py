@@ -118,7 +118,7 @@ def test_a_failed_run_reaches_nothing():
     assert ranking.main_gaps(again).method.tolist() == [learner]
     assert TABLES["against-learner"](again).empty
     assert TABLES["runtimes"](again).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    (times,) = costs.costs(again)[other, "solve_s"]
+    times = costs.times_of(again, again.cells["ascending", other], "solve_s")
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 

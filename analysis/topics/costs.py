@@ -18,7 +18,6 @@ from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.methods import TOGETHER, in_order, is_learner, main_methods, name_of
 from coartic.analysis.settings import name_in, shown_methods
 from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.running_times import RunningTimes
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
@@ -62,11 +61,9 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
 
     Infinite where it did not. A planner reaches all of its targets at the end. Kinematics
     evaluations and time are known as totals of the run and spread evenly over its trials, which is
-    not exact: over the first 10, 100 and 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times
-    their even share, 3.4 times for the first 10 trials of CMA-ES on two-armed 1 (the learner, hill
-    climbing and CMA-ES, six cells, one seed each); a learner without its corrective process spends
-    most of them on its first trial. A run whose spend is not known, such as the time of a cold one,
-    has no part; times are those of :func:`.scores.solve_times`, without building.
+    not exact: over the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their
+    even share, 3.4 times for the first 10 of CMA-ES on two-armed 1. A run whose spend is not known,
+    such as the time of a cold one, has no part; times are those of :func:`.scores.solve_times`.
     """
     initial, optimum = scores.initial_and_optimum(study)[cell.task]
     targets = np.ceil(initial + shares * (optimum - initial) - 1e-9)
@@ -86,18 +83,6 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
                 spent = trials if spend == "trials" else total * (trials / made)
             rows.append(np.append(spent, math.inf)[np.searchsorted(rewards, targets)])
     return np.array(rows).reshape(-1, len(targets))
-
-
-@cached
-def costs(study: Study) -> dict[tuple[str, str], RunningTimes]:
-    """Running times over :func:`.scores.common_tasks` by method and spend."""
-    by_method: dict[tuple[str, str], RunningTimes] = {}
-    for method, cells in cells_compared(study).items():
-        for spend in SPENDS:
-            times = [times_of(study, cell, spend) for cell in cells]
-            if all(map(len, times)):
-                by_method[method, spend] = times
-    return by_method
 
 
 def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
@@ -167,13 +152,14 @@ def list_runtimes(study: Study) -> Rows:
     """Cost of a quarter and of half of the targets; ``half on``: median trials to the
     target halfway, by task, infinite where most runs never reach it."""
     for method, cells in cells_compared(study).items():
-        if (method, "trials") not in costs(study):
+        times = {spend: [times_of(study, cell, spend) for cell in cells] for spend in SPENDS}
+        if not all(map(len, times["trials"])):
             continue
-        times = costs(study)[method, "trials"]
-        row: Row = {"method": method, "reached": running_times.share_reached(times)}
+        reached = running_times.share_reached(times["trials"])
+        row: Row = {"method": method, "reached": reached}
         for name, spend, share in COSTS:
-            if (method, spend) in costs(study):
-                row |= running_times.budget_for(costs(study)[method, spend], share).columns(name)
+            if all(map(len, times[spend])):
+                row |= running_times.budget_for(times[spend], share).columns(name)
         if scores.groups(study)[method] == scores.BY_TRIAL:
             of_method = scores.compared(study)[method]
             for task in (task for task in scores.initial_and_optimum(study) if task in of_method):

@@ -7,7 +7,7 @@ import pandas as pd
 
 from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
 from coartic.analysis.optima import gap_share, locks_base
-from coartic.analysis.signatures.signs import ROUNDING, SIGNS
+from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.placebo import placebos
@@ -58,16 +58,11 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
     }
 
 
-THERE = {"hand": 0.1, "arm": ROUNDING, "other arm": 0.1, "first": ROUNDING, "whole": ROUNDING}
-"""Least values with which signs of :data:`~coartic.analysis.signatures.signs.SIGNS` are there: a
-tenth of the goals, or of the way; more than a tick, which rounding can make."""
-
-
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     """Values of signs (n,) on every instance, of the learner by condition and of the placebo.
 
-    By the instance's name and the method's label, then by the sign's name in :data:`THERE`; a
+    By the instance's name and the method's label, then by the sign's name in :data:`SIGNS`; a
     value for each run that has one. A sign without any is left out. Label ``PLACEBO`` has each sign
     of the placebo that shows most of it over the instances of the family.
     """
@@ -77,7 +72,7 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.executed(name, label)
-                measured = {sign: SIGNS[sign].of(runs) for sign in THERE}
+                measured = {sign: SIGNS[sign].of(runs) for sign in SIGNS}
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
     # Of each family and sign, the placebo with the highest mean over instances.
     means = pd.DataFrame(
@@ -88,20 +83,10 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
     ).groupby(["family", "sign", "label"], sort=False)["mean"].mean()  # fmt: skip
     most = means.groupby(["family", "sign"], sort=False).idxmax().to_dict()
     for name in [name for name, label in by_cell if label == PLACEBO]:
-        chosen = {sign: most.get((study.tasks[name].family, sign), ("",))[-1] for sign in THERE}
+        chosen = {sign: most.get((study.tasks[name].family, sign), ("",))[-1] for sign in SIGNS}
         by_cell[name, PLACEBO] = {
             sign: by_cell[name, label][sign]
             for sign, label in chosen.items()
             if sign in by_cell.get((name, label), {})
         }
     return by_cell
-
-
-def signs_by_family(study: Study, label: str, sign: str) -> Scores:
-    """A sign of a condition by family, of the instances that have a value."""
-    scores: dict[str, list[tuple[Array]]] = {}
-    for name in best_of_instances(study):
-        values = signs(study).get((name, label), {}).get(sign)
-        if values is not None:
-            scores.setdefault(str(study.tasks[name].family), []).append((values,))
-    return scores

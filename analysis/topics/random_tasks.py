@@ -1,57 +1,22 @@
-"""Results on random tasks: gaps, more exploration against less, signs of coarticulation."""
+"""Gaps of methods on random tasks."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import (
-    EC1,
-    EC2,
-    EC3,
-    EC4,
-    INITIAL,
-    LEARNERS,
-    PLACEBO,
-    is_variant,
-    most_exploring,
-    name_of,
-)
-from coartic.analysis.signatures.signs import SIGNS
-from coartic.analysis.statistics.instances import other_tasks, value
-from coartic.analysis.study import CellRuns, Study
+from coartic.analysis.methods import is_variant, most_exploring, name_of
+from coartic.analysis.statistics.instances import other_tasks
+from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.instances import (
-    THERE,
-    best_of_instances,
-    by_family,
-    signs_by_family,
-    solved,
-)
-from coartic.analysis.words import interval, number
+from coartic.analysis.topics.instances import best_of_instances, by_family, solved
+from coartic.analysis.words import number
 
-OfFamily = TypeVar("OfFamily")
-CONTRASTS = (
-    (EC2, INITIAL),
-    (EC1, INITIAL),
-    (EC3, EC2),
-    (EC4, EC3),
-    (EC4, EC2),
-)
-"""More exploration against less: learning at all; random hands in place of the closest, the other
-arm still; the other arm's joints as well; the same, against the closest hands: conditions 2 and 4
-differ in nothing but the hands that they try."""
-INITIAL_SOLUTION = "the initial solution"
-"""Its name in the column of contrasts."""
-ALL = "all"
-"""In the column of families: the mean over all of them, each counting alike."""
 MOST_GAPS = 4
 """Methods whose gaps a sentence tells."""
 _FARTHEST = 1.0  # gap at the right end; larger ones stand there too
@@ -83,71 +48,6 @@ def list_family_gaps(study: Study) -> Rows:
         ]
         rows.append((label, row | runs_of(*cells)))
     yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
-
-
-def each_and_all(parts: Mapping[str, OfFamily]) -> Iterator[tuple[str, Mapping[str, OfFamily]]]:
-    """Every family by itself, and ``all`` of them where there are several."""
-    for family, part in parts.items():
-        yield family, {family: part}
-    if len(parts) > 1:
-        yield ALL, parts
-
-
-def family_cells(study: Study, family: str, labels: Iterable[str]) -> list[CellRuns]:
-    """Cells of methods on the instances of a family, or of all."""
-    return [
-        cell
-        for (task, label), cell in study.cells.items()
-        if label in labels and (family == ALL or study.tasks[task].family == family)
-    ]
-
-
-@table("contrast, family, instances, gain[], better, worse")
-def list_exploration(study: Study) -> Rows:
-    """More exploration against less, by family and over all of them.
-
-    ``gain``: of rewards, as a share of the best known.
-    """
-    rows = solved(study)
-    for first, second in CONTRASTS:
-        less = INITIAL_SOLUTION if second == INITIAL else name_of(second)
-        contrast = f"{name_of(first)} over {less}"
-        both = rows[rows.label == first].merge(rows[rows.label == second], on=["family", "task"])
-        pairs = {
-            str(family): [(-more, -less) for more, less in zip(part.gap_x, part.gap_y, strict=True)]
-            for family, part in both.groupby("family", sort=False)
-        }
-        for family, scores in each_and_all(pairs):
-            # Equal means of different runs may differ in the last bit.
-            values = np.array([value(runs) for part in scores.values() for runs in part]).round(12)
-            row: Row = {
-                "contrast": contrast,
-                "family": family,
-                "instances": len(values),
-                **other_tasks(scores).columns("gain"),
-                "better": int((values > 0).sum()),
-                "worse": int((values < 0).sum()),
-                **runs_of(*family_cells(study, family, (first, second))),
-            }
-            yield f"{contrast}, {family}", row
-
-
-@table("sign, method, family, instances, there, mean[]")
-def list_family_signs(study: Study) -> Rows:
-    """Signs of coarticulation over instances, of the learner by condition and of the placebo."""
-    for label, sign in itertools.product((*LEARNERS, PLACEBO), THERE):
-        for family, scores in each_and_all(signs_by_family(study, label, sign)):
-            means = [float(runs[0].mean()) for of_family in scores.values() for runs in of_family]
-            row: Row = {
-                "sign": SIGNS[sign].in_short,
-                "method": label,
-                "family": family,
-                "instances": len(means),
-                "there": sum(mean > THERE[sign] for mean in means),
-                **other_tasks(scores).columns("mean"),
-                **runs_of(*family_cells(study, family, (label,))),
-            }
-            yield f"{sign}, {label}, {family}", row
 
 
 @figure(
@@ -213,15 +113,3 @@ def on_random_tasks(study: Study) -> str:
         f"arms): {', '.join(ends)}. On {sum(each.proven for each in best)} tasks this reward is "
         "the proven optimum."
     )
-
-
-def exploration_pays(study: Study) -> str:
-    """Gain of each condition on the next lower one, over all families."""
-    rows = list_exploration(study)
-    initial = rows.contrast.astype(str).str.endswith(INITIAL_SOLUTION)
-    gains = [
-        f"{row['contrast']} {interval(row, 'gain', scale=100, unit=' %')}, better on "
-        f"{row['better']} of {row['instances']} tasks"
-        for row in rows[(rows.family == ALL) & ~initial].to_dict("records")
-    ]
-    return f"Gains over all families: {'; '.join(gains)}." if gains else ""

@@ -109,16 +109,13 @@ def scores(study: Study) -> pd.DataFrame:
     Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
     ``reward`` (NaN for a run without a solution) and ``best_known``.
     """
-    columns, best = (
-        ["method", "task", "run", "seed", "reward", "best_known"],
-        initial_and_optimum(study),
-    )
+    columns = ["method", "task", "run", "seed", "reward", "best_known"]
     parts = [
         cell.runs.assign(
             method=method,
             task=task,
             reward=cell.runs.reward.where(cell.runs.status == "ok").astype(float),
-            best_known=best[task][1],
+            best_known=initial_and_optimum(study)[task][1],
         )[columns]
         for method, cells in compared(study).items()
         for task, cell in cells.items()

@@ -12,41 +12,30 @@ from matplotlib.figure import Figure
 from coartic import Task
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
-from coartic.analysis.methods import LEARNER
-from coartic.analysis.statistics.estimates import mean
+from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics.published import published_cell
-from coartic.analysis.topics.scores import best_condition
+from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
-@table("task, arms, base, initial, condition, learned[], published±, optimum, bound")
+@table("task, arms, base, initial, optimum, bound")
 def list_tasks(study: Study) -> Rows:
-    """One row a task: initial, learned, published and best possible reward."""
-    for name in sorted(one_by_one(study), key=list(study.tasks).index):
-        task, label = study.tasks[name], best_condition(study, name)
+    """One row a task: initial and best possible reward."""
+    for name, task in study.tasks.items():
         best = study.optima.get(name)
-        row: Row = {
-            "task": marked(task),
-            "arms": len(task.hands),
-            "base": f"locked in {' and '.join(task.locked_base)}" if task.locked_base else "free",
-            "optimum": best.reward if best else None,
-            "bound": best.bound if best else None,
-        }
-        if label is not None:
-            cell, condition = study.cells[name, label], label.removeprefix(LEARNER)
-            paper = published_cell(name, condition)
-            row |= {
-                "initial": cell.good.initial_reward.dropna().mean(),
-                "condition": condition,
-                **mean(cell.rewards).columns("learned"),
-                "published": paper.summary.mean if paper and paper.summary else None,
-                "published_sd": paper.summary.sd if paper and paper.summary else None,
-                **runs_of(cell),
+        if name in one_by_one(study):
+            row: Row = {
+                "task": marked(task),
+                "arms": len(task.hands),
+                "base": f"locked in {' and '.join(task.locked_base)}"
+                if task.locked_base
+                else "free",
+                "initial": initial_reward(task),
+                "optimum": best.reward if best else None,
+                "bound": best.bound if best else None,
             }
-        yield name, row
+            yield name, row
 
 
 @figure(
