@@ -85,7 +85,7 @@ def shows(read: Reader, sign: str, *, by: float = 0.0, beyond: str = "") -> Comp
     return f", more than {who_is(beyond)}" if beyond else "", compare
 
 
-def corrective_ensures(read: Reader) -> Finding:
+def every_trial_completes(read: Reader) -> Finding:
     """No trial fails."""
     names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
     cells = [(name, label) for name in names for label in LEARNERS]
@@ -246,7 +246,7 @@ CLAIMS_ON_FAMILIES = [
         place="Method, The Corrective Process; Discussion, Multiple Controller Schemes",
         quote="to ensure that the overall task is accomplished",
         test="exact: failed trials of the learner",
-        judge=corrective_ensures,
+        judge=every_trial_completes,
         group="exact",
     ),
 ]

@@ -163,7 +163,7 @@ class Reader:
             self.runs(task, each)
         if replay:
             values = sign.of(self.study.executed(task, label, replay=True))
-            words = f"in noiseless replays, {sign.in_short}"
+            words = f"in noiseless replays, {words}"
         elif self.task(task).family is not None:
             values = signs(self.study)[task, label].get(name, np.empty(0))
         elif label == PLACEBO:

@@ -7,8 +7,8 @@ import pandas as pd
 from coartic.analysis.claims.judgements import CLAIMS, counts, judgements
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, table
-from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.topics.rewards import beside_paper
+from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import capital, listed
 from coartic.text import counted
 

@@ -129,8 +129,6 @@ class Sign:
     each: Callable[[Solutions], Array]
     """The sign of each run, shape ``(n,)``; NaN where a run has none."""
     words: str
-    in_short: str
-    """The same for tables."""
 
     def of(self, runs: Solutions) -> Array:
         """The sign of each run that has one, shape ``(k,)``."""
@@ -185,30 +183,25 @@ SIGNS = {
     "hand": Sign(
         hand,
         "share of the goals that others follow which are hit with the slower hand for them alone",
-        "share of goals hit with the slower hand for them",
     ),
     "arm": Sign(
         arm,
         "ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
         "waiting arm where it was (mean over goals)",
-        "ticks by which the next goal is nearer",
     ),
     "other arm": Sign(
         other_arm,
         "share of the initial distance to its next goal by which the waiting arm brings its hand "
         "nearer (mean over goals)",
-        "share of its way that the waiting hand makes",
     ),
     "first": Sign(
         lambda runs: runs.against_same_hands[:, 0],
         "ticks by which the first movement is longer than the corrective process's with the same "
         "hands",
-        "ticks by which the first movement is slower",
     ),
     "whole": Sign(
         lambda runs: -runs.against_same_hands.sum(axis=1),
         "ticks by which the whole is shorter than the corrective process's",
-        "ticks by which the whole task is faster",
     ),
 }
 """Every sign by its name in claims, in the order of the tables: ``first`` is t(i, 1) - c(i, 1),

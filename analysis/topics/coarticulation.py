@@ -31,7 +31,7 @@ from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import placebo
-from coartic.analysis.topics.failed import failed_runs
+from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
 from coartic.robot import HANDS, Array

@@ -21,7 +21,6 @@ from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
-from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import interval, number
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
@@ -252,4 +251,4 @@ def what_it_costs(study: Study) -> str:
         if scores.groups(study)[method] == scores.BY_TRIAL
         for cell in by_task.values()
     )
-    return text + failed_runs(cells, " and count as reaching nothing")
+    return text + scores.failed_runs(cells, " and count as reaching nothing")

@@ -17,7 +17,6 @@ from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_fl
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
-from coartic.analysis.topics.failed import failed_runs
 from coartic.analysis.words import capital, interval, listed, marked, number, p_value
 from coartic.text import counted
 
@@ -249,7 +248,7 @@ def nearest(study: Study) -> str:
         text += f" The best planner that knows the reward as a formula ends {gap(best)} away"
         text += f"{declared(best.method)}."
     cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
-    failed = failed_runs(cells, ", which bars a method from the ranking")
+    failed = scores.failed_runs(cells, ", which bars a method from the ranking")
     return text + from_files(study) + failed
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 
 import pandas as pd
 
@@ -21,13 +22,14 @@ from coartic.analysis.methods import (
     TOGETHER,
     is_search,
     is_variant,
+    name_of,
 )
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
 from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
-from coartic.analysis.words import marked, tally
+from coartic.analysis.words import marked, number, tally
 from coartic.method import Information
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
@@ -161,6 +163,24 @@ def cell_gap(study: Study, cell: CellRuns) -> float:
     if best is None or best.reward == 0 or not len(cell.good) or locks_base(cell.runs):
         return math.nan
     return float(gap_share(cell.rewards.mean(), best.reward))
+
+
+def failed_runs(cells: Iterable[CellRuns], consequence: str) -> str:
+    """A sentence with a leading space; empty where none of the cells' runs failed.
+
+    It counts all runs of the methods of which some failed, and ends with the ``consequence``:
+    `` 3 of 40 runs of hill climbing failed and are not counted.``
+    """
+    runs, failed = Counter[str](), Counter[str]()
+    for cell in {(cell.task, cell.label): cell for cell in cells}.values():
+        runs[cell.label] += len(cell.runs)
+        failed[cell.label] += len(cell.runs) - len(cell.good)
+    who = [label for label in failed if failed[label]]
+    if not who:
+        return ""
+    names = " and ".join(map(name_of, who)) if len(who) < 3 else f"{len(who)} methods"
+    total = sum(runs[label] for label in who)
+    return f" {number(failed.total())} of {number(total)} runs of {names} failed{consequence}."
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:

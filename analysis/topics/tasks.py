@@ -14,7 +14,7 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
-from coartic.analysis.table import Row, Rows, table
+from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.words import marked
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
@@ -34,6 +34,7 @@ def list_tasks(study: Study) -> Rows:
                 "initial": initial_reward(task),
                 "optimum": best.reward if best else None,
                 "bound": best.bound if best else None,
+                **runs_of(),
             }
             yield name, row
 
