@@ -23,11 +23,11 @@ from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 
 
 def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, KnownOptimum]:
-    """Optimum with all joints free by task, for the tasks of a folder.
+    """Best known reward with all joints free by task, for the tasks of a folder.
 
     What the shipped data say where the task is the same in all that matters, bettered by
     what the folder's own searches found. Searches of an instance of a family are short, and any
-    run of the folder may better them.
+    run of the folder may better them. A reward of 0, which leaves no gap, does not count.
     """
     optima: dict[str, KnownOptimum] = {}
     solved = runs[runs.status == "ok"]
@@ -38,33 +38,16 @@ def known_optima(runs: pd.DataFrame, tasks: Mapping[str, Task]) -> dict[str, Kno
     for name, task in tasks.items():
         of_task = searches[searches.task == name]
         candidates = [from_runs(of_task)] if len(of_task) else []
-        entry = best_shipped(task)
-        if entry is not None:
+        if (entry := best_shipped(task)) is not None:
             candidates.append(entry)
-        if not candidates:
-            continue
-        bounds = [optimum.bound for optimum in candidates if optimum.bound is not None]
-        reward = max(optimum.reward for optimum in candidates)
         of_task = solved[solved.task == name]
         if task.family is not None and len(of_task):
-            reward = max(reward, from_runs(of_task).reward)
-        optima[name] = KnownOptimum(reward, min(bounds, default=None))
+            candidates.append(KnownOptimum(int(of_task.reward.max()), None))
+        reward = max((each.reward for each in candidates), default=0)
+        if reward < 0:
+            bounds = [each.bound for each in candidates if each.bound is not None]
+            optima[name] = KnownOptimum(reward, min(bounds, default=None))
     return optima
-
-
-def best_known(
-    runs: pd.DataFrame, tasks: Mapping[str, Task], optima: Mapping[str, KnownOptimum]
-) -> dict[str, KnownOptimum]:
-    """Best known reward by task: of an instance of a family at least the best of these runs.
-    Rewards of 0, which leave no gap, do not count."""
-    known = dict(optima)
-    highest = runs[runs.status == "ok"].groupby("task").reward.max()
-    for name, task in tasks.items():
-        if task.family is not None and name in highest.index:
-            best = KnownOptimum(int(highest[name]), None)
-            proven = known.get(name, best)
-            known[name] = KnownOptimum(max(best.reward, proven.reward), proven.bound)
-    return {name: optimum for name, optimum in known.items() if optimum.reward < 0}
 
 
 def locks_base(runs: pd.DataFrame) -> bool:

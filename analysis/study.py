@@ -18,7 +18,7 @@ import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
 from coartic.analysis.frames import gaps
-from coartic.analysis.optima import best_known, known_optima
+from coartic.analysis.optima import known_optima
 from coartic.analysis.solutions import Solutions
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -114,7 +114,7 @@ def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     ``hands`` those of the solution.
     """
     tasks, parameters = plan.tasks, {text: json.loads(text) for text in runs.parameters.unique()}
-    known = best_known(runs, tasks, known_optima(runs, tasks))
+    known = known_optima(runs, tasks)
     rows = [
         {
             **parameters[text],
@@ -277,13 +277,8 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, KnownOptimum]:
-        """Best known reward by task, with all joints free."""
+        """Best known reward by task with all joints free, of an instance at least this folder's."""
         return known_optima(self.runs, self.tasks)
-
-    @cached_property
-    def best_known(self) -> dict[str, KnownOptimum]:
-        """The same, and of an instance of a family without one the best of this folder's runs."""
-        return best_known(self.runs, self.tasks, self.optima)
 
     @cached
     def _movements(self, part: str) -> dict[str, tuple[Movement, ...]]:

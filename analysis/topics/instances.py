@@ -19,9 +19,8 @@ from coartic.tasks.optima import KnownOptimum
 @cached
 def best_of_instances(study: Study) -> dict[str, KnownOptimum]:
     """Best known reward of each instance of a family that has one."""
-    best = study.best_known
     drawn = [name for name, task in study.tasks.items() if task.family is not None]
-    return {name: best[name] for name in drawn if name in best}
+    return {name: study.optima[name] for name in drawn if name in study.optima}
 
 
 @cached
