@@ -81,7 +81,7 @@ def test_verdicts_of_planted_means():
     }  # fmt: skip
     assert judged.evidence["few"] == "Not judged: fewer than 3 random tasks can be judged."
     # Holm: the smallest p counts as often as there are claims.
-    alone = claims["above"].p
+    (alone,) = (test.p for test in claims["above"].tests)
     assert judged.p_holm["above"] == pytest.approx(min(1, alone * len(claims)))
 
 
