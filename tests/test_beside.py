@@ -67,6 +67,7 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
     assert (progress.present, progress.done) == (2, 1 + 3)
     more = cells(*[(cell.task.name, cell.method.name) for cell in LEFT], runs=3)
     assert joined(parts[:1], tmp_path / "more", more, runs=3).done == 1
+    assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
     same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     with pytest.raises(CoarticError, match=f"left is not finished: it lacks runs of {EC1} on asc"):
         put_beside(planned(RIGHT[2:], **OPTIONS), [left], tmp_path / "other")

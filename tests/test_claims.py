@@ -444,6 +444,7 @@ SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
         ({"EC2": "LLRR", "EC3": "LRLR"}, "LRLR", "supported"),  # left is slower for goal 2
         ({"EC2": "RRRR", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but as initially
         ({"EC2": "LRLR", "EC3": "LRLR"}, "LRLR", "not supported"),
+        ({"EC2": "LRLL", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but nothing follows
         ({"EC2": "LLRR", "EC3": "LRLR"}, "LLRR", "undecided"),  # the placebo does so as well
         ({"EC2": "few LLRR", "EC3": "LRLR"}, "LRLR", "undecided"),  # more than it, but few
     ],
@@ -455,7 +456,8 @@ def test_hands_that_serve_other_goals(hands, placebo, verdict):
     assert quick["LLLL"][0] < quick["RRRR"][0]
     assert quick["LRRR"][1] < corrective_trial(task, "LLRR").ticks_by_goal()[1]
     of = {**{f"dual-process/{condition}": h for condition, h in hands.items()}, GUESSES: placebo}
-    runs = {h: corrective_trial(task, h) for h in set(SLOWER)}
+    runs = {h: corrective_trial(task, h) for h in {"LRLL", *SLOWER}}
+    assert runs["LRLR"].ticks_by_goal()[3] < runs["LRLL"].ticks_by_goal()[3]
     solutions = {
         (T1, label): [runs[h] for h in (SLOWER if h.startswith("few") else [h] * 40)]
         for label, h in of.items()

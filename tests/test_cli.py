@@ -116,6 +116,9 @@ def test_reproduce(coartic, tmp_path):
     with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
         change = "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?"
         plain_sql.execute(change, (second,))
+    code, text, _ = coartic("verify", out, "--again", 2)
+    assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
+    with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as plain_sql:
         change = 'UPDATE movements SET right_1 = right_1 + 1e-15 WHERE "order" = 0 AND part = ?'
         plain_sql.execute(change, ("replay",))
     code, text, _ = coartic("reproduce", second, "--in", out)
@@ -239,6 +242,9 @@ def test_draw(coartic, tmp_path):
         assert coartic("draw", "ascending", "--out", tmp_path / name)[0] == 0
         assert (tmp_path / name).stat().st_size > 5000
         assert b"Date" not in (tmp_path / name).read_bytes()
+    for count, words in ((12, "12 tasks."), (13, "13 tasks, of which 12 are drawn.")):
+        many = ("long/v1/i001.." + f"i{count:03d}", "--out", tmp_path / f"{count}.png")
+        assert coartic("draw", *many)[1].endswith(f": {words}\n")
     drawing = tmp_path / "own.svg"
     assert coartic("draw", tmp_path / "mine.toml", "--out", drawing)[0] == 0
     before = drawing.read_bytes()

@@ -11,6 +11,7 @@ from coartic.analysis.claims import reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
+from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -81,6 +82,11 @@ def test_gaps_are_between_the_best_known_and_the_bound():
     assert list(solved(study).family.unique()) == [*ONE, *TWO]
 
 
+def test_more_than_eight_instances_are_not_shown_singly():
+    for count, shown in ((8, 8), (9, 0)):
+        assert len(one_by_one(rewarded(RISING, families=ONE, count=count))) == shown
+
+
 def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
     """Signs of the learner, and of the placebo: that share of them, more by a little."""
     by_cell = {}
@@ -134,6 +140,12 @@ def test_claims_of_generality(monkeypatch):
     jerk = entries.loc["beats-inaccurate-in-general"]
     assert jerk.verdict == "undecided"
     assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
+
+
+def test_instances_for_tuning_are_not_judged():
+    study = rewarded({**RISING, EC4: lambda n: -540 - n}, families=ONE + TWO, split="d")
+    judged = judge_claims(study, [CLAIMS["other-arm-pays-in-general"]]).iloc[0]
+    assert "has no instances of two-armed/v1 that can be judged" in judged.evidence
 
 
 def test_hands_are_learned_where_they_differ_from_the_closest():

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import time
 from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -18,12 +19,13 @@ from coartic import (
 )
 from coartic.analysis.study import load
 from coartic.analysis.topics.rewards import beside_paper
+from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import perform, plan_suite
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
-from coartic.benchmarks.worker import Job, Outcome, fail
+from coartic.benchmarks.worker import Job, Outcome, fail, perform_job
 from coartic.learner.conditions import CONDITIONS, VARIANTS
 from coartic.method import Information, Meter, Session
 from coartic.runs.plan import Setting, run_seed
@@ -298,6 +300,18 @@ def test_the_runs_of_a_batch_are_scored():
     assert [run.reason for run in runs] == reasons
     assert "movements for goals [1], wanted [1, 2, 3]" in runs[3].reason
     assert runs[3].scores == {}
+    better = replace(runs[0], rewards=[None, -310, -319, -319])  # than the solution
+    assert better.thin().rewards == [None, -310, -319, None]
+
+
+def test_the_runs_of_a_batch_share_its_time():
+    task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
+    setting = Setting(task, card.name, card.code, card.told, card.complete({"trials": 50}), None)
+    begun = time.perf_counter(), time.process_time()
+    outcomes = perform_job(Job(setting, card, 0, tuple(range(8))))
+    wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+    assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
+    assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():
@@ -385,6 +399,29 @@ def test_a_suite_can_move_one_goal(tmp_path):
             'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
             "move = { goal = 2, by = [[0, 9]] }",
         )
+
+
+def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
+    (tmp_path / "mine.toml").write_text('hands = ["right"]\n' + GOOD, encoding="utf-8")
+    head = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
+    assert len(suite_of(tmp_path, head + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
+    own = [str(tmp_path / "mine.toml")]
+    cells = select_cells(load_suite(str(tmp_path / "own.toml")), KNOWN, tasks=own)
+    assert [cell.task.name for cell in cells] == ["mine"]
+
+
+def test_a_block_may_be_for_tasks_of_so_many_goals(tmp_path):
+    block = 'tasks = ["*"]\nmethods = ["corrective-alone/given"]\ngoals = [3]'
+    cells = suite_of(tmp_path, block)
+    assert {cell.task.name for cell in cells} == {"ascending", "descending"}  # others have more
+
+
+def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):
+    monkeypatch.setattr(reproduce, "Local", InProcess)
+    again = dict(reproduce.perform_some_again(results.folder, len(results.cells), KNOWN))
+    assert not any(again.values())
+    cells = results.runs[results.runs.run_id.isin(again)].groupby(["task", "label"])
+    assert len(cells) == len(again) == len(results.cells)
 
 
 def test_a_folder_of_another_suite_is_refused(tmp_path):

@@ -16,9 +16,9 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import render
-from coartic.analysis.report.about import answers
+from coartic.analysis.report.about import answers, limits
 from coartic.analysis.report.build import write_report
-from coartic.analysis.report.trace import rows_of, tables_of
+from coartic.analysis.report.trace import rows_of, runs_behind, tables_of
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
@@ -94,6 +94,26 @@ def delete(path, run_id):
     with closing(sqlite3.connect(path)) as db:
         db.execute("DELETE FROM results WHERE run_id = ?", (run_id,))
         db.commit()
+
+
+def test_the_lowest_reward_of_a_task_is_first(traced):
+    shown = runs_behind(traced.runs, list(traced.runs.run_id), traced.tasks)
+    first = shown.drop_duplicates("task")["reward (ticks)"].tolist()
+    assert first == [f"−{-reward}" for reward in traced.runs.groupby("task").reward.min()]
+
+
+def test_the_commonest_reasons_are_said(traced):
+    reasons = ["rare", *["often"] * 4, *["twice"] * 2, *["thrice"] * 3]
+    runs = traced.runs.reset_index(drop=True)
+    runs.loc[: len(reasons) - 1, "status"] = "crashed"
+    runs.loc[: len(reasons) - 1, "reason"] = reasons
+    said = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
+    assert (said["failed"], said["reasons"]) == (10, ["4 × often", "3 × thrice", "2 × twice"])
+
+
+def test_p_is_small_below_a_thousandth():
+    frame = pd.DataFrame({"p_holm": [0.0009, 0.001, 0.0099]})
+    assert render.texts_of(frame, "p_holm") == ["< 0.001", "0.001", "0.010"]
 
 
 HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'

@@ -22,7 +22,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.topics import coarticulation, placebo
+from coartic.analysis.topics import coarticulation, instances, placebo
 from coartic.robot import HANDS
 from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -391,6 +391,20 @@ def test_the_placebo_that_shows_most_of_a_sign_counts():
     assert placebo.placebo_of(study, coarticulation.shared_goal(study)).method == PLACEBO
     assert list(placebo.of_placebo(study, "ascending", "first")) == [2, 2, 2]
     assert not placebo.selects(study, drawn)
+
+
+def test_of_a_family_one_placebo_counts():
+    """That of the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of one."""
+    drawn = "placebo/hands"
+    cells = [
+        posed(task, label, [posture()], np.add(corrective_trial(task, "RRR").ticks_by_goal(), more))
+        for number, task in enumerate(map(load_task, ("one-armed/v1/i001", "one-armed/v1/i002")))
+        for label, slower in ((PLACEBO, (9, -7)), (drawn, (3, 3)))
+        for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
+    ]
+    shown = instances.signs(study_with(*cells))
+    for cell in cells:
+        assert shown[cell.task.name, PLACEBO]["first"].tolist() == [3]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():

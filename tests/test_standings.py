@@ -1,5 +1,6 @@
 """How far methods end from the optimum, who is ahead, and what it costs: by hand."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -66,6 +67,28 @@ def test_a_rank_counts_algorithms():
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
     test = paired_difference(seen, *rows.method)
     assert test.p == pytest.approx(2 / 2**8, abs=0.003)
+
+
+def test_tasks_count_alike_in_a_paired_test():
+    """However many pairs they have: of ticks as shares, -292 and -465 are the optima."""
+    ahead = {"ascending": [5, -3], "two-armed-1": [4, 1, 2, -1, 3, 1, -2, 2]}
+    seen = study({
+        (task, method): [-400 + tick * (method == "mine") for tick in ticks]
+        for task, ticks in ahead.items() for method in ("mine", "yours")
+    })  # fmt: skip
+    parts = [np.array(ticks) / size / len(ticks)
+             for ticks, size in zip(ahead.values(), (292, 465), strict=True)]  # fmt: skip
+    values = np.concatenate(parts)
+    sums = [abs(values @ signs) for signs in itertools.product((1, -1), repeat=len(values))]
+    p = np.mean(np.array(sums) >= abs(values.sum()) - 1e-12)
+    assert paired_difference(seen, "mine", "yours").p == pytest.approx(p)
+
+
+def test_the_learners_place_is_said():
+    both = study(TEN | strangers(("mine", 2), ("yours", -3), runs=10))
+    assert "The paper's learner is number 2, at" in ranking.nearest(both)
+    last = study(TEN | strangers(("mine", 2), runs=10))
+    assert "The paper's learner is last, at" in ranking.nearest(last)
 
 
 def test_the_learner_stands_by_the_form_that_explores_most():

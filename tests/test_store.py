@@ -114,7 +114,8 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
     movements = (Movement(1, "left", "path", edges, 3, edges[None] / 7),)
     solution = Score(-3, "L", movements)
-    run = replace(next(iter(written[0].values())), scores={"solution": solution})
+    run = replace(next(iter(written[0].values())), scores={"solution": solution},
+                  environment={"commit": {"id": "c0de", "dirty": True}})  # fmt: skip
 
     def some():
         yield run
@@ -133,6 +134,8 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
             store.write([unlike])  # paths of two parts
     with open_store(tmp_path) as store:
         assert plain(store.run(run.id)) == plain(run)
+    with closing(sqlite3.connect(tmp_path / RUNS_FILE)) as plain_sql:
+        assert read_values(plain_sql, run.id, '"commit" FROM runs WHERE run_id = ?') == ["c0de+"]
 
 
 def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
@@ -307,6 +310,10 @@ def test_runs_of_other_code_are_counted_and_left_out(undisturbed, tmp_path):
     same_results(load(tmp_path), undisturbed)
     with open_store(tmp_path) as store:
         assert len(store.ids()) == 18
+    fewer = perform(planned(ONE, **FEW | {"runs": 4}), tmp_path, executor=InProcess())
+    words = "4 runs made by a different version of the code and 10 runs of earlier commands"
+    assert words in repr(fewer)
+    assert len(load(tmp_path).runs) == 4
 
 
 def sql(statement):

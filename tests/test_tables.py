@@ -110,6 +110,14 @@ def test_methods(study):
     })  # fmt: skip
 
 
+def test_the_median_run_is_nearest_to_the_median():
+    """-309, from which the mean, -324, is far."""
+    rows = [row(EC1, reward, task=ONE, run=run, run_id=f"id-{run}")
+            for run, reward in enumerate((-400, -300, -309, -301, -310))]  # fmt: skip
+    table = TABLES["methods"](study_of(rows, optima=made_up_optima(ONE)))
+    assert table.median_run.tolist() == ["id-2"]
+
+
 def test_runtimes(study):
     """Within 20, 50, 100, 101, 200, 500 and 1000 trials the learner has 5, 10, 15, 21, 51, 56 and
     91 of 120 pairs: 30 of two-armed 1 from trial 200.
