@@ -72,7 +72,7 @@ def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
 def initial_reward(task: Task) -> float:
     """Reward of the initial solution; NaN where there is none."""
     solution = initial_solution(task)
-    return math.nan if solution is None or solution.reward is None else float(solution.reward)
+    return math.nan if solution is None else float(-solution.ticks)
 
 
 def from_runs(runs: pd.DataFrame) -> KnownOptimum:

@@ -219,7 +219,7 @@ class Study:
             The stored movements cannot be executed or do not do what is stored of them.
         """
         stored = self._movements("replay" if replay else "solution")
-        ids = map(str, self.cells[task, label].good.run_id[:MOST_EXECUTED])
+        ids = map(str, self.cells[task, label].good.run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
         executed = []
         with explain_errors(self.folder):

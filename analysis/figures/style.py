@@ -89,9 +89,9 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     return {label: given[label] for label in dict.fromkeys(labels)}
 
 
-def grid(panels: int, columns: int | None = None) -> tuple[int, int]:
-    """Rows and columns of so many panels; two or three columns by default."""
-    columns = min(columns or (2 if panels <= 6 else 3), panels)
+def grid(panels: int) -> tuple[int, int]:
+    """Rows and columns of so many panels; at most three columns."""
+    columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
 

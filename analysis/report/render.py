@@ -1,6 +1,6 @@
 """Tables as HTML and LaTeX.
 
-:data:`~coartic.analysis.COLUMNS` says how columns are called and formatted. A column that
+:data:`~coartic.analysis.table.COLUMNS` says how columns are called and formatted. A column that
 ends in ``_low``, ``_high`` or ``_sd`` is shown behind the one that it belongs to.
 """
 

@@ -102,10 +102,8 @@ def list_ranking(study: Study) -> Rows:
     for method in dict.fromkeys([*over.index, *(method for *_, method in others)]):
         cells = scores.compared(study)[method]
         row: Row = {"method": method, "knows": scores.groups(study)[method], "gap": math.nan}
-        row |= {f"on {task}": math.nan for task in single}
-        row |= {
-            f"on {task}": scores.cell_gap(study, cells[task]) for task in single if task in cells
-        }
+        for t in single:
+            row[f"on {t}"] = scores.cell_gap(study, cells[t]) if t in cells else math.nan
         if method in over.index:
             row |= over.loc[method, ["gap", "gap_low", "gap_high"]].to_dict()
         tests = tested[tested.index.isin([f"{task} {cell.label}" for task, cell in cells.items()])]
