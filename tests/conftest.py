@@ -103,9 +103,7 @@ def report(traced, tmp_path_factory):
 
     def make(folder):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(
-                build, "picture", lambda figure, ending: b""
-            )  # drawn for the page already
+            patch.setattr(build, "picture", lambda *_: b"")  # drawn for the page already
             patch.setattr(about, "visible_sections", lambda study: build.SECTIONS)  # all
             build.write_report(traced, folder / "report", for_paper=False)
 

@@ -207,12 +207,12 @@ def names_of_program(title):
     return names
 
 
-def test_the_first_program_of_the_page_learns(capsys):
+def test_the_first_program_of_the_page_learns():
     table = coartic.gym.score(TWO, names_of_program("REINFORCE")["policy"], ahead=3)
     assert table.reward["policy"] > -475  # the corrective process alone: -532
 
 
-def test_the_agent_of_the_page_trains(capsys):
+def test_the_agent_of_the_page_trains():
     pytest.importorskip("stable_baselines3")
     table = coartic.gym.score(TWO, names_of_program("Train PPO")["agent"])
     assert -531 < table.reward["policy"] < -480

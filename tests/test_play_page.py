@@ -201,7 +201,7 @@ def test_the_link_holds_the_whole_state(opened):
     assert ticks(odd, "Blue") > 0
 
 
-def test_it_plays_holds_at_hits_and_saves_pictures(opened, tmp_path):
+def test_it_plays_holds_at_hits_and_saves_pictures(opened):
     page = settled(opened(reduced_motion="no-preference"))
     page.wait_for_function("document.querySelector('[data-is=tick]').value > 30")
     page.get_by_role("button", name="Pause").click()

@@ -68,10 +68,8 @@ def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial
 
 
 def run_and_write(folder, cells=None, *, executor=None, **options):
-    """Perform such a plan into a folder; what the folder then says."""
-    plan = planned(cells, **options)
-    executor = executor or InProcess()
-    perform(plan, folder, executor=executor)
+    """The study of a folder into which a plan of :func:`planned` is performed."""
+    perform(planned(cells, **options), folder, executor=executor or InProcess())
     return load(folder)
 
 
