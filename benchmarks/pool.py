@@ -107,7 +107,7 @@ class Local:
                         lost = lost + 1 if worker.since_s is None else 0
                         if lost == _STARTS:
                             raise CoarticError(
-                                f"processes cannot begin ({worker.last_words}; finished runs are "
+                                f"processes cannot begin {worker.last_words}; finished runs are "
                                 "kept"
                             )
                         if lost:
@@ -127,16 +127,15 @@ class Local:
 class Worker:
     """A process that performs jobs of one method in their order."""
 
-    def __init__(self, folder: str, jobs: Sequence[Job], crew: Local) -> None:
+    def __init__(self, folder: str, jobs: Sequence[Job], local: Local) -> None:
         self.jobs = deque(jobs)
         """Jobs that are not answered yet."""
         self.since_s: float | None = None
         """Clock when it began the first of these; None before."""
-        self._patience_s = crew.patience_s
+        self._patience_s = local.patience_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
-        arguments = self._folder, jobs, crew.workers
-        self._process = WorkerProcess(target=perform_jobs, args=arguments)
+        self._process = WorkerProcess(target=perform_jobs, args=(self._folder, jobs, local.workers))
 
     def start(self) -> None:
         """Begin it; where it cannot begin, it has ended."""
@@ -191,7 +190,7 @@ class Worker:
         lines = words.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_WORDS:])
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        return f"{how}): {plain(last, 1000) or 'it left no message'}"
+        return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None) -> list[Outcome]:
         """The outcomes of the job that it has not answered: it is late, or has ended."""
@@ -201,7 +200,7 @@ class Worker:
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
         if exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
-        return fail(job, "crashed", f"the worker process ended ({self.last_words}")
+        return fail(job, "crashed", f"the worker process ended {self.last_words}")
 
     def end(self) -> None:
         """End it, with the processes that it has started."""

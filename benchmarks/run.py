@@ -191,7 +191,7 @@ def perform(
             progress.waiting[job.setting.method] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, "")
-        jobs = in_order(missing, executor.workers)
+        jobs = divided(missing, executor.workers)
         while jobs:
             alone: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # workers end, whatever happens here
@@ -231,7 +231,7 @@ def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
     return jobs
 
 
-def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
+def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     """Jobs divided for workers, in the order in which they begin; results do not depend on it.
 
     A run among many takes a fraction of its time alone, so jobs are as large as methods take
@@ -251,12 +251,12 @@ def in_order(jobs: Sequence[Job], workers: int) -> list[Job]:
         is_ours, parameters = job.method.is_ours, job.setting.parameters
         most = job.method.configure(parameters).most_together() if is_ours else 1
         parts += divide(job, min(most, share))
-    rest = len(parts) % workers
-    jobs_planned, last = parts[: len(parts) - rest], parts[len(parts) - rest :]
+    whole = len(parts) - len(parts) % workers
+    done, last = parts[:whole], parts[whole:]
     for job in last:
-        jobs_planned += divide(job, max(math.ceil(len(job.numbers) * rest / workers), LEAST_BATCH))
+        done += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
         return trials_in(job.setting.parameters) * len(job.numbers) or math.inf
 
-    return sorted(jobs_planned, key=trials, reverse=True)
+    return sorted(done, key=trials, reverse=True)

@@ -238,8 +238,8 @@ class TaskVectorEnv(VectorEnv):
         for row, each in enumerate(seed):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]
-        self._begin(np.ones(self.num_envs, np.bool_))
-        return self.fleet.seen.copy(), self._infos()
+        self._begin_anew(np.ones(self.num_envs, np.bool_))
+        return self.fleet.seen.copy(), self._masked_infos()
 
     def step(
         self, actions: ArrayLike
@@ -254,21 +254,20 @@ class TaskVectorEnv(VectorEnv):
             last = np.full(self.num_envs, None, dtype=object)
             for row in np.flatnonzero(ended).tolist():
                 last[row] = fleet.seen[row].copy()
-            final = {"final_obs": last, "final_info": self._infos(ended)}
+            final = {"final_obs": last, "final_info": self._masked_infos(ended)}
             final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
-            self._begin(ended)
-        infos = self._infos() | final
+            self._begin_anew(ended)
+        infos = self._masked_infos() | final
         return fleet.seen.copy(), fleet.rewards.copy(), ended, np.zeros_like(ended), infos
 
-    def _begin(self, ended: NDArray[np.bool_]) -> None:
+    def _begin_anew(self, ended: NDArray[np.bool_]) -> None:
         number, rows = len(self.tasks), np.flatnonzero(ended)
         drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
         self.begin(rows, drawn)
 
-    def _infos(self, there: NDArray[np.bool_] | None = None) -> dict[str, Any]:
+    def _masked_infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
         infos = self.infos()
-        there = np.ones(self.num_envs, np.bool_) if there is None else there
-        return infos | {f"_{name}": there.copy() for name in infos}
+        return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
 
 
 class TaskEnv(gymnasium.Env):

@@ -125,13 +125,12 @@ def run(
             display.line(f"Copying {' and '.join(beside)}.")
             plan = put_beside(plan, beside, out)
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
-        report = perform(plan, out, executor=executor, watch=display.update)
-    say(str(report))
+        progress = perform(plan, out, executor=executor, watch=display.update)
+    say(str(progress))
     from coartic.analysis.study import load
 
-    pairs = answers_in_words(load(report.folder))
-    say_pairs([*pairs, ("Next", f"coartic report {report.folder}")])
-    if report.crashed:
+    say_pairs([*answers_in_words(load(out)), ("Next", f"coartic report {out}")])
+    if progress.crashed:
         sys.exit(1)
 
 
