@@ -16,6 +16,7 @@ from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
+from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
 
@@ -144,6 +145,23 @@ def test_a_trial_that_fails_ends():
         env.reset()
         _, reward, ended, _, info = env.step(np.zeros(6))
         assert (reward, ended, info["is_success"]) == (-FAILED, True, False)
+
+
+def test_where_the_corrective_process_fails_the_posture_takes_its_place():
+    """In 50 iterations it comes near the goal, 0.3 to the right of the hand, and no further."""
+    start, model = tiny_task(), MotionModel(max_iterations=50)
+    x, y = start.robot.forward_kinematics(start.q0, "right")
+    task = tiny_task(hands=["right"], goals=[[x + 0.3, y]], initial_hands="R")
+    assert not correct(task.robot, task.q0, "right", task.goals[0], model=model).converged
+    for share in (0.0, 0.6):  # of half a unit, to the right
+        env = TaskEnv(task, model=model)
+        env.reset()
+        target = task.q0.copy()
+        target[0] += share / 2
+        due = execute(task, movements_of("R", [target]), model=model).reward
+        reward, ended = env.step([share, 0, 0, 0, 0, 0])[1:3]
+        assert (reward, ended) == (-FAILED if due is None else due, True)
+    assert due is not None
 
 
 def test_actions_that_are_none():

@@ -99,6 +99,9 @@ HANDLED = {
     "paths": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
               "        return Result(corrected(session), initial=way)",
               "solver-failed", "movements in 'initial' follow a path"),
+    "paths_in_replay": ("way = (Movement(1, 'right', 'path', waypoints=[session.q0]),)\n"
+                        "        return Result(corrected(session), replay=way)",
+                        "solver-failed", "movements in 'replay' follow a path"),
     "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
              "solver-failed", "returned no solution"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",
@@ -196,7 +199,7 @@ def test_what_a_method_forks_ends_with_it():
 
 PRINTS = """for _ in range(1000):
             os.write(1, b'x' * 10**5)
-        os.write(2, b'\\nthe end')
+        os.write(2, b'\\none\\ntwo\\nthe end')
         os._exit(3)"""
 
 
