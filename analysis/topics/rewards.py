@@ -204,5 +204,5 @@ def changed_hands(study: Study) -> str:
             if before not in commonest:
                 changes.append(f"on {marked(task)} from {before} to {' or '.join(commonest)}")
     if not changes:
-        return "The learner keeps the hands of the initial solution."
-    return f"The learner changes hands {listed(changes)}."
+        return "The learner most often keeps the hands of the initial solution."
+    return f"The learner most often changes hands {listed(changes)}."
