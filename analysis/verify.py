@@ -286,7 +286,8 @@ def check_all(db: sqlite3.Connection) -> Report:
         bound, proof = min(proofs, default=(0, ""))
         words = f"is better than bound {bound} of run {proof}"
         wrong += [f"Run {run} {words}." for reward, run in rewards[same] if reward > bound]
-    return Report(runs, movements, wrong, [*UNCHECKED, f"Runs without a solution: {unsolved}."])
+    empty = [f"Runs without a solution: {unsolved}."] if unsolved else []
+    return Report(runs, movements, wrong, [*UNCHECKED, *empty])
 
 
 def schema(db: sqlite3.Connection) -> list[list[str]]:
