@@ -45,6 +45,9 @@ def new_method(
         [
             ("Written", f"{path}: change it as you like"),
             ("Check", f"coartic check {name} --method-file {path}"),
-            ("Run", f"coartic run comparison --method-file {path} --beside released"),
+            (
+                "Run",
+                f"coartic run comparison --method-file {path} --beside released --out results/mine",
+            ),
         ]
     )

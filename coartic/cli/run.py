@@ -183,7 +183,9 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         runs = sorted({block.runs or suite.runs for block in suite.cells})
         counts = " or ".join(map(str, runs))
         yield "Runs", f"{counts} of each cell, {suite.trials or 'no'} trials a run"
-        yield "Tasks", ", ".join(dict.fromkeys(t for block in suite.cells for t in block.tasks))
+        asked = [t for block in suite.cells for t in block.tasks]
+        tasks = [t for name in asked for t in (builtin_tasks() if name == "*" else [name])]
+        yield "Tasks", ", ".join(dict.fromkeys(tasks))
         yield "Methods", ", ".join(dict.fromkeys(m for block in suite.cells for m in block.methods))
         yield "Run it", f"coartic run {name}"
     elif name in builtin_tasks() or address_of(name):
