@@ -231,15 +231,15 @@ def nearest(study: Study) -> str:
             beside = f" (too few runs to tell it from {following[0]})"
     things = "settings" if by_settings else "algorithms"
     among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
-    text = (
-        f"{among if len(learn) > 1 else capital(who)} comes nearest to the optimum: "
-        f"{gap(rows.iloc[0])} away{beside}{declared(rows.method[0])}."
-    )
+    first, away = among if len(learn) > 1 else capital(who), gap(rows.iloc[0])
+    place = f"comes nearest to the optimum: {away} away{beside}"
+    place = place if following else f"ends {away} from the optimum"  # one alone is not nearest
+    text = f"{first} {place}{declared(rows.method[0])}."
     rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
     if rank and not by_settings:
-        place = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
+        standing = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
         guesses = by_trial.gap[by_trial.method == methods.PLACEBO]
-        text += f" The paper's learner is {place}, at {gap(learn.iloc[rank])}"
+        text += f" The paper's learner is {standing}, at {gap(learn.iloc[rank])}"
         text += "".join(f"; random guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
