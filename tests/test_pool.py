@@ -213,6 +213,15 @@ def test_what_a_worker_prints_is_bounded(tmp_path):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50 * 2**10
 
 
+def test_words_of_an_earlier_run_are_not_those_of_a_crash(tmp_path):
+    task, says = load_task("ascending"), "print('x', flush=True); return Result(corrected(session))"
+    does, _ = entries(tmp_path, [("says", says), ("quits", "os._exit(0)")])
+    cells = [Cell(task, does, {"what": what}) for what in ("says", "quits")]
+    runs = run_and_write(tmp_path / "out", cells, executor=Local(1), runs=1).runs
+    assert runs.status.tolist() == ["ok", "crashed"]
+    assert runs.reason[1].endswith("exit code 0): it left no message")
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the processes in /proc")
 @pytest.mark.parametrize("whom", ["worker", "server"])
 def test_what_somebody_kills_is_repeated(tmp_path, whom):
