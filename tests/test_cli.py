@@ -76,8 +76,9 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
 def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
-    progress = Progress(Path("results"), 63, done=28, timed=Counter(x=28), waiting=Counter(x=35))
-    progress.took["x"] = 2800.0
+    counts = {"done": 28, "timed": Counter(x=28), "waiting": Counter(x=35), "workers": 2}
+    progress = Progress(Path("results"), 63, **counts)
+    progress.took["x"] = 5600.0  # 200 s a run: 35 of them by two workers
     with Display() as display:
         display.update(progress, f"two-armed-1 {'method' * 20}")
         progress.done = 63

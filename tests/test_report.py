@@ -24,6 +24,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
+from tests.support import made_up
 from tests.support.suites import KNOWN, run_and_write
 
 
@@ -109,6 +110,13 @@ def test_the_commonest_reasons_are_said(traced):
     runs.loc[: len(reasons) - 1, "reason"] = reasons
     said = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
     assert (said["failed"], said["reasons"]) == (10, ["4 × often", "3 × thrice", "2 × twice"])
+
+
+@pytest.mark.parametrize(("count", "few"), [(19, 19), (20, 0)])
+def test_fewer_runs_than_the_papers_twenty_are_few(count, few):
+    one = {"method": "dual-process/EC1", "reward": -300, "task": "ascending", "commit": "c0de"}
+    study = made_up.study_of([made_up.row(**one, run=run) for run in range(count)])
+    assert limits(study)["few"] == few
 
 
 def test_p_is_small_below_a_thousandth():
