@@ -237,11 +237,12 @@ def what_it_costs(study: Study) -> str:
     halves = [row["trials_to_half"] for row in rows]
     ends = [f"{number(100 * row['reached'], 0)} %" for row in rows]
     reached = " and ".join(f"{name} reaches {end}" for name, end in zip(names, ends, strict=True))
-    text = f"Of the reward targets between initial solution and optimum, {reached}."
+    best = scores.optimum_in_words(study)
+    text = f"Of the reward targets between initial solution and {best}, {reached}."
     if len(rows) == 2 and np.isfinite(halves).all():
         ours, theirs = (interval(row, "trials_to_half", digits=0) for row in rows)
         text = (
-            f"To get halfway from the initial solution to the optimum, the learner needs {ours} "
+            f"To get halfway from the initial solution to the {best}, the learner needs {ours} "
             f"trials; {names[1]} needs {theirs}. In the end they reach {ends[0]} and {ends[1]} of "
             "the reward targets."
         )

@@ -17,7 +17,6 @@ from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
 from coartic.analysis.topics.costs import improvements
-from coartic.analysis.topics.ranking import optimum_in_words
 from coartic.analysis.words import marked, number
 
 BUDGETS = (100, 1_000, 10_000)
@@ -111,7 +110,9 @@ def draw_learning_curves(study: Study) -> Parts | None:
         for label, look in looks.items()
     ]
     handles += [style.legend_line("initial solution", **style.INITIAL)]
-    handles += [style.legend_line(optimum_in_words(study), **style.OPTIMUM)] * bool(study.optima)
+    handles += [style.legend_line(scores.optimum_in_words(study), **style.OPTIMUM)] * bool(
+        study.optima
+    )
     style.legend(drawing, handles, min(len(handles), 4))
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(ends, "{task}, {method}: {best:.0f}")

@@ -192,16 +192,10 @@ def draw_ranking(study: Study) -> Parts | None:
     farthest = float(np.nanmax(percent[["gap", "gap_high"]]))
     panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
     first, *more = scores.common_tasks(study)
-    where = f"to {optimum_in_words(study).removesuffix(' reward')}"
+    where = f"to {scores.optimum_in_words(study).removesuffix(' reward')}"
     panels[-1].set_xlabel(f"gap {where if more else f'on {study.tasks[first].label}'} (%)")
     alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
-
-
-def optimum_in_words(study: Study) -> str:
-    """``optimum``, or ``best known reward`` where an optimum is not proven."""
-    proven = all(best.proven for best in study.optima.values())
-    return "optimum" if proven else "best known reward"
 
 
 def nearest(study: Study) -> str:
@@ -232,8 +226,9 @@ def nearest(study: Study) -> str:
     things = "settings" if by_settings else "algorithms"
     among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
     first, away = among if len(learn) > 1 else capital(who), gap(rows.iloc[0])
-    place = f"comes nearest to the optimum: {away} away{beside}"
-    place = place if following else f"ends {away} from the optimum"  # one alone is not nearest
+    known = scores.optimum_in_words(study)
+    place = f"comes nearest to the {known}: {away} away{beside}"
+    place = place if following else f"ends {away} from the {known}"  # one alone is not nearest
     text = f"{first} {place}{declared(rows.method[0])}."
     rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
     if rank and not by_settings:

@@ -40,6 +40,12 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
 """Groups of methods by their use of the reward."""
 
 
+def optimum_in_words(study: Study) -> str:
+    """``optimum``, or ``best known reward`` where an optimum is not proven."""
+    proven = all(best.proven for best in study.optima.values())
+    return "optimum" if proven else "best known reward"
+
+
 @cached
 def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
     """Rewards of the initial solution and of the optimum by task, where the optimum is better.
