@@ -63,7 +63,7 @@ def test_it_is_one_small_file_without_addresses():
     assert not re.findall(r"(?:src|href)=[\"'](?!data:)|url\(|@import", html)
     assert 50 < len(re.sub(r"<[^>]*>", " ", pages.text_of("try.html.jinja")).split()) <= 150
     for name, label in (
-        ("two-armed-2", "Two-armed 2 †"),
+        ("two-armed-2", "Two-armed 2†"),
         ("long/v1/i000", load_task("long/v1/i000").label),
     ):
         own = pages.play_page(load_task(name))
