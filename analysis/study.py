@@ -114,14 +114,14 @@ def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     ``hands`` those of the solution.
     """
     tasks, parameters = plan.tasks, {text: json.loads(text) for text in runs.parameters.unique()}
-    known = known_optima(runs, tasks)
+    optima = known_optima(runs, tasks)
     rows = [
         {
             **parameters[text],
             "family": tasks[name].family,
             "split": tasks[name].split,
             "goals": len(tasks[name].goals),
-            "best_known": known[name].reward if name in known else None,
+            "best_known": optima[name].reward if name in optima else None,
         }
         for name, text in zip(runs.task, runs.parameters, strict=True)
     ]

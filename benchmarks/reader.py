@@ -70,7 +70,7 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
         except EOFError:
             return
         try:
-            said: Any
+            content: Any
             if question == "cards":
                 try:
                     module = load_file(Path(path))
@@ -79,10 +79,10 @@ def answer_questions(pipe: Any, path: str, shown: str) -> None:
                     raise CoarticError(why) from None
                 methods = {method.name: method for method in methods_in(module)}
                 cards = cards_of_module(module, methods.values(), shown, path)
-                said = [asdict(card) for card in cards]
+                content = [asdict(card) for card in cards]
             else:
-                said = answer(methods[name], question, *arguments)
-            text = json.dumps({"answer": said})
+                content = answer(methods[name], question, *arguments)
+            text = json.dumps({"answer": content})
         except CoarticError as error:
             text = json.dumps({"error": str(error)})
         except BaseException as error:

@@ -123,8 +123,8 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     ]
     for part in PARTS:
         if a.movement_data(part) != b.movement_data(part):
-            found = [run.scores.get(part) for run in (a, b)]
-            words = [f"{each.reward} with {each.hands}" if each else "nothing" for each in found]
+            scores = [run.scores.get(part) for run in (a, b)]
+            words = [f"{each.reward} with {each.hands}" if each else "nothing" for each in scores]
             changes.append(f"{part}: {' against '.join(words)}")
     if a.rewards != b.rewards:
         pairs = enumerate(zip_longest(a.rewards, b.rewards, fillvalue="no trial"))

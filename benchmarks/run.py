@@ -251,12 +251,12 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         is_ours, parameters = job.method.is_ours, job.setting.parameters
         most = job.method.configure(parameters).most_together() if is_ours else 1
         parts += divide(job, min(most, share))
-    whole = len(parts) - len(parts) % workers
-    done, last = parts[:whole], parts[whole:]
+    even = len(parts) - len(parts) % workers
+    ordered, last = parts[:even], parts[even:]
     for job in last:
-        done += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
+        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
         return trials_in(job.setting.parameters) * len(job.numbers) or math.inf
 
-    return sorted(done, key=trials, reverse=True)
+    return sorted(ordered, key=trials, reverse=True)

@@ -216,8 +216,8 @@ def select_cells(
             refusals.append(reason)
         elif (task.name, method) not in there:
             cells.append(Cell(task, registered[method], runs=suite.runs))
-    known = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    if wrong := [unknown("task", name, known) for name in wanted if name not in known]:
+    task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
+    if wrong := [unknown("task", name, task_names) for name in wanted if name not in task_names]:
         raise CoarticError("\n".join(wrong))
     of_tasks = [cell for cell in cells if not wanted or cell.task.name in wanted]
     chosen = [cell for cell in of_tasks if not methods or cell.method.name in methods]

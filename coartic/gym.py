@@ -473,16 +473,16 @@ def score(
     rewards["random actions"] = run(lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), episodes)
     rewards |= {"corrective process": column(alone), "best known": best}
     rows = {}
-    for name, found in rewards.items():
-        gaps = pd.DataFrame(100.0 * (best - found) / np.abs(best))
+    for name, earned in rewards.items():
+        gaps = pd.DataFrame(100.0 * (best - earned) / np.abs(best))
         values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
         half = stdtrit(len(values) - 1, 0.975) * values.sem() if len(values) > 2 else np.nan
         rows[name] = {
-            "reward": pd.DataFrame(found).mean(axis=1).mean(),
+            "reward": pd.DataFrame(earned).mean(axis=1).mean(),
             "gap": values.mean(),
             "gap_low": values.mean() - half,
             "gap_high": values.mean() + half,
-            "completed": float(np.isfinite(found).mean()),
+            "completed": float(np.isfinite(earned).mean()),
         }
     rows["best known"]["completed"] = np.nan
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")

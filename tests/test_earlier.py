@@ -51,10 +51,10 @@ def ask(folder, column, name, value):
         for row in db.execute("SELECT * FROM settings").fetchall():
             read = {key: json.loads(row[key]) for key in ("parameters", "model")}
             read[column][name] = value
-            said = {"task": json.loads(row["definition"]), "method": row["method"], **read}
-            said |= {"trial_budget": row["trial_budget"]}
-            said["model"] = {"arrival_tick": 1} | read["model"]  # which 1.0 stored
-            text = json.dumps(said, sort_keys=True, separators=(",", ":"))
+            setting = {"task": json.loads(row["definition"]), "method": row["method"], **read}
+            setting |= {"trial_budget": row["trial_budget"]}
+            setting["model"] = {"arrival_tick": 1} | read["model"]  # which 1.0 stored
+            text = json.dumps(setting, sort_keys=True, separators=(",", ":"))
             asked = hashlib.sha256(text.encode()).hexdigest()
             values = json.dumps(read[column]), asked, row["id"]
             db.execute(f"UPDATE settings SET {column} = ?, asked = ? WHERE id = ?", values)

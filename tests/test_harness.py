@@ -405,8 +405,8 @@ def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
     (tmp_path / "mine.toml").write_text('hands = ["right"]\n' + GOOD, encoding="utf-8")
     head = 'tasks = ["*"]\nmethods = ["dual-process/EC1"]\n'
     assert len(suite_of(tmp_path, head + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
-    own = [str(tmp_path / "mine.toml")]
-    cells = select_cells(load_suite(str(tmp_path / "own.toml")), KNOWN, tasks=own)
+    files = [str(tmp_path / "mine.toml")]
+    cells = select_cells(load_suite(str(tmp_path / "own.toml")), KNOWN, tasks=files)
     assert [cell.task.name for cell in cells] == ["mine"]
 
 

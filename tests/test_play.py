@@ -234,7 +234,9 @@ def test_search_and_plan_end_where_the_packages_do_and_say_their_true_reward(nam
     mine = statistics.mean(found["reward"] for found in searches)
     assert abs(mine - statistics.mean(best)) < 0.025 * abs(mine)
     # A plan of all goals is nearly the best known; with no goal ahead it is not.
-    known = {(entry.task, entry.base, entry.other_arm): entry.reward for entry in shipped_optima()}
-    optimum = known[name, "task", "free"]
+    rewards_by_task = {
+        (entry.task, entry.base, entry.other_arm): entry.reward for entry in shipped_optima()
+    }
+    optimum = rewards_by_task[name, "task", "free"]
     assert optimum * 1.03 <= plans[-1]["reward"] <= optimum
     assert plans[0]["reward"] < optimum * 1.04

@@ -165,8 +165,8 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page.get_by_role("button", name="Base").focus()
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowUp")  # it is on a rail
-    own = re.search(r"own=([^&]+)", settled(page).url)[1]
-    rows = [[float(value) for value in row.split(",")] for row in own.split(";")]
+    postures = re.search(r"own=([^&]+)", settled(page).url)[1]
+    rows = [[float(value) for value in row.split(",")] for row in postures.split(";")]
     movements = [
         Movement(goal, ("left", "right")[int(row[0])], "learned", np.array(row[1:]))
         for goal, row in enumerate(rows, 1)

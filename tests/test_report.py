@@ -108,8 +108,11 @@ def test_the_commonest_reasons_are_said(traced):
     runs = traced.runs.reset_index(drop=True)
     runs.loc[: len(reasons) - 1, "status"] = "crashed"
     runs.loc[: len(reasons) - 1, "reason"] = reasons
-    said = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
-    assert (said["failed"], said["reasons"]) == (10, ["4 × often", "3 × thrice", "2 × twice"])
+    reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
+    assert (reported["failed"], reported["reasons"]) == (
+        10,
+        ["4 × often", "3 × thrice", "2 × twice"],
+    )
 
 
 @pytest.mark.parametrize(("count", "few"), [(19, 19), (20, 0)])

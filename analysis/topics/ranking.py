@@ -226,9 +226,9 @@ def nearest(study: Study) -> str:
     things = "settings" if by_settings else "algorithms"
     among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
     first, away = among if len(learn) > 1 else capital(who), gap(rows.iloc[0])
-    known = scores.optimum_in_words(study)
-    place = f"comes nearest to the {known}: {away} away{beside}"
-    place = place if following else f"ends {away} from the {known}"  # one alone is not nearest
+    reference = scores.optimum_in_words(study)
+    place = f"comes nearest to the {reference}: {away} away{beside}"
+    place = place if following else f"ends {away} from the {reference}"  # one alone is not nearest
     text = f"{first} {place}{declared(rows.method[0])}."
     rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
     if rank and not by_settings:

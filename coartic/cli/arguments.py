@@ -65,5 +65,5 @@ def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:
     """
     from coartic.benchmarks.suites import methods_named
 
-    known = method_names(registered) if names else {}
-    return [method for n in names for method in methods_named(id_named(n, known), registered)]
+    ids = method_names(registered) if names else {}
+    return [method for n in names for method in methods_named(id_named(n, ids), registered)]
