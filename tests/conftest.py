@@ -132,7 +132,7 @@ def visited(browser):
 
     def visit(link, width=1280, **options):
         context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-        context.set_default_timeout(600_000)  # ms; a machine may be busy
+        context.set_default_timeout(180_000)  # ms; a machine may be busy
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda message: problems.append(message.text))

@@ -63,7 +63,7 @@ def test_it_is_one_small_file_without_addresses():
     assert not re.findall(r"(?:src|href)=[\"'](?!data:)|url\(|@import", html)
     assert 50 < len(re.sub(r"<[^>]*>", " ", pages.text_of("try.html.jinja")).split()) <= 150
     for name, label in (
-        ("two-armed-2", "Two-armed 2†"),
+        ("two-armed-2", "Two-armed 2 †"),
         ("long/v1/i000", load_task("long/v1/i000").label),
     ):
         own = pages.play_page(load_task(name))
@@ -207,7 +207,7 @@ def test_it_plays_holds_at_hits_and_saves_pictures(opened):
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("slider", name="Tick").fill("100")
     page.get_by_role("slider", name="Tick").press("ArrowRight")
-    page.get_by_text("101 of").wait_for()
+    page.get_by_text("102 of").wait_for()
     with page.expect_download() as download:
         page.get_by_role("button", name="Save PNG").click()
     assert download.value.path().read_bytes().startswith(b"\x89PNG")

@@ -61,7 +61,7 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
 def preset_of(task: Task) -> dict[str, Any]:
     """A task as the figure offers it."""
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
-    mark = "†" if "goals" in task.reconstructed else ""
+    mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
     return {"label": f"{task.label}{mark}", "task": content}
 

@@ -534,8 +534,8 @@ class Play {
     const tick = this.find("tick");
     tick.max = this.last;
     tick.value = state.tick;
-    tick.setAttribute("aria-valuetext", `tick ${state.tick} of ${this.last}`);
-    this.find("count").textContent = `${state.tick} of ${this.last} ticks`;
+    tick.setAttribute("aria-valuetext", `tick ${state.tick + 1} of ${this.last + 1}`);
+    this.find("count").textContent = `${state.tick + 1} of ${this.last + 1} ticks`;
     this.find("play").textContent = this.playing ? "Pause" : "Play";
     this.find("stage").setAttribute("aria-label", words([
       `${main.length > 1 ? "Two robots" : "A robot"} and ${this.problems[0].goals.length} goals; ${name}.`, finding,
