@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from coartic.benchmarks.provenance import command, current_environment, now
-from coartic.benchmarks.released import RELEASED, open_released
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.scoring import score
+from coartic.benchmarks.shipped import SHIPPED, open_shipped
 from coartic.benchmarks.worker import Job, Outcome
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -38,7 +38,7 @@ _SCORED = (
 def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
     """The plan with all that other folders hold, whose runs are copied into ``out``.
 
-    ``released`` names the shipped results. Performed in ``out``, the plan makes the runs that no
+    ``shipped`` names the shipped results. Performed in ``out``, the plan makes the runs that no
     folder has. A warning names a folder that has fewer runs of a cell than are asked for.
 
     Raises CoarticError where the folders do not go together, where one lacks runs that cannot be
@@ -48,16 +48,20 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
         for name in map(str, folders):
-            if name == RELEASED:
-                sources[name] = stack.enter_context(open_released(plan.suite))
+            if name == SHIPPED:
+                sources[name] = stack.enter_context(open_shipped(plan.suite))
                 continue
+            if not folder_named(name).exists():
+                raise CoarticError(
+                    f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
+                )
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
         target = stack.enter_context(writing(out))
-        if RELEASED in sources:
-            target.begin_as(sources[RELEASED])
+        if SHIPPED in sources:
+            target.begin_as(sources[SHIPPED])
         with target.transaction():
             target.replace_plan(whole, current_environment(), command(), now())
             origin = dict.fromkeys(target.ids(), str(out))
@@ -164,7 +168,7 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
                     f"differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
                 )
         runs = [source.run(run_id) for run_id in results if run_id not in there]
-        if runs and name != RELEASED:  # whose file is checked by its hash
+        if runs and name != SHIPPED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
         target.write(runs)
         origin |= {run.id: name for run in runs}

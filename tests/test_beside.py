@@ -1,4 +1,4 @@
-"""Results beside others: the released ones, the parts of a suite, another person's folder."""
+"""Results beside others: the shipped ones, the parts of a suite, another person's folder."""
 
 import hashlib
 import lzma
@@ -14,7 +14,7 @@ from coartic import CoarticError, load_task
 from coartic.analysis.sections import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
-from coartic.benchmarks import released, template
+from coartic.benchmarks import shipped, template
 from coartic.benchmarks.beside import put_beside
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.run import perform
@@ -141,7 +141,11 @@ def test_what_does_not_go_together(parts, tmp_path):
     other = plan_suite("quick", cells=LEFT, **OPTIONS)
     for plan, folder, said in (
         (other, parts[0], "the suite is 'paper' in .*left and 'quick' in this command"),
-        (planned(LEFT, **OPTIONS), tmp_path / "nowhere", "nowhere is not a results folder"),
+        (
+            planned(LEFT, **OPTIONS),
+            tmp_path / "nowhere",
+            "no folder .*nowhere.; .shipped. stands for",
+        ),
         (planned(LEFT, **OPTIONS), tmp_path / "whole", "cannot stand beside itself"),
     ):
         with pytest.raises(CoarticError, match=said):
@@ -180,10 +184,10 @@ def test_a_stranger_beside_others(parts, tmp_path):
         put_beside(more, parts[1:], tmp_path / "more")
 
 
-def test_released_results(monkeypatch, tmp_path):
+def test_shipped_results(monkeypatch, tmp_path):
     """They are those of their hash, and are read as any folder."""
-    for suite in released.released_hashes():
-        with released.open_released(suite) as store:
+    for suite in shipped.shipped_hashes():
+        with shipped.open_shipped(suite) as store:
             plan = store.plan()
             assert plan.suite == suite
             assert len(store.ids()) == plan.size
@@ -191,23 +195,23 @@ def test_released_results(monkeypatch, tmp_path):
             assert all(load_task(name) == plan.tasks[name] for name in some)  # as shipped today
             learned = store.runs().query("method == 'dual-process/EC1'").run_id
             assert store.run(learned.iloc[0]).is_thin
-    with pytest.raises(CoarticError, match="of suite 'quick' are released, but of comparison, "):
-        released.open_released("quick")
-    copy = shutil.copytree(Path(released.__file__).with_name("released"), tmp_path / "copy")
-    monkeypatch.setattr(released, "_FOLDER", copy)
+    with pytest.raises(CoarticError, match="of suite 'quick' are shipped, but of comparison, "):
+        shipped.open_shipped("quick")
+    copy = shutil.copytree(Path(shipped.__file__).with_name("shipped"), tmp_path / "copy")
+    monkeypatch.setattr(shipped, "_FOLDER", copy)
     (copy / "families.sqlite.xz").write_bytes(lzma.compress(b"something else"))
-    with pytest.raises(CoarticError, match="not as it was released"):
-        released.open_released("families")
+    with pytest.raises(CoarticError, match="not as it was shipped"):
+        shipped.open_shipped("families")
     (copy / "families.sqlite.xz").unlink()
     with pytest.raises(CoarticError, match="families.sqlite.xz cannot be read: install"):
-        released.open_released("families")
+        shipped.open_shipped("families")
     (copy / "SHA256SUMS").write_text("something else\n\n")
     with pytest.raises(CoarticError, match="cannot be read: install"):
-        released.open_released("comparison")
+        shipped.open_shipped("comparison")
 
 
 def test_packed_results_say_the_same(parts, tmp_path):
-    released.pack(parts[0], tmp_path)
+    shipped.pack(parts[0], tmp_path)
     content = (tmp_path / "paper.sqlite.xz").read_bytes()
     assert (tmp_path / "SHA256SUMS").read_text().split()[0] == hashlib.sha256(content).hexdigest()
     (tmp_path / "thin").mkdir()
@@ -221,34 +225,34 @@ def test_packed_results_say_the_same(parts, tmp_path):
 
 
 @pytest.fixture
-def shipped(parts, tmp_path, monkeypatch):
-    """The right part of suite ``paper``, as if it were released."""
+def packed(parts, tmp_path, monkeypatch):
+    """The right part of suite ``paper``, as if it were shipped."""
     (tmp_path / "packed").mkdir()
-    released.pack(parts[1], tmp_path / "packed")
-    monkeypatch.setattr(released, "_FOLDER", tmp_path / "packed")
+    shipped.pack(parts[1], tmp_path / "packed")
+    monkeypatch.setattr(shipped, "_FOLDER", tmp_path / "packed")
     return parts[1]
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_command(shipped, parts, tmp_path, coartic):
-    """A method is written by a command, run beside the released results, and there when that is
+def test_command(packed, parts, tmp_path, coartic):
+    """A method is written by a command, run beside the shipped results, and there when that is
     repeated; a colleague puts the folder beside another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
 
     assert coartic("new", "method", "my-search", "--out", mine)[0] == 0
-    command = ("run", "paper", "--method-file", mine, "--beside", "released", "--out", out)
+    command = ("run", "paper", "--method-file", mine, "--beside", "shipped", "--out", out)
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
     code, text, _ = coartic(*command, *small)
     assert (code, text[:16]) == (0, "8 runs (4 reused")
     assert coartic(*command, *small)[1].startswith("8 runs (8 reused)")
-    assert set(load(out).runs.method) == {"my-search", *load(shipped).runs.method}
+    assert set(load(out).runs.method) == {"my-search", *load(packed).runs.method}
     assert coartic("verify", out)[0] == 0
     both = ("--beside", out, "--beside", parts[0], "--out", tmp_path / "both", *small)
     code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
     assert (code, text[:19]) == (0, "10 runs (10 reused)")
     for wrong, said in (
-        (("run", "quick", *command[2:]), "no results of suite 'quick' are released"),
-        ((*command, *small, "--seed", 3), "the seed is 0 in released and 3 in this command"),
+        (("run", "quick", *command[2:]), "no results of suite 'quick' are shipped"),
+        ((*command, *small, "--seed", 3), "the seed is 0 in shipped and 3 in this command"),
         (("new", "method", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
         (("new", "method", "cma-es"), "'cma-es' is a name of a method here"),
         (("new", "method", "my search"), "letters, digits"),

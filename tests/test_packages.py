@@ -12,7 +12,7 @@ import zipfile
 import pytest
 
 from coartic.benchmarks.registry import built_in
-from coartic.benchmarks.released import open_released, released_hashes
+from coartic.benchmarks.shipped import open_shipped, shipped_hashes
 from tests.support.suites import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -34,8 +34,8 @@ def do(*command, cwd):
 
 def test_shipped_results_are_of_this_code():
     """Otherwise nobody's runs of a built-in method go beside them."""
-    for suite in released_hashes():
-        with open_released(suite) as store:
+    for suite in shipped_hashes():
+        with open_shipped(suite) as store:
             shipped = store.plan().methods
         now = built_in()
         assert {name: card.code for name, card in shipped.items()} == {

@@ -47,7 +47,7 @@ def new_method(
             ("Check", f"coartic check {name} --method-file {path}"),
             (
                 "Run",
-                f"coartic run comparison --method-file {path} --beside released --out results/mine",
+                f"coartic run comparison --method-file {path} --beside shipped --out results/mine",
             ),
         ]
     )

@@ -70,7 +70,7 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="FOLDER",
-            help="Put these results beside: a folder, or 'released' for the shipped ones.",
+            help="Put these results beside: a folder, or 'shipped' for the shipped ones.",
         ),
     ] = None,
 ) -> None:

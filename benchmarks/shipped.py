@@ -1,6 +1,6 @@
-"""Results that are shipped: ``released/SUITE.sqlite.xz``, each a results folder of one file.
+"""Results that are shipped: ``shipped/SUITE.sqlite.xz``, each a results folder of one file.
 
-``python -m coartic.benchmarks.released FOLDER`` makes one of a results folder. The rewards of
+``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder. The rewards of
 trials are thinned (:meth:`coartic.runs.run.Run.thin`), which takes it from 30 to 2 MB.
 """
 
@@ -17,32 +17,30 @@ from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.runs.store import RUNS_FILE, Store, open_content, open_store, writing
 
-RELEASED = "released"
+SHIPPED = "shipped"
 """Stands for the shipped results in place of a folder."""
-_FOLDER = Path(__file__).with_name("released")
+_FOLDER = Path(__file__).with_name("shipped")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
 
 
-def open_released(suite: str) -> AbstractContextManager[Store]:
+def open_shipped(suite: str) -> AbstractContextManager[Store]:
     """The shipped results of a suite, unpacked in memory. Raises CoarticError where there are none,
     or they were changed."""
     path = _FOLDER / f"{suite}{_ENDING}"
     try:
-        hashes = released_hashes()
+        hashes = shipped_hashes()
         content = path.read_bytes() if suite in hashes else b""
     except (OSError, ValueError) as error:
         raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
-        raise CoarticError(
-            f"no results of suite {suite!r} are released, but of {', '.join(hashes)}"
-        )
+        raise CoarticError(f"no results of suite {suite!r} are shipped, but of {', '.join(hashes)}")
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
-        raise CoarticError(f"{path} is not as it was released: install coartic again")
-    return open_content(lzma.decompress(content), RELEASED)
+        raise CoarticError(f"{path} is not as it was shipped: install coartic again")
+    return open_content(lzma.decompress(content), SHIPPED)
 
 
-def released_hashes() -> dict[str, str]:
+def shipped_hashes() -> dict[str, str]:
     """SHA-256 of the shipped results of each suite."""
     lines = (_FOLDER / _HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
