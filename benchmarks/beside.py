@@ -51,12 +51,11 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
             if name == SHIPPED:
                 sources[name] = stack.enter_context(open_shipped(plan.suite))
                 continue
-            if not folder_named(name).exists():
-                raise CoarticError(
-                    f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
-                )
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
+            if not folder_named(name).exists():
+                said = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
+                raise CoarticError(said)
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
         target = stack.enter_context(writing(out))
