@@ -18,7 +18,7 @@ from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
 BLACK, BASE_GREY, WHITE = "#000000", "#7a7a7a", "#ffffff"
-HIT = "0.55"  # of a goal; not black, which is the right hand
+HIT = "#009e73"  # of a goal, as on the play page
 MARKERS: dict[Hand, dict[str, Any]] = {
     # Squares are larger than circles, so that hands at one place show both.
     "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": WHITE},
@@ -28,7 +28,13 @@ _CROWDED = 0.6  # length unit: a goal that near above another has its number
 
 
 def draw_robot(
-    axes: Axes, task: Task, q: Array, *, weight: float = 1.0, alpha: float = 1.0
+    axes: Axes,
+    task: Task,
+    q: Array,
+    *,
+    weight: float = 1.0,
+    alpha: float = 1.0,
+    colour: str = BLACK,
 ) -> Callable[[Array], None]:
     """Draw base and arms in configuration ``q`` (dof,), their joints marked.
 
@@ -40,13 +46,13 @@ def draw_robot(
     base = [
         Polygon(outline, facecolor=BASE_GREY, alpha=0.25 * alpha, edgecolor="none", zorder=1.5),
         Polygon(
-            outline, fill=False, edgecolor=BLACK, linewidth=0.6 * weight, alpha=alpha, zorder=1.6
+            outline, fill=False, edgecolor=colour, linewidth=0.6 * weight, alpha=alpha, zorder=1.6
         ),
     ]
     for patch in base:
         axes.add_artist(patch)
     style: Any = {
-        "color": BLACK,
+        "color": colour,
         "linewidth": 0.9 * weight,
         "markeredgewidth": 0.7 * weight,
         "alpha": alpha,

@@ -1,7 +1,7 @@
-"""Movements tick by tick as a GIF or an MP4, by the conventions of the paper's figures.
+"""Movements tick by tick as a GIF or an MP4, in the colours of the play page.
 
 Open squares mark the left arm, closed circles the right one; goals are numbered circles,
-filled from the tick at which they are hit. Thin lines trace both hands.
+filled from the tick at which they are hit, when the film pauses. Thin lines trace both hands.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,12 +30,14 @@ if TYPE_CHECKING:
 FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
 """Seconds that the longest movement takes; one of fewer ticks than frames takes less."""
-HOLD_S = 2.0
-"""Seconds that the last frame stands."""
+PAUSE_S, HOLD_S = 0.5, 2.5
+"""Seconds that the film stands where a goal is hit, and at the end."""
+COLOURS = "#0072b2", "#c04a00"
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
-_WEIGHT = 1.5  # of lines
-_LEFT, _RIGHT, _BELOW, _ABOVE = 0.45, 0.05, 0.3, 0.5  # inches beside the axes
+_WEIGHT = 2.0  # of lines
+_COUNTER: Any = {"fontsize": 13, "fontweight": "bold", "va": "bottom"}
+_BESIDE, _BELOW, _ABOVE = 0.08, 0.05, 0.65  # inches beside the axes
 
 
 def write_film(
@@ -60,8 +63,9 @@ def write_film(
     speed = max(ticks / LASTS_S, RATE)
     stride = max(1, math.ceil(speed / RATE - 1e-9))
     interval_s = max(2, round(100 * stride / speed)) / 100
-    rows = list(dict.fromkeys([*range(0, ticks, stride), ticks - 1]))
-    held = max(1, round(HOLD_S / interval_s))
+    hits = {int(hit) for _, movement in movements for hit in movement.hits}
+    rows = sorted({*range(0, ticks, stride), *hits, ticks - 1})
+    stands = dict.fromkeys(hits, PAUSE_S) | {ticks - 1: HOLD_S}
     figure, scenes = set_stage(movements, width)
     rate: Any = 1 / interval_s
     # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
@@ -72,10 +76,11 @@ def write_film(
         with tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             with writer.saving(figure, str(film), _DPI):
-                for row in [*rows, *[rows[-1]] * held]:
+                for row in rows:
                     for show in scenes:
                         show(row)
-                    writer.grab_frame()
+                    for _ in range(1 + round(stands.get(row, 0) / interval_s)):
+                        writer.grab_frame()
             write_output(path, film.read_bytes(), replace=replace)
     except OSError as error:
         raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
@@ -96,7 +101,7 @@ def check_film(path: Path, *, replace: bool = False) -> None:
     check_output(path, replace=replace)
 
 
-def set_scene(axes: Axes, movement: Trajectory) -> Callable[[int], None]:
+def set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
     """Draw what moves in one picture.
 
     Returns a function that shows the state at a row of the movement, or at its last one: artists
@@ -104,25 +109,18 @@ def set_scene(axes: Axes, movement: Trajectory) -> Callable[[int], None]:
     """
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
-    traces = {hand: axes.plot([], [], color="0.6", linewidth=1)[0] for hand in task.hands}
+    traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}
     goals = draw_goals(axes, task, weight=_WEIGHT)
-    move = draw_robot(axes, task, task.q0, weight=_WEIGHT)
-    status = axes.text(
-        0.0, 1.01, "", transform=axes.transAxes, fontsize=9, va="bottom", parse_math=False
-    )
+    move = draw_robot(axes, task, task.q0, weight=_WEIGHT, colour=colour)
+    counter = axes.text(0, 1.01, "", transform=axes.transAxes, color=colour, **_COUNTER)
 
     def show(row: int) -> None:
         row = min(row, len(movement.configurations) - 1)
         move(movement.configurations[row])
         for hand, trace in traces.items():
             trace.set_data(*paths[hand][: row + 1].T)
-        hit = movement.hits <= row
-        fill_goals(goals, hit)
-        state = "done"
-        if not hit.all():
-            goal = int(np.argmin(hit))
-            state = f"goal {goal + 1} with the {movement.hands[goal]} hand"
-        status.set_text(f"reward −{row + 1}   {state}")
+        fill_goals(goals, movement.hits <= row)
+        counter.set_text(f"{row + 1} ticks")
 
     return show
 
@@ -136,19 +134,22 @@ def set_stage(
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
     inches, count = width / _DPI, len(movements)
-    wide = inches / count - _LEFT - _RIGHT
+    wide = inches / count - 2 * _BESIDE
     # Even in pixels, as MP4 wants it.
     height = 2 * round((wide * up / across + _ABOVE + _BELOW) * _DPI / 2) / _DPI
     figure = Figure(figsize=(inches, height), dpi=_DPI)
     for index, (title, movement) in enumerate(movements):
-        left, tall = index / count + _LEFT / inches, 1 - (_ABOVE + _BELOW) / height
+        left, tall = index / count + _BESIDE / inches, 1 - (_ABOVE + _BELOW) / height
         axes = figure.add_axes((left, _BELOW / height, wide / inches, tall), aspect="equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         number_goals(axes, movement.task, weight=_WEIGHT, fontsize=9)
-        axes.set_title(title, fontsize=9, loc="left", pad=18, parse_math=False)
-        axes.tick_params(labelsize=8)
-        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_title(title, fontsize=9, loc="left", pad=24, parse_math=False)
+        axes.set_xticks(range(math.ceil(low[0]), math.ceil(high[0])), [])
+        axes.set_yticks(range(math.ceil(low[1]), math.ceil(high[1])), [])
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        axes.grid(color="0.92")
     # What stands still takes most of the time of drawing: it is drawn once, as a picture.
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
@@ -159,6 +160,6 @@ def set_stage(
         for text in list(axes.texts):
             text.remove()
     return figure, [
-        set_scene(axes, movement)
-        for axes, (_, movement) in zip(figure.axes, movements, strict=True)
+        set_scene(axes, movement, colour)
+        for axes, (_, movement), colour in zip(figure.axes, movements, cycle(COLOURS), strict=False)
     ]

@@ -201,9 +201,11 @@ def play() -> Iterator[str]:
 
 
 def add_page(app: Sphinx, failure: Exception | None) -> None:
-    """Put the page of the figure beside the index."""
+    """Put the page of the figure beside the index, with a link to it."""
     if failure is None:
-        (Path(app.outdir) / "play.html").write_text(play_page(), encoding="utf-8")
+        home = '<main>\n<p class="soft"><a href="index.html">coartic: findings, how-to</a></p>'
+        page = play_page().replace("<main>", home, 1)
+        (Path(app.outdir) / "play.html").write_text(page, encoding="utf-8")
 
 
 class Made(SphinxDirective):

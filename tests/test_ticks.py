@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Task, corrective_trial, movements_of, trajectory
 
@@ -28,11 +28,12 @@ def test_the_table_has_each_tick(mine):
 
 
 def test_a_film_and_a_picture(tmp_path):
-    near = Task(goals=[(4.8, 0.1)])  # 20 steps along the base
-    mine = trajectory(near, corrective_trial(near, "R").movements)
+    near = Task(goals=[(4.8, 0.1), (5.1, 0.1)])  # 20 steps along the base, then 30
+    mine = trajectory(near, corrective_trial(near, "RR").movements)
     mine.animate(tmp_path / "mine.gif", width=200)
     with Image.open(tmp_path / "mine.gif") as film:
-        assert film.n_frames > 5
+        lasts = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
+        assert sum(ms > 400 for ms in lasts) == len(mine.hits)  # it stands where a goal is hit
     mine.plot().savefig(tmp_path / "mine.png")
     with pytest.raises(CoarticError, match="there already"):
         mine.animate(tmp_path / "mine.gif")

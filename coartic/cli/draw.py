@@ -85,11 +85,11 @@ def animate(
     for run_id in (run,) if other is None else (run, other):
         place, found = find_run(run_id, folder)
         movement, number = trajectory_of(place, found), found.number
-        title = f"{movement.task.label}: {name_of(found.setting.method)}, run {number}"
+        title = f"{movement.task.label}\n{name_of(found.setting.method)}, run {number}"
         movements.append((title, movement))
     if initial:
         on = movements[0][1].task
         initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
-        movements.insert(0, (f"{on.label}: initial solution", initial_solution))
+        movements.insert(0, (f"{on.label}\ninitial solution", initial_solution))
     frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
