@@ -9,7 +9,14 @@ from pathlib import Path
 from coartic import CoarticError, Task
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import Suite, load_suite, select_cells
-from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS, check_limits
+from coartic.inputs import (
+    MOST_RUNS,
+    MOST_SECONDS,
+    MOST_SEED,
+    MOST_TRIALS,
+    brief_value,
+    check_limits,
+)
 from coartic.runs.plan import Cell, Plan, hash_of, trials_in
 from coartic.tasks.families import own_families
 from coartic.tasks.task import check_task
@@ -27,7 +34,7 @@ LIMITS = {
 def plan_suite(
     suite: str | Path | Suite,
     *,
-    tasks: Sequence[str | Path] = (),
+    tasks: Sequence[str | Path | Task] = (),
     methods: Sequence[str] = (),
     method_files: Sequence[str | Path] = (),
     family_files: Sequence[str | Path] = (),
@@ -46,7 +53,7 @@ def plan_suite(
         A shipped suite by name, or a suite file (``.toml``).
     tasks, methods : sequence of str
         The part of the suite that is run, as :func:`coartic.benchmarks.suites.select_cells` takes
-        them; without names, all of it.
+        them, and own tasks (Task, or Path); without names, all of it.
     method_files, family_files : sequence of str or Path
         Files with methods and families of your own.
     cells : iterable of Cell, optional
@@ -73,10 +80,13 @@ def plan_suite(
     """
     lists = {"method_files": method_files, "family_files": family_files}
     for name, names in ({"tasks": tasks, "methods": methods} | lists).items():
-        if isinstance(names, str | Path):
-            raise CoarticError(f"{name} is a list: write {name}=[{str(names)!r}]")
-        if not all(isinstance(item, str | Path) for item in names):
-            raise CoarticError(f"{name} is {names!r}; it must be a list of names or paths")
+        if isinstance(names, str | Path | Task):
+            shown = names if isinstance(names, Task) else str(names)
+            raise CoarticError(f"{name} is a list: write {name}=[{brief_value(shown)}]")
+        kinds = (str, Path, Task) if name == "tasks" else (str, Path)
+        if not all(isinstance(item, kinds) for item in names):
+            what = "names, paths or tasks" if name == "tasks" else "names or paths"
+            raise CoarticError(f"{name} is {brief_value(names)}; it must be a list of {what}")
     numbers = {"runs": runs, "trials": trials, "trial_budget": trial_budget}
     try:
         check_limits("seed", seed, *LIMITS["seed"])
@@ -91,7 +101,7 @@ def plan_suite(
         cells = select_cells(
             suite,
             registry(map(Path, method_files)),
-            tasks=[str(name) for name in tasks],
+            tasks=[each if isinstance(each, Task) else str(each) for each in tasks],
             methods=methods,
             families=own_families(map(Path, family_files)),
         )

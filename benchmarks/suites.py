@@ -146,7 +146,7 @@ def read_suite(path: Path) -> Suite:
     if "goals" in content and "cells" not in content:
         raise CoarticError(f"{path} is a task, not a suite: run a suite with --tasks {path}")
     try:
-        return Suite(**{"name": path.stem, **content})
+        return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:
         keys = [*Suite.model_fields, *Block.model_fields, *Move.model_fields]
         raise CoarticError(explain_file(str(path), error, keys)) from None
@@ -156,14 +156,14 @@ def select_cells(
     suite: Suite,
     registered: Registry,
     *,
-    tasks: Sequence[str] = (),
+    tasks: Sequence[str | Task] = (),
     methods: Sequence[str] = (),
     families: Mapping[str, Family] = NO_FAMILIES,
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
-    A name of ``tasks`` that ends with ``.toml`` is a task file; ``optimum/*`` among ``methods``
-    stands for all that begin so.
+    ``tasks`` has names, task files (``.toml``) and tasks; ``optimum/*`` among ``methods`` stands
+    for all that begin so.
 
     A method of ``methods`` that the suite does not have runs on all of the suite's
     tasks that it applies to. A task from a file runs under every applicable method of
@@ -180,9 +180,19 @@ def select_cells(
             return instance_of(families[address.family], address)
         return load_task(name)
 
+    def known_by_name(task: str | Task) -> str | Task:
+        """The name in place of a shipped task or an instance, which no other task may have."""
+        if isinstance(task, str) or not (address_of(task.name) or task.name in builtin_tasks()):
+            return task
+        if task != task_named(task.name):
+            raise CoarticError(f"{task!r} is not the task of that name: give it another name")
+        return task.name
+
     methods = [method for name in methods for method in methods_named(name, registered)]
-    user_tasks = read_tasks(Path(name) for name in tasks if name.endswith(".toml"))
-    wanted = [each for name in tasks if not name.endswith(".toml") for each in named_by(name)]
+    tasks = list(map(known_by_name, tasks))
+    own = [each for each in tasks if isinstance(each, Task) or each.endswith(".toml")]
+    user_tasks = read_tasks(own)
+    wanted = [each for name in tasks if name not in own for each in named_by(str(name))]
     wanted += user_tasks
     in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
     for name in wanted:
@@ -245,18 +255,18 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     return named
 
 
-def read_tasks(paths: Iterable[Path]) -> dict[str, Task]:
-    """The tasks of files by name, which no other task may have."""
-    files: dict[str, Path] = {}
+def read_tasks(own: Iterable[str | Task]) -> dict[str, Task]:
+    """Tasks, and those of files, by name, which no other task may have."""
+    places: dict[str, str] = {}
     tasks: dict[str, Task] = {}
-    for path in paths:
-        task = load_task(path)
-        taken = "a shipped task" if task.name in builtin_tasks() else files.get(task.name)
-        if taken == path:
-            raise CoarticError(f"{path}: the same task file is given twice")
+    for each in own:
+        task, place = (each, repr(each)) if isinstance(each, Task) else (load_task(each), each)
+        taken = "a shipped task" if task.name in builtin_tasks() else places.get(task.name)
+        if taken == place:
+            raise CoarticError(f"{place}: the same task is given twice")
         if taken is not None:
-            raise CoarticError(f"{path}: name {task.name!r} is already taken by {taken}")
-        files[task.name], tasks[task.name] = path, task
+            raise CoarticError(f"{place}: name {task.name!r} is already taken by {taken}")
+        places[task.name], tasks[task.name] = place, task
     return tasks
 
 

@@ -99,7 +99,8 @@ def check_output(path: Path, *, replace: bool) -> None:
         raise CoarticError(f"cannot write {path}: what is there is a link or no file")
     if path.exists() and not replace:
         raise CoarticError(
-            f"{path} is there already; add --replace to write over it, or choose another name"
+            f"{path} is there already; add --replace (in Python replace=True) to write over it, or "
+            "choose another name"
         )
 
 

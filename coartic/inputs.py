@@ -8,10 +8,11 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic.errors import CoarticError
@@ -20,8 +21,9 @@ from coartic.text import LONGEST_LINE, did_you_mean, plain, short_repr
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-    from pydantic import ValidationError
     from pydantic_core import ErrorDetails
+
+T = TypeVar("T")
 
 MOST_CELLS = 10_000
 """Most cells of a suite: sixty times the largest one shipped."""
@@ -54,6 +56,24 @@ _PLAINER = {
 """Wordings of pydantic, and what they say to a person."""
 
 
+def in_sentences(kind: type[T]) -> type[T]:
+    """The class itself, which raises ValueError in sentences where it is called with what it does
+    not take."""
+    init: Any = kind.__init__
+
+    @wraps(init)
+    def call(self: Any, *args: Any, **given: Any) -> None:
+        try:
+            init(self, *args, **given)
+        except ValidationError as error:
+            fields = [*type(self).__pydantic_fields__]
+            raise ValueError(f"{type(self).__name__}: {explain_inline(error, fields)}") from None
+
+    kind.__init__ = call  # type: ignore[method-assign]
+    return kind
+
+
+@in_sentences
 class FileData(BaseModel):
     """What a file states: it cannot be changed, and every key is known."""
 
@@ -138,21 +158,24 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
     ``keys`` are the keys that it may have, wherever they belong.
     """
-    details, shown, keys = error.errors(include_url=False), plain(source), list(keys)
-    # A list is counted too short without its bad entries.
-    details = [d for d in details if d["type"] != "too_short"] or details[:1]
-    sentences = (plain(explain_problem(detail, keys)) for detail in details[:_SHOWN])
-    lines = list(dict.fromkeys(f"{shown}: {sentence}" for sentence in sentences))
-    if len(details) > _SHOWN:
-        lines.append(f"{shown}: has {len(details) - _SHOWN} more problems")
+    sentences = explain_all(error, list(keys))
+    lines = [f"{plain(source)}: {sentence}" for sentence in sentences[:_SHOWN]]
+    if len(sentences) > _SHOWN:
+        lines.append(f"{plain(source)}: has {len(sentences) - _SHOWN} more problems")
     return "\n".join(lines)
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """The problems of a file, the first :data:`_SHOWN` of them, as part of a sentence."""
-    return "; ".join(
-        plain(explain_problem(detail, keys)) for detail in error.errors(include_url=False)[:_SHOWN]
-    )
+    return "; ".join(explain_all(error, keys)[:_SHOWN])
+
+
+def explain_all(error: ValidationError, keys: Sequence[str]) -> list[str]:
+    """A sentence for each problem."""
+    details = error.errors(include_url=False)
+    # A list is counted too short without its bad entries.
+    details = [d for d in details if d["type"] != "too_short"] or details[:1]
+    return list(dict.fromkeys(plain(explain_problem(detail, keys)) for detail in details))
 
 
 def error_saying(text: str) -> PydanticCustomError:
@@ -164,6 +187,8 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
     """One sentence for a thing that is wrong; ``keys`` is what an unknown key may have meant."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
+        if not key and isinstance(part, int) and keys:
+            part = keys[part]  # an argument without its name
         name = plain(str(part), 80)
         key += f"[{name}]" if isinstance(part, int) else f".{name}" if key else name
     match detail["type"]:
@@ -178,6 +203,8 @@ def explain_problem(detail: ErrorDetails, keys: Sequence[str] = ()) -> str:
             return f"{key} is an unknown key{did_you_mean(name, keys)}"
         case "list_type" | "tuple_type" if key == "goals":
             message = "should be a list of points, such as [[3.0, 2.0]]"
+        case "list_type" | "tuple_type" if isinstance(detail["input"], str):
+            message = f"should be a list, such as [{detail['input']!r}]"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     for wording, plainer in _PLAINER.items():

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from coartic.errors import CoarticError
+from coartic.inputs import in_sentences
 from coartic.model import PAPER, MotionModel
 from coartic.motion.corrective import Correction, correct
 from coartic.motion.initial import search_initial_hands, too_many_sequences
@@ -95,6 +96,7 @@ class MethodError(CoarticError):
         self.details = details or {}
 
 
+@in_sentences
 class Parameters(BaseModel):
     """Base of every method's parameters: typed, validated, immutable, plain data."""
 

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from coartic.inputs import in_sentences
 from coartic.text import short_repr
 
 Hand = Literal["left", "right"]
@@ -84,6 +85,7 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
 
+@in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class Robot:
     """Geometry of a two-armed planar robot, and its kinematics; the default is the paper's.

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coartic import TaskError, builtin_tasks, corrective_trial, load_task
+from coartic import TaskError, corrective_trial, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.run import run_suite
 from coartic.inputs import MOST_CELLS
@@ -25,9 +25,8 @@ from coartic.tasks.families import (
     named_by,
     read_family,
     shipped_families,
-    task_text,
 )
-from coartic.tasks.task import Address, address_of, beyond_reach
+from coartic.tasks.task import Address, address_of, beyond_reach, task_text
 from tests.support.suites import ROOT
 
 # What the shipped families draw, by the hash of the task's file. A family is never changed: what
@@ -121,13 +120,6 @@ def test_every_instance_is_valid(address):
     assert (accepted.goals, accepted.start) == (task.goals, task.start)
     for attempt, rule in enumerate(rejected):
         assert broken_rule(family, draft(family, address, attempt)) == rule
-
-
-@pytest.mark.parametrize("name", builtin_tasks())
-def test_any_task_can_be_written(name, tmp_path):
-    path = tmp_path / "copy.toml"
-    path.write_text(task_text(load_task(name)), encoding="utf-8")
-    assert load_task(path) == load_task(name)
 
 
 FAMILY = load_family("two-armed/v1")

@@ -259,6 +259,12 @@ def test_a_single_task_is_scored():
     assert table.reward["policy"] == table.reward["corrective process"] == -319
     assert table.gap["policy"] == pytest.approx(100 * 27 / 292)
     assert table.gap_low["random actions"] < table.gap["random actions"] > table.gap["policy"]
+    own = load_task("ascending").model_copy(
+        update={"name": "own", "goals": ((3.0, 2.0),), "initial_hands": "R"}
+    )
+    table = coartic.gym.score("coartic/Task-v2", task=own)
+    assert table.reward["corrective process"] == corrective_trial(own, "R").reward
+    assert table.gap.isna().all()
     model = MotionModel(max_iterations=60)
     fails = coartic.gym.score(TWO, lambda seen: np.ones((1, 10)), model=model)
     assert fails.completed["policy"] == 0

@@ -363,6 +363,15 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     assert methods(other) == ["dual-process/EC1"]
     both = select_cells(paper, KNOWN, tasks=["ascending", str(path)])
     assert [cell.task.name for cell in both] == ["ascending"] + 4 * ["mine"]
+    made = [*map(load_task, ("two-armed-1", path, "two-armed/v1/i003"))]
+    again = select_cells(paper, KNOWN, tasks=made, methods=["EC4"])
+    assert [cell.task for cell in again] == made
+    for name in ("ascending", "two-armed/v1/i003"):
+        impostor = made[1].model_copy(update={"name": name})
+        with pytest.raises(CoarticError, match="is not the task of that name: give it another"):
+            select_cells(paper, KNOWN, tasks=[impostor])
+    with pytest.raises(CoarticError, match="name 'mine' is already taken by"):
+        select_cells(paper, KNOWN, tasks=[made[1], str(path)])
 
 
 def test_variants_of_the_learner_are_methods_of_their_own():

@@ -3,9 +3,18 @@
 import numpy as np
 import pytest
 
-from coartic import PAPER, CoarticError, Movement, execute
+from coartic import (
+    PAPER,
+    CoarticError,
+    Movement,
+    SolutionError,
+    corrective_trial,
+    execute,
+    load_task,
+    movements_of,
+)
 from coartic.runs.run import MOST_STEPS, execute_all
-from tests.support.strategies import tiny_task
+from tests.support.strategies import make_trials, tiny_task
 
 
 def test_no_way_is_followed_without_end():
@@ -31,6 +40,7 @@ def posture(x, y=0.0):
 
 
 WAY = np.zeros((1, 10))
+LRLR = [*enumerate(("left", "right") * 2, 1)]
 
 
 @pytest.mark.parametrize(
@@ -41,7 +51,10 @@ WAY = np.zeros((1, 10))
         (planned(posture(1.0), posture(1.0), posture(1.0)), "wanted [1, 2]"),
         (planned([0.0] * 9, posture(1.0)), "goal 1: configuration has shape (9,)"),
         (planned(posture(np.nan), posture(1.0)), "goal 1: configuration"),
-        (planned(posture(0.0, 1.0), posture(1.0)), "goal 1: the target moves a locked base"),
+        (
+            planned(posture(0.0, 1.0), posture(1.0)),
+            "goal 1: a target moves the base in y, which is locked, by 1: entry 1 must be 0",
+        ),
         (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
         ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
@@ -49,7 +62,10 @@ WAY = np.zeros((1, 10))
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "target is its last waypoint"),
         ([Movement(1, "right", "planned", WAY[0], waypoints=WAY)], "movement has no waypoints"),
-        ([Movement(1, "right", "path", waypoints=WAY + 1)], "the target moves a locked base"),
+        (
+            [Movement(1, "right", "path", waypoints=WAY + 1)],
+            "moves the base in y, which is locked, by 1",
+        ),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):
@@ -59,6 +75,25 @@ def test_solutions_that_break_the_rules(movements, words):
     with pytest.raises(CoarticError) as caught:
         execute(task, movements)
     assert words in str(caught.value)
+
+
+def test_a_base_that_a_solver_moves_a_little_is_held():
+    """In movements, on paths and in trials; elsewhere a target stays as it is."""
+    task = load_task("two-armed-1")
+    due = corrective_trial(task, "LRLR")
+    exact = due.configurations
+    off = exact + np.outer([1e-12, -1e-7, 0.0, 9e-7], np.eye(10)[1])
+    for targets in (exact, off):
+        made = execute(task, movements_of("LRLR", targets))
+        given = [m.target for m in made.movements if m.kind == "learned"]
+        np.testing.assert_array_equal(given, exact)
+    waypoints = [Movement(n, hand, "path", waypoints=off[n - 1 : n]) for n, hand in LRLR]
+    assert np.unique(execute(task, waypoints).configurations[:, 1]) == [0.0]
+    trials = make_trials(task, "LRLR", off[None])
+    np.testing.assert_array_equal(trials.targets[0], exact)
+    assert off[0, 1]
+    with pytest.raises(SolutionError, match=r"base in y, which is locked, by 0\.02: entry 1 must"):
+        execute(task, movements_of("LRLR", exact + 0.02))
 
 
 def test_a_goal_is_hit_by_one_hand():

@@ -16,8 +16,8 @@ import pytest
 
 from coartic.analysis import figures, fill_page, load, write_study
 from coartic.benchmarks.suites import load_suite
-from coartic.tasks.families import instance_of, own_families, task_text
-from coartic.tasks.task import address_of
+from coartic.tasks.families import instance_of, own_families
+from coartic.tasks.task import address_of, task_text
 
 ROOT = Path(__file__).parents[1]
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))

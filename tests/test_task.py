@@ -1,13 +1,17 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from coartic import (
     PAPER,
+    CoarticError,
+    ExplorationCondition,
     NotApplicableError,
+    Optimiser,
     Robot,
     Start,
     Task,
@@ -18,6 +22,7 @@ from coartic import (
     load_task,
 )
 from coartic.analysis.verify import stored_task
+from coartic.tasks.families import shipped_families
 from coartic.tasks.task import check_task, parse_task
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import TIED, tiny_task
@@ -55,6 +60,67 @@ def test_a_penalty_is_what_version_1_reads(tmp_path):
     stored = json.dumps(load_task("ascending").model_dump(mode="json") | {"penalty": {}})
     with pytest.raises(ValueError, match="its task has a penalty, which version 1.1.0 reads"):
         stored_task(stored, json.dumps(PAPER._asdict()))
+
+
+def robot_with(links, **changes):
+    robot = {"left_links": (4 / links,) * links, "right_links": (4 / links,) * links}
+    start = {"left": (0.1,) * links, "right": (-1e-7,) * links}
+    return tiny_task(robot=robot, start=start, **changes)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        *map(load_task, builtin_tasks()),
+        *(load_task(f"{family}/d001") for family in shipped_families()),
+        tiny_task(
+            title='Fingers \\ "é"', provenance={"goals": {"status": "chosen", "source": "me"}}
+        ),
+        robot_with(3, hands=["left"], initial_hands="LL"),
+        robot_with(6, locked_base=["y"], radius=0.3),
+        robot_with(5, locked_base=["y", "x"], goals=[[3.0, 1.0], [-0.5, 2.5]]),
+        Task(goals=[(3, 2)], q0=np.linspace(-6, 6, 10), robot=Robot(base_size=(2.0, 0.1))),
+    ],
+    ids=repr,
+)
+def test_a_saved_task_is_read_as_it_was(task, tmp_path):
+    path = tmp_path / "saved.toml"
+    task.save(path)
+    assert load_task(path) == task
+    with pytest.raises(CoarticError, match="replace=True"):
+        task.save(path)
+    task.save(str(path), replace=True)
+
+
+def test_a_task_is_saved_as_toml(tmp_path):
+    with pytest.raises(CoarticError, match=r"the name of a task's file ends in \.toml"):
+        tiny_task().save(tmp_path / "saved.json")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"hands": "right"}, "Task: hands is 'right'; it should be a list, such as ['right']"),
+        ({"goals": [(3, "2")]}, "Task: goals[0][1] is '2'; it should be a number"),
+        ({"goal": 3}, "Task: goal is an unknown key; did you mean 'goals'?"),
+        ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),
+        ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
+        ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
+    ],
+)
+def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):
+    with pytest.raises(ValueError, match=re.escape(words)) as caught:
+        Task(**{"goals": [(3, 2)]} | wrong)
+    assert "pydantic" not in str(caught.value)
+
+
+def test_what_else_is_made_of_wrong_arguments_says_so_in_a_sentence():
+    with pytest.raises(ValueError, match=r"Robot: links is an unknown key; did you mean 'left_l"):
+        Robot(links=(1, 1))
+    with pytest.raises(ValueError, match=r"ExplorationCondition: hand_exploration is 'all'; it sh"):
+        ExplorationCondition("x", ("right",), True, True, "all")
+    with pytest.raises(ValueError, match=r"Parameters: trials is 0; it should be greater than 0"):
+        Optimiser.Parameters(trials=0)
 
 
 def test_a_file_that_is_not_text(tmp_path):

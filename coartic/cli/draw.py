@@ -33,7 +33,8 @@ def draw(
     """Draw tasks, or write them into a folder as files."""
     from coartic import builtin_tasks, load_task
     from coartic.files import publish, write_output
-    from coartic.tasks.families import named_by, task_text
+    from coartic.tasks.families import named_by
+    from coartic.tasks.task import task_text
 
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]

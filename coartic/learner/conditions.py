@@ -18,7 +18,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
-from coartic.inputs import brief_value
+from coartic.inputs import brief_value, in_sentences
 from coartic.robot import HANDS, Hand
 from coartic.text import short_repr, unknown
 
@@ -35,12 +35,13 @@ Counted = Literal["later", "all"]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
+@in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
     """What the learner explores. Source: paper, section *Experiments*.
 
     ``CONDITIONS`` has the paper's four, ``VARIANTS`` has ours; ``dataclasses.replace`` makes others
-    of them. Raises pydantic.ValidationError, a ValueError, for what cannot be.
+    of them. Raises ValueError for what cannot be.
     """
 
     id: str

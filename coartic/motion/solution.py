@@ -29,6 +29,9 @@ from coartic.text import short_repr
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
+HELD = 1e-6
+"""How far from its value a target may have a locked base coordinate, length unit; solvers leave
+less."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,8 @@ def execute(
         The task is neither a Task nor a text nor a path.
     SolutionError
         The solution breaks the task's rules: goals are missing or out of order, the robot does
-        not have a hand, a target has the wrong shape or is not finite, a locked base moves.
+        not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
+        than 1e-6.
     ValueError
         No movement can be made with the model.
 
@@ -403,29 +407,43 @@ def check_movement(task: Task, movement: Movement) -> Movement:
     if kind == "path":
         if waypoints is None or len(waypoints) == 0:
             raise SolutionError("a path needs waypoints")
-        for point in waypoints:
-            check_point(task, point)
-        way = np.array(waypoints, dtype=np.float64)
-        if target is not None and not np.array_equal(target, way[-1]):
+        way = np.array([check_point(task, point) for point in waypoints], dtype=np.float64)
+        if target is not None and not np.array_equal(target, waypoints[-1]):
             raise SolutionError("a path's target is its last waypoint")
         return replace(movement, target=way[-1], waypoints=way)
     if waypoints is not None:
         raise SolutionError(f"a {kind} movement has no waypoints")
     if target is not None:
-        check_point(task, target)
-    elif kind != "corrective":
+        held = check_point(task, target)
+        return movement if held is target else replace(movement, target=held)
+    if kind != "corrective":
         raise SolutionError(f"a {kind} movement needs a target")
     return movement
 
 
-def check_point(task: Task, point: Any) -> None:
-    """Raises ValueError for a point that is no configuration of the robot, and SolutionError where
-    it moves a locked base coordinate."""
+def check_point(task: Task, point: Any) -> Array:
+    """The point, with its base held (:func:`hold_base`). Raises ValueError for what is no
+    configuration of the robot, and where it moves a locked base coordinate."""
     usual = isinstance(point, np.ndarray) and point.dtype == np.float64
     # A sum of squares is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not point @ point <= LARGEST_ENTRY:
         point = configuration(task.robot, point)
+    held: Array = point
+    if any(held[k] != task.q0[k] for k in map("xy".index, task.locked_base)):
+        held = hold_base(task, held.copy())
+    return held
+
+
+def hold_base(task: Task, points: Array) -> Array:
+    """The points, ``(..., dof)``, of which locked base coordinates that move by no more than
+    :data:`HELD` are put back. Raises ValueError where one moves by more."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
-        if point[k] != task.q0[k]:
-            raise SolutionError("the target moves a locked base coordinate")
+        moved = np.abs(points[..., k] - task.q0[k])
+        if (moved > HELD).any():
+            raise ValueError(
+                f"a target moves the base in {coordinate}, which is locked, by "
+                f"{np.nanmax(moved):.2g}: entry {k} must be {task.q0[k]:g}, as at the start"
+            )
+        points[..., k][moved > 0] = task.q0[k]
+    return points

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic.inputs import brief_value, real_array
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.reach import Bench, reach_all
-from coartic.motion.solution import Movement
+from coartic.motion.solution import Movement, hold_base
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task, check_hands, hands_of
 
@@ -135,8 +135,4 @@ def check_targets(task: Task, targets: Array) -> Array:
     within = copy.max(initial=0.0) <= LARGEST_ENTRY and copy.min(initial=0.0) >= -LARGEST_ENTRY
     if not within and np.any(np.abs(copy) > LARGEST_ENTRY):  # or some are NaN
         raise ValueError(f"a target has a number beyond {LARGEST_ENTRY:g}")
-    for coordinate in task.locked_base:
-        column = copy[..., "xy".index(coordinate)]
-        if np.any(~np.isnan(column) & (column != task.q0["xy".index(coordinate)])):
-            raise ValueError(f"a target moves the base in {coordinate}, which is locked")
-    return copy
+    return hold_base(task, copy)

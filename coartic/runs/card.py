@@ -102,7 +102,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         return {"quick": dict(method.quick), "config": wanted}
     parameters, *outline = arguments
     try:
-        typed = method.Parameters(**parameters)
+        typed = method.Parameters.model_validate(parameters)
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
         wrong, listed = explain_inline(error, names), ", ".join(names) or "none"

@@ -17,7 +17,6 @@ the others ask the compiled kernels, which use IEEE arithmetic alone
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -387,7 +386,7 @@ def read_family(path: Path) -> Family:
     if "name" in content:
         raise TaskError(f"{path}: name: is an unknown key; a family is named by its file")
     try:
-        family = Family(**content, name=name)
+        family = Family.model_validate(content | {"name": name})
     except ValidationError as error:
         keys = [*Family.model_fields, *Region.model_fields, *Alignment.model_fields]
         raise TaskError(explain_file(str(path), error, keys)) from None
@@ -415,29 +414,3 @@ def instance_names(
     check_limits("count", count, 1, MOST_CELLS)
     streams = {name: stream for stream, name in SPLITS.items()} | {"fresh": f"{year}-"}
     return [str(Address(family, streams[split], number)) for number in range(count)]
-
-
-def task_text(task: Task) -> str:
-    """The task as the text of its file, from which :func:`coartic.load_task` gives it again."""
-    content = task.model_dump(mode="json")
-    tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
-    if task.robot == Robot():
-        del tables["robot"]
-    lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]
-    for key, table in tables.items():
-        if table:
-            lines += [
-                "",
-                f"[{key}]",
-                *(f"{k} = {toml_value(v)}" for k, v in table.items() if v is not None),
-            ]
-    return "\n".join(lines) + "\n"
-
-
-def toml_value(value: Any) -> str:
-    """A value as TOML writes it; strings as JSON does, of printable characters."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {toml_value(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(toml_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

@@ -7,6 +7,7 @@ the key and what would be right.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping
@@ -18,7 +19,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
-from coartic.errors import TaskError
+from coartic.errors import CoarticError, TaskError
+from coartic.files import folder_named, write_output
 from coartic.inputs import (
     FileData,
     brief_value,
@@ -213,7 +215,7 @@ class Task(FileData):
         robot = content.get("robot", Robot())
         try:
             robot = robot if isinstance(robot, Robot) else Robot(**robot)
-        except (TypeError, ValidationError):
+        except (TypeError, ValueError):
             robot = Robot()  # the table [robot] is wrong, and is said to be
         content = dict(content)
         q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
@@ -234,6 +236,12 @@ class Task(FileData):
                 raise error_saying(
                     f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} "
                     "joints"
+                )
+            most = max(angles, key=abs)
+            if abs(most) > 2 * math.pi:
+                raise error_saying(
+                    f"start.{hand} has the angle {most:g}; angles are in rad, from -2π to 2π. Did "
+                    f"you mean {most:g}° = {math.radians(most):.3f}?"
                 )
         for key in self.provenance:
             if key not in Task.model_fields:
@@ -259,6 +267,26 @@ class Task(FileData):
         if info.context != WITHOUT_REACH and (far := out_of_reach(self, self.radius)) is not None:
             raise error_saying(far)
         return self
+
+    def save(self, path: str | Path, *, replace: bool = False) -> None:
+        """Write the task as a file, which :func:`load_task` reads.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            The file, whose name ends in ``.toml``.
+        replace : bool
+            Whether a file that is there is written over.
+
+        Raises
+        ------
+        CoarticError
+            The file cannot be written.
+        """
+        file = folder_named(path, "the name of a task's file")
+        if file.suffix != ".toml":
+            raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
+        write_output(file, task_text(self).encode(), replace=replace)
 
     def __repr__(self) -> str:
         """Its name and what there is to hit, with which hands."""
@@ -402,3 +430,29 @@ def all_keys() -> list[str]:
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]
+
+
+def task_text(task: Task) -> str:
+    """The task as the text of its file, from which :func:`coartic.load_task` gives it again."""
+    content = task.model_dump(mode="json")
+    tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
+    if task.robot == Robot():
+        del tables["robot"]
+    lines = [f"{key} = {toml_value(value)}" for key, value in content.items()]
+    for key, table in tables.items():
+        if table:
+            lines += [
+                "",
+                f"[{key}]",
+                *(f"{k} = {toml_value(v)}" for k, v in table.items() if v is not None),
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it; strings as JSON does, of printable characters."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
