@@ -22,7 +22,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
-from coartic.runs.plan import Plan, trials_in
+from coartic.runs.plan import Plan, Setting, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
 from coartic.text import counted
@@ -77,13 +77,14 @@ class Progress:
             self.took[method] += seconds
 
     @property
-    def time_left(self) -> tuple[float, bool]:
-        """Seconds that the runs to come take, by the mean of earlier runs of their methods, and
-        whether every method that is to come has an earlier run."""
+    def time_left(self) -> float:
+        """Seconds that the runs to come take, NaN while fewer than half of them are of methods that
+        have an earlier run; these take their mean, and the others as long as they do."""
         coming = +self.waiting
-        known = [method for method in coming if self.timed[method]]
-        seconds = sum(coming[m] * self.took[m] / self.timed[m] for m in known)
-        return seconds / self.workers, len(known) == len(coming)
+        known = {method: count for method, count in coming.items() if self.timed[method]}
+        share = sum(known.values()) / max(coming.total(), 1)
+        seconds = sum(count * self.took[m] / self.timed[m] for m, count in known.items())
+        return seconds / share / self.workers if share >= 0.5 else math.nan
 
     def __repr__(self) -> str:
         """How many runs were made in how long, how many failed, and where they are."""
@@ -104,9 +105,8 @@ class Progress:
         return f"{runs} in {time_taken}, {failed}: {self.folder}{without}"
 
 
-Watcher = Callable[[Progress, str], None]
-"""Called before the first run and after each, with the progress and with the task and the method of
-the run; these are empty before the first."""
+Watcher = Callable[[Progress, Setting | None], None]
+"""Called before the first run, and after each with its setting."""
 
 
 def run_suite(
@@ -114,7 +114,7 @@ def run_suite(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    watch: Watcher = lambda progress, what: None,
+    watch: Watcher = lambda progress, setting: None,
     **options: Any,
 ) -> Progress:
     """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
@@ -153,7 +153,7 @@ def perform(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    watch: Watcher = lambda progress, what: None,
+    watch: Watcher = lambda progress, setting: None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
 
@@ -190,7 +190,7 @@ def perform(
         for job in missing:
             progress.waiting[job.setting.method] += len(job.numbers)
         progress.workers = executor.workers
-        watch(progress, "")
+        watch(progress, None)
         jobs = divided(missing, executor.workers)
         while jobs:
             alone: list[Job] = []
@@ -204,7 +204,7 @@ def perform(
                     store.write(runs)
                     for run in runs:
                         progress.finish(run)
-                        watch(progress, f"{run.setting.task.name} {run.setting.method}")
+                        watch(progress, run.setting)
             jobs = alone
         progress.wall_s = time.perf_counter() - clock
         progress.others = len(store.ids()) - plan.size

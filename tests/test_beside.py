@@ -239,7 +239,7 @@ def test_command(packed, parts, tmp_path, coartic):
     repeated; a colleague puts the folder beside another one, without the method's file."""
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
 
-    assert coartic("new", "method", "my-search", "--out", mine)[0] == 0
+    assert coartic("new", "my-search", "--out", mine)[0] == 0
     command = ("run", "paper", "--method-file", mine, "--beside", "shipped", "--out", out)
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
     code, text, _ = coartic(*command, *small)
@@ -253,11 +253,11 @@ def test_command(packed, parts, tmp_path, coartic):
     for wrong, said in (
         (("run", "quick", *command[2:]), "no results of suite 'quick' are shipped"),
         ((*command, *small, "--seed", 3), "the seed is 0 in shipped and 3 in this command"),
-        (("new", "method", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
-        (("new", "method", "cma-es"), "'cma-es' is a name of a method here"),
-        (("new", "method", "my search"), "letters, digits"),
-        (("new", "method", "other", "--out", mine), "is there already"),
-        (("new", "method", "other", "--out", tmp_path / "x.txt"), "must end in .py"),
+        (("new", "cma-es/bandit"), "'cma-es/bandit' is already taken"),
+        (("new", "cma-es"), "'cma-es' is a name of a method here"),
+        (("new", "my search"), "letters, digits"),
+        (("new", "other", "--out", mine), "is there already"),
+        (("new", "other", "--out", tmp_path / "x.txt"), "must end in .py"),
     ):
         code, _, error = coartic(*wrong)
         assert (code, said in error) == (2, True), error

@@ -12,17 +12,17 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from coartic import __version__
+from coartic import __version__, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool
 from coartic.benchmarks.run import Progress
 from coartic.cli import COMMANDS, app
 from coartic.cli.terminal import Display
-from coartic.runs.plan import run_seed
+from coartic.runs.plan import Cell, run_seed
 from coartic.runs.store import RUNS_FILE
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session
-from tests.support.suites import BROKEN, ROOT, InProcess
+from tests.support.suites import BROKEN, KNOWN, ROOT, InProcess, planned
 
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
 
@@ -36,7 +36,7 @@ def test_run_resumes(coartic, tmp_path):
     assert text.startswith("14 runs in ")
     assert len(text.splitlines()) <= 12
     assert max(map(len, text.splitlines())) <= max(80, len(str(out)) + 40)
-    assert "14 of 14 runs, 0 failed" in error  # plain lines without a terminal
+    assert "14/14    0 failed\n" in error  # plain lines without a terminal
     made_with = load(out).made_with
     assert made_with["packages"]["numba"]
     assert made_with["command"][1:3] == ["run", "paper"]
@@ -76,22 +76,26 @@ def test_a_failed_run_makes_the_exit_code(coartic, tmp_path):
 def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
-    counts = {"done": 28, "timed": Counter(x=28), "waiting": Counter(x=35), "workers": 2}
-    progress = Progress(Path("results"), 63, **counts)
-    progress.took["x"] = 5600.0  # 200 s a run: 35 of them by two workers
+    progress = Progress(Path("results"), 63, done=8, waiting=Counter(x=35, y=20), workers=2)
+    setting = planned([Cell(load_task("two-armed-2"), KNOWN["nullspace-qp/next-goal"])]).settings[0]
     with Display() as display:
-        display.update(progress, f"two-armed-1 {'method' * 20}")
-        progress.done = 63
-        display.update(progress, "two-armed-1 x")
+        display.update(progress, setting)  # of whose method no run was seen
+        progress.done, progress.timed["x"] = 28, 28
+        progress.took["x"] = 2800.0  # 100 s a run: 55 of them by two workers
+        display.update(progress, setting)
+        progress.done, progress.waiting = 63, Counter()
+        display.update(progress, setting)
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
+    name = "Two-armed 2, null-space control, next goal"
+    lines = ["63/63    0 failed"]
     if is_terminal:
-        assert shown[1].startswith("28 of 63 runs, 0 failed, about 58 min 20 s left: two-armed-1 m")
+        lines = [
+            f" 8/63    0 failed                      {name}",
+            f"28/63    0 failed  about 46 min left   {name}"[:79],
+            f"63/63    0 failed                      {name}",
+        ]
         assert {*map(len, shown)} == {0, 79}  # drawn in its place, each time as wide
-    assert [line.rstrip() for line in shown[-2:]] == (
-        ["63 of 63 runs, 0 failed: two-armed-1 x", ""]
-        if is_terminal
-        else ["63 of 63 runs, 0 failed", ""]
-    )
+    assert [line.rstrip() for line in shown if line] == [line[:79].rstrip() for line in lines]
 
 
 def test_check(coartic, tmp_path):

@@ -13,9 +13,10 @@ import logging
 import os
 import sys
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 import coartic
 from coartic.cli import draw, new, play, read, run
@@ -46,24 +47,32 @@ def _options(
     pass
 
 
+class Command(TyperCommand):
+    """A command whose usage has no braces: they would look like a choice."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """The words after the command's name."""
+        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
+
+
 COMMANDS = (
-    (run.run, "comparison --methods EC4,CMA-ES --tasks ascending --runs 5 --out results/mine"),
+    (play.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
-    (run.check, "EC4"),
-    (run.reproduce, "1a2b3c --in results/quick"),
+    (run.run, "comparison --methods EC4,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
     (read.trace, "ranking cma-es/bandit --in results/comparison"),
-    (read.verify, "results/quick --again 3"),
-    (read.cite, "results/comparison --analysis"),
-    (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
-    (play.play, "two-armed-1 --out play.html"),
+    (run.reproduce, "1a2b3c --in results/quick"),
+    (read.verify, "results/quick --again 3"),
+    (new.new, "my-search"),
+    (run.check, "my-search --method-file my_search.py"),
+    (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
+    (read.cite, "results/comparison --analysis"),
 )
-"""The commands, each with the arguments of the example in its help."""
+"""The commands as people need them, each with the arguments of the example in its help."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
-    app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
-app.add_typer(new.group, name="new")
+    app.command(name=name, cls=Command, epilog=f"Example: coartic {name} {example}")(command)
 
 
 def main() -> None:

@@ -12,21 +12,13 @@ from coartic.cli import arguments as given
 from coartic.cli.terminal import say_pairs
 from coartic.errors import CoarticError
 
-group = typer.Typer(no_args_is_help=True, help="Begin a method of your own.")
 
-
-@group.callback()
-def _group() -> None:
-    pass
-
-
-@group.command("method")
-def new_method(
+def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its id, such as my-search.")],
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a method that works, to be changed into one of your own."""
+    """Write a method of your own: ten lines that work, to be changed."""
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
     from coartic.benchmarks.registry import add_cards, registry
@@ -37,8 +29,8 @@ def new_method(
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})
-    check_declaration(mine, "new method")
-    add_cards(registry(), [card_of(mine, "new method", "", "")])
+    check_declaration(mine, "new")
+    add_cards(registry(), [card_of(mine, "new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     say_pairs(

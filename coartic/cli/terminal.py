@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 import textwrap
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from coartic.benchmarks.run import Progress
+    from coartic.runs.plan import Setting
 
 READABLE = 24  # characters that a column of text needs
 
@@ -65,34 +67,36 @@ class Display:
     def __exit__(self, *_: object) -> None:
         print(end=self._end, file=sys.stderr, flush=True)
 
-    def update(self, progress: Progress, what: str) -> None:
+    def update(self, progress: Progress, setting: Setting | None) -> None:
         """Show the progress, and the task and method of the last run."""
-        self.done, total = progress.done, counted(progress.total, "run")
-        if not what:
+        from coartic.analysis.methods import name_of
+
+        self.done, total = progress.done, progress.total
+        if setting is None:
             if progress.stale:
                 count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
             if progress.present:
-                self.line(f"{progress.present} of {total} are already there.")
-        if progress.present == progress.total:
+                self.line(f"{progress.present} of {counted(total, 'run')} are already there.")
+        if progress.present == total:
             return
-        there = progress.present + progress.done
-        is_finished = there == progress.total
-        text = f"{there} of {total}, {progress.failed} failed"
-        if progress.done and not is_finished:
-            seconds, is_all = progress.time_left
-            minutes, rest = divmod(round(seconds), 60)
-            spoken = f"{minutes} min {rest} s" if minutes else f"{rest} s"
-            text += f", {'about' if is_all else 'at least'} {spoken} left"
+        there, seconds = progress.present + progress.done, progress.time_left
+        left = ""
+        if not math.isnan(seconds):
+            left = f"about {seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
+        text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
         if self._is_live:
+            last = "starting processes"
+            if setting is not None:
+                last = f"{setting.task.label}, {name_of(setting.method)}"
             width = shutil.get_terminal_size().columns - 1
-            words = one_line(f"{text}: {what or 'starting workers (the first time compiles)'}")
             print("\r", end="", file=sys.stderr)
+            words = one_line(f"{text}  {last}")
             say(f"{words[:width]:{width}}", stream=sys.stderr, end="")
             self._end = "\n"
-        elif progress.done and (is_finished or time.monotonic() - self._last >= self.EVERY_S):
+        elif there == total or (self.done and time.monotonic() - self._last >= self.EVERY_S):
             self._last = time.monotonic()
-            self.line(text)
+            self.line(text.rstrip())
 
     def line(self, text: str) -> None:
         """Print a line; the progress goes on below it."""
