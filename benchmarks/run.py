@@ -78,13 +78,14 @@ class Progress:
 
     @property
     def time_left(self) -> float:
-        """Seconds that the runs to come take, NaN while fewer than half of them are of methods that
-        have an earlier run; these take their mean, and the others as long as they do."""
+        """Seconds that the runs to come take, by the mean of earlier runs of their methods, or of
+        all; NaN until a quarter is done."""
         coming = +self.waiting
-        known = {method: count for method, count in coming.items() if self.timed[method]}
-        share = sum(known.values()) / max(coming.total(), 1)
-        seconds = sum(count * self.took[m] / self.timed[m] for m, count in known.items())
-        return seconds / share / self.workers if share >= 0.5 else math.nan
+        if not self.timed or self.done < coming.total() / 3:
+            return math.nan
+        mean = sum(self.took.values()) / self.timed.total()
+        each = {method: self.took[method] / count for method, count in self.timed.items()}
+        return sum(each.get(m, mean) * count for m, count in coming.items()) / self.workers
 
     def __repr__(self) -> str:
         """How many runs were made in how long, how many failed, and where they are."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import sys
 import textwrap
@@ -80,9 +79,8 @@ class Display:
                 self.line(f"{progress.present} of {counted(total, 'run')} are already there.")
         if progress.present == total:
             return
-        there, seconds = progress.present + progress.done, progress.time_left
-        left = ""
-        if not math.isnan(seconds):
+        there, seconds, left = progress.present + progress.done, progress.time_left, ""
+        if seconds > 0:  # which NaN is not
             left = f"about {seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
         text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
         if self._is_live:
