@@ -71,8 +71,8 @@ SECTIONS = (
         figure=coarticulation.draw_postures,
         sentence=coarticulation.next_goal,
         answer="Coarticulation",
-        note="Postures are compared in length units and rad. Random guesses are a placebo: they "
-        "learn nothing, and the best of many is selected.",
+        note="Postures are compared in length units and rad. Guesses learn "
+        "nothing; the best of many is selected.",
     ),
     Section(
         "paper",

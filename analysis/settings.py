@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from coartic.analysis.methods import INITIAL, PLACEBOS, is_search, main_methods, name_of
+from coartic.analysis.methods import ALL_GUESSES, INITIAL, is_search, main_methods, name_of
 from coartic.analysis.study import Study, cached
 
 
@@ -33,7 +33,7 @@ def compares_settings(study: Study) -> bool:
     several = [
         names
         for method, names in varied(study).items()
-        if method not in (INITIAL, *PLACEBOS) and not is_search(method)
+        if method not in (INITIAL, *ALL_GUESSES) and not is_search(method)
     ]
     return bool(several) and all(several)
 

@@ -1,6 +1,6 @@
 """Random search: noise on target configurations, the best trial is kept.
 
-``placebo/guesses`` is the best of uniform guesses around the corrective process with its best
+``guesses`` is the best of uniform guesses around the corrective process with its best
 hands. It cannot coarticulate by learning: no guess depends on any reward. Its best trial shows
 the effect of selecting one of many noisy trials by the reward of the whole task. A sign of
 coarticulation of a method that selects its solution from trials counts if it exceeds this one.
@@ -14,8 +14,8 @@ instances each, for 0.06, 0.12, 0.18, 0.25, 0.5 and 1.0: first movement slower b
 0.06, 0.07, 0.16, 0.24, 0.30 and 0; on four long tasks next goal nearer by 1.6, 1.9 and from 0.18 on
 0. So suites have all of these but the last.
 
-``placebo/guesses`` has the hands with which the corrective process alone does best, so that its
-hands could not come out otherwise. In ``placebo/hands`` every sequence gets as many of the trials,
+``guesses`` has the hands with which the corrective process alone does best, so that its
+hands could not come out otherwise. In ``guesses/hands`` every sequence gets as many of the trials,
 the first by the corrective process alone, the others around it. The best of all is the solution.
 
 ``random-search/climbing`` adds Gaussian noise and draws hands as well: a (1+1) hill climber for
@@ -47,8 +47,8 @@ _EPSILON = 0.2  # probability of a random hand, for each goal
 _MOST_DRAWN = 128  # trials that are drawn before they are made, at most
 
 
-class PlaceboParameters(OptimiserParameters):
-    """Parameters of the placebo."""
+class GuessesParameters(OptimiserParameters):
+    """Parameters of guesses."""
 
     half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
     """Half the width of the box of targets, length unit (base) and rad (joints)."""
@@ -61,13 +61,13 @@ class Guesses(Optimiser):
     solution; the first is the corrective process alone.
     """
 
-    name = "placebo/guesses"
-    title = "Placebo: best of random guesses around the corrective process"
+    name = "guesses"
+    title = "Best of random guesses around the corrective process"
     citation = (
         "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
         "control of a many parameter system. Automation and Remote Control."
     )
-    Parameters = PlaceboParameters
+    Parameters = GuessesParameters
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Guess until no trial is left."""
@@ -77,7 +77,7 @@ class Guesses(Optimiser):
 
 
 class DrawnHandsParameters(Parameters):
-    """Parameters of the placebo for hands."""
+    """Parameters of guesses with every hand sequence."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
@@ -87,8 +87,8 @@ class DrawnHandsParameters(Parameters):
 class DrawnHands(Method):
     """Guesses in a box for each hand sequence; the task's own alone, where there are too many."""
 
-    name = "placebo/hands"
-    title = "Placebo: best of random guesses with every hand sequence"
+    name = "guesses/hands"
+    title = "Best of random guesses with every hand sequence"
     citation = Guesses.citation
     told = TOLD
     Parameters = DrawnHandsParameters

@@ -30,7 +30,7 @@ from tests.support.suites import KNOWN, InProcess, run_and_write
 NAN = float("nan")
 ONE_ARMED = ("ascending", "descending")
 T1, T2 = "two-armed-1", "two-armed-2"
-GUESSES = "placebo/guesses"
+GUESSES = "guesses"
 COUNTED = Path(__file__).parent.parent / "docs" / "stored" / "reconstruction" / "sets.csv"
 
 
@@ -439,23 +439,23 @@ SLOWER = ["LLRR"] * 8 + ["LRLR"] * 31 + ["RRRR"]
 
 
 @pytest.mark.parametrize(
-    ("hands", "placebo", "verdict"),
+    ("hands", "guessed", "verdict"),
     [
         ({"EC2": "LLRR", "EC3": "LRLR"}, "LRLR", "supported"),  # left is slower for goal 2
         ({"EC2": "RRRR", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but as initially
         ({"EC2": "LRLR", "EC3": "LRLR"}, "LRLR", "not supported"),
         ({"EC2": "LRLL", "EC3": "LRLR"}, "LRLR", "not supported"),  # slower, but nothing follows
-        ({"EC2": "LLRR", "EC3": "LRLR"}, "LLRR", "undecided"),  # the placebo does so as well
+        ({"EC2": "LLRR", "EC3": "LRLR"}, "LLRR", "undecided"),  # guesses do so as well
         ({"EC2": "few LLRR", "EC3": "LRLR"}, "LRLR", "undecided"),  # more than it, but few
     ],
 )
-def test_hands_that_serve_other_goals(hands, placebo, verdict):
+def test_hands_that_serve_other_goals(hands, guessed, verdict):
     """Of two-armed task 1: left first and right second are the quicker hands, initially RRRR."""
     task = load_task(T1)
     quick = {h: corrective_trial(task, h).ticks_by_goal() for h in ("LLLL", "RRRR", "LRRR")}
     assert quick["LLLL"][0] < quick["RRRR"][0]
     assert quick["LRRR"][1] < corrective_trial(task, "LLRR").ticks_by_goal()[1]
-    of = {**{f"dual-process/{condition}": h for condition, h in hands.items()}, GUESSES: placebo}
+    of = {**{f"dual-process/{condition}": h for condition, h in hands.items()}, GUESSES: guessed}
     runs = {h: corrective_trial(task, h) for h in {"LRLL", *SLOWER}}
     assert runs["LRLR"].ticks_by_goal()[3] < runs["LRLL"].ticks_by_goal()[3]
     solutions = {
@@ -521,10 +521,10 @@ SEEN = {
         (1, 0, 1, "undecided"),  # what a reward by subtask shows
         (1, 2, 0, "not supported"),
         (1, 0, 2, "not supported"),
-        (-1, -2, -2, "not supported"),  # though the placebos show less
+        (-1, -2, -2, "not supported"),  # though guesses show less
     ],
 )
-def test_coarticulation_is_more_than_either_placebo_shows(
+def test_coarticulation_is_more_than_guesses_and_subtasks_show(
     claim, learned, guesses, subtask, verdict
 ):
     run, tasks, conditions, size, step = SEEN[claim]
@@ -592,7 +592,7 @@ def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The paper's cells as far as its claims need them, beside a placebo."""
+    """The paper's cells as far as its claims need them, beside guesses."""
     cells = [(task, f"dual-process/{condition}") for task, condition, _ in CELLS]
     cells += [
         (task, method) for task in ONE_ARMED for method in (GUESSES, "dual-process/EC1-subtask")
@@ -608,7 +608,7 @@ def test_the_register_on_runs(study):
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_OF_THE_PAPER]
     sacrificed = entries.loc["first-movement-sacrificed"]
-    assert "(random guesses)" in sacrificed.evidence
+    assert "(guesses)" in sacrificed.evidence
     assert len(sacrificed.run_ids.split()) == 24
     for name in ("beats-inaccurate-one-armed", "arm-coarticulation"):  # it was not run
         assert entries.verdict[name] == "undecided"

@@ -10,7 +10,7 @@ from coartic import load_task
 from coartic.analysis.claims import reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, INITIAL, PLACEBO
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
 from coartic.analysis.study import one_by_one
 from coartic.analysis.topics.instances import best_of_instances, signs, solved
 from coartic.tasks.families import named_by
@@ -49,7 +49,7 @@ def rewarded(centres, *, families=FEW, split="i", count=COUNT):
             tasks.append(load_task(name))
             best[name] = KnownOptimum(BEST, BEST if number % 2 else BEST + 50)
             for label, centre in centres.items():
-                if (label == EC1) == (family in ONE) or label in (INITIAL, PLACEBO):
+                if (label == EC1) == (family in ONE) or label in (INITIAL, GUESSES):
                     value = centre(number) if callable(centre) else centre
                     noise = (0,) if label == INITIAL else NOISE
                     rows += runs_of(name, label, value, noise=noise)
@@ -87,11 +87,11 @@ def test_more_than_eight_instances_are_not_shown_singly():
         assert len(one_by_one(rewarded(RISING, families=ONE, count=count))) == shown
 
 
-def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
-    """Signs of the learner, and of the placebo: that share of them, more by a little."""
+def made_up_signs(study, hand=1.0, waiting=0.3, guessed=0.5):
+    """Signs of the learner, and of guesses: that share of them, more by a little."""
     by_cell = {}
     for name in study.tasks:
-        for label in (EC1, EC2, EC3, EC4, PLACEBO):
+        for label in (EC1, EC2, EC3, EC4, GUESSES):
             if (name, label) in study.cells:
                 number = int(name[-3:])
                 values = {
@@ -102,9 +102,9 @@ def made_up_signs(study, hand=1.0, waiting=0.3, placebo=0.5):
                 if len(study.tasks[name].hands) > 1:
                     values["hand"] = np.array([hand, hand, hand - 0.1 * (number == 0)])
                     values["other arm"] = np.array([waiting + 0.01 * number])
-                if label == PLACEBO:
+                if label == GUESSES:
                     off = 0.001 * (number - 2)
-                    values = {sign: placebo * of + off for sign, of in values.items()}
+                    values = {sign: guessed * of + off for sign, of in values.items()}
                 by_cell[name, label] = values
     return by_cell
 
@@ -118,7 +118,7 @@ def with_signs(study, **values):
 def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
     monkeypatch.setattr(reader, "initial_solution", lambda task: alone)
-    centres = {**RISING, EC4: lambda n: -540 - n, PLACEBO: -580}
+    centres = {**RISING, EC4: lambda n: -540 - n, GUESSES: -580}
     study = with_signs(rewarded(centres, families=ONE + TWO, count=12))
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_ON_FAMILIES]
@@ -131,7 +131,7 @@ def test_claims_of_generality(monkeypatch):
         entry = entries.loc[f"{name}-in-general"]
         assert entry.verdict == "supported", entry.evidence
         assert entry.p_holm < 0.05
-    guessed = with_signs(rewarded(centres, families=ONE + TWO), placebo=1.0)
+    guessed = with_signs(rewarded(centres, families=ONE + TWO), guessed=1.0)
     of_signs = [CLAIMS[f"{name}-in-general"] for name in ("other-arm-coarticulation",
                                                           "arm-coarticulation")]  # fmt: skip
     # No more than guessing shows:
@@ -150,7 +150,7 @@ def test_instances_for_tuning_are_not_judged():
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    study = with_signs(rewarded(RISING | {PLACEBO: -580}, families=ONE + TWO, count=8), placebo=0.1)
+    study = with_signs(rewarded(RISING | {GUESSES: -580}, families=ONE + TWO, count=8), guessed=0.1)
 
     def verdict(more):
         for (task, label), values in signs(study).items():

@@ -10,7 +10,7 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task
-from coartic.analysis.methods import EC1, PLACEBO
+from coartic.analysis.methods import EC1, GUESSES
 from coartic.analysis.sections import TABLES
 from coartic.analysis.signatures import context_tests, signs
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
@@ -22,7 +22,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.topics import coarticulation, instances, placebo
+from coartic.analysis.topics import coarticulation, guesses, instances
 from coartic.robot import HANDS
 from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -82,12 +82,12 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
     assert context_tests.smallest_p(50, 50, resamples=99) == 0.01
 
 
-def test_more_than_a_placebo_by_brute_force():
+def test_more_than_another_by_brute_force():
     """Every division of five runs and of four in two contexts, counted one by one."""
     draw = rng(6)
     method = draw.standard_normal((3, 2)), draw.standard_normal((2, 2)) + 2.0
-    placebo = draw.standard_normal((2, 2)), draw.standard_normal((2, 2)) + 0.5
-    pools = [np.concatenate(runs) for runs in zip(method, placebo, strict=True)]
+    other = draw.standard_normal((2, 2)), draw.standard_normal((2, 2)) + 0.5
+    pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
 
     def excess(ours, theirs):
         groups = zip(pools, ours, theirs, strict=True)
@@ -97,7 +97,7 @@ def test_more_than_a_placebo_by_brute_force():
         )
 
     observed, count, total = (
-        distance_of_means(*method) - distance_of_means(*placebo),
+        distance_of_means(*method) - distance_of_means(*other),
         0,
         0,
     )
@@ -106,7 +106,7 @@ def test_more_than_a_placebo_by_brute_force():
             rest = [set(range(5)) - set(one), set(range(4)) - set(two)]
             count += excess((one, two), rest) >= observed - 1e-12
             total += 1
-    p = context_tests.beyond_p(method, placebo, rng(), resamples=20_000)
+    p = context_tests.beyond_p(method, other, rng(), resamples=20_000)
     assert p == pytest.approx(2 * count / total, abs=0.03)
 
 
@@ -340,15 +340,15 @@ def study_with(*cells):
     return study_of(rows, [cell.task for cell in cells], executed=made(executed))
 
 
-def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_trials=10):
-    """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of the placebo."""
+def beside_guesses(apart, of_guesses=0.5, *, runs=12, guesses_runs=12, guesses_trials=10):
+    """The learner's bases lie ``apart`` at goal 1 by the next goal, and those of guesses."""
     cells = []
-    for label, shift, count in ((EC1, apart, runs), (PLACEBO, of_placebo, placebo_runs)):
+    for label, shift, count in ((EC1, apart, runs), (GUESSES, of_guesses, guesses_runs)):
         noise = 0.1 * rng(2).standard_normal(count)
         for task, x in ((load_task("ascending"), 0.0), (load_task("descending"), shift)):
             cells.append(posed(task, label, [posture(each) for each in noise + x]))
     study = study_with(*cells)
-    study.runs.loc[study.runs.method == PLACEBO, "trials"] = placebo_trials
+    study.runs.loc[study.runs.method == GUESSES, "trials"] = guesses_trials
     return study
 
 
@@ -357,82 +357,82 @@ def beside_placebo(apart, of_placebo=0.5, *, runs=12, placebo_runs=12, placebo_t
     [
         ({"apart": 2.0}, "Yes. Depending on the next goal"),
         ({"apart": 0.5}, "Not shown:"),
-        ({"apart": 0.5, "of_placebo": 2.0}, "Not shown:"),
+        ({"apart": 0.5, "of_guesses": 2.0}, "Not shown:"),
         ({"apart": 0.0}, "No significant difference:"),
         ({"apart": 2.0, "runs": 2}, "Too few runs"),
-        ({"apart": 2.0, "placebo_runs": 0}, "Undecided:"),
-        ({"apart": 2.0, "placebo_trials": 9}, "Undecided:"),  # fewer than the learner's
+        ({"apart": 2.0, "guesses_runs": 0}, "Undecided:"),
+        ({"apart": 2.0, "guesses_trials": 9}, "Undecided:"),  # fewer than the learner's
     ],
 )
-def test_a_method_that_selects_has_to_exceed_the_placebo(made_up, answer):
-    study = beside_placebo(**made_up)
+def test_a_method_that_selects_has_to_exceed_guesses(made_up, answer):
+    study = beside_guesses(**made_up)
     contexts = coarticulation.shared_goal(study)
     assert contexts.method == EC1
     assert contexts.apart == pytest.approx(made_up["apart"])
     assert coarticulation.next_goal(study).startswith(answer)
-    guesses = placebo.placebo_of(study, contexts)
-    if guesses is not None:
-        assert guesses.apart == pytest.approx(made_up.get("of_placebo", 0.5))
-        beyond = placebo.context_beyond_p(study, contexts)
+    compared = guesses.guesses_beside(study, contexts)
+    if compared is not None:
+        assert compared.apart == pytest.approx(made_up.get("of_guesses", 0.5))
+        beyond = guesses.context_beyond_p(study, contexts)
         assert (beyond < 0.05) == (made_up["apart"] == 2.0)
-        assert math.isnan(placebo.context_beyond_p(study, guesses))  # it is not tested itself
+        assert math.isnan(guesses.context_beyond_p(study, compared))  # it is not tested itself
 
 
-def test_the_placebo_that_shows_most_of_a_sign_counts():
-    tasks, drawn = [load_task("ascending"), load_task("descending")], "placebo/hands"
+def test_the_guesses_that_show_most_of_a_sign_counts():
+    tasks, drawn = [load_task("ascending"), load_task("descending")], "guesses/hands"
     alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
     study = study_with(*(
         posed(task, label, [posture(shift * number + noise) for noise in (0.0, 0.1, 0.2)],
               np.add(alone[task.name], [slower, 0, 0]))
-        for label, shift, slower in ((EC1, 1.0, 5), (PLACEBO, 0.8, 1), (drawn, 0.3, 2))
+        for label, shift, slower in ((EC1, 1.0, 5), (GUESSES, 0.8, 1), (drawn, 0.3, 2))
         for number, task in enumerate(tasks)
     ))  # fmt: skip
-    assert placebo.placebos(study, "ascending") == [PLACEBO, drawn]
-    assert placebo.placebo_of(study, coarticulation.shared_goal(study)).method == PLACEBO
-    assert list(placebo.of_placebo(study, "ascending", "first")) == [2, 2, 2]
-    assert not placebo.selects(study, drawn)
+    assert guesses.guesses_on(study, "ascending") == [GUESSES, drawn]
+    assert guesses.guesses_beside(study, coarticulation.shared_goal(study)).method == GUESSES
+    assert list(guesses.most_guessed(study, "ascending", "first")) == [2, 2, 2]
+    assert not guesses.selects(study, drawn)
 
 
-def test_of_a_family_one_placebo_counts():
+def test_of_a_family_one_width_counts():
     """That of the highest mean: 3 ticks and 3 against 9 and -7, though 9 is the most of one."""
-    drawn = "placebo/hands"
+    drawn = "guesses/hands"
     cells = [
         posed(task, label, [posture()], np.add(corrective_trial(task, "RRR").ticks_by_goal(), more))
         for number, task in enumerate(map(load_task, ("one-armed/v1/i001", "one-armed/v1/i002")))
-        for label, slower in ((PLACEBO, (9, -7)), (drawn, (3, 3)))
+        for label, slower in ((GUESSES, (9, -7)), (drawn, (3, 3)))
         for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
     ]
     shown = instances.signs(study_with(*cells))
     for cell in cells:
-        assert shown[cell.task.name, PLACEBO]["first"].tolist() == [3]
+        assert shown[cell.task.name, GUESSES]["first"].tolist() == [3]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
     """Of eight runs in two places 2 of 70 divisions are as far apart. Two tasks share two goals:
-    the learner, on three tasks, has six of them, and random guesses, on two, have two."""
+    the learner, on three tasks, has six of them, and guesses, on two, have two."""
     tasks = [
         tiny_task(name=name, goals=[[5.0, 1.0], [5.0, 2.0], [5.0, y]], initial_hands="RRR")
         for name, y in (("a", 3.0), ("b", 3.5), ("c", 4.0))
     ]
     cells = [
         posed(task, label, [posture(place + 0.01 * run) for run in range(4)])
-        for label, count in ((EC1, 3), (PLACEBO, 2))
+        for label, count in ((EC1, 3), (GUESSES, 2))
         for place, task in enumerate(tasks[:count])
     ]
     table = TABLES["contexts"](study_with(*cells)).set_index("method")
     assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
-    assert table.p_holm[PLACEBO].tolist() == pytest.approx([2 * 2 / 70] * 2)
+    assert table.p_holm[GUESSES].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.5])
 def test_a_method_that_draws_nothing_needs_no_test(apart):
-    """One run a context, and no placebo."""
+    """One run a context, and no guesses."""
     cells = [
         posed(load_task(name), "trajectory-optimisation/jerk", [posture(x)])
         for name, x in (("ascending", 0.0), ("descending", apart))
     ]
     study = study_with(*cells)
     study.runs["trials"] = 0
-    assert not placebo.selects(study, cells[0].label)
+    assert not guesses.selects(study, cells[0].label)
     answer = "Yes. Depending on the next goal" if apart else "No significant difference:"
     assert coarticulation.next_goal(study).startswith(answer)

@@ -56,7 +56,7 @@ def comparable(table, path):
     table.to_csv(path, float_format="%.6g")
     table = read(path)
     ends = [name for name in table if name.endswith(("_low", "_high"))]
-    resampled = {"evidence", "p_holm", "p_without", "opposite_p_holm"}
+    resampled = {"evidence", "p_holm", "beyond_p", "p_without", "opposite_p_holm"}
     return table.drop(columns=[*ends, *(resampled & {*table})])
 
 

@@ -14,7 +14,7 @@ from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, PLACEBO
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES
 from coartic.analysis.signatures.context_tests import dependence_below
 from coartic.analysis.signatures.signs import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
@@ -41,7 +41,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
         first = read.sign("first", task, EC1)
         comparisons += [
             Higher(first, by=margins.TICKS),
-            Higher(first, read.sign("first", task, PLACEBO)),
+            Higher(first, read.sign("first", task, GUESSES)),
             Higher(first, read.sign("first", task, EC1_BY_SUBTASK)),
             Higher(read.sign("whole", task, EC1)),
         ]
@@ -50,7 +50,7 @@ def first_movement_sacrificed(read: Reader) -> Finding:
 
 
 def posture_depends_on_context(read: Reader) -> Finding:
-    """Postures at goal 1 depend on the goal that follows, more than a placebo's."""
+    """Postures at goal 1 depend on the goal that follows, more than those of guesses."""
     contexts, replayed = contexts_of(read, EC1), contexts_of(read, EC1, replay=True)
     equivalent, other = contexts.parts
     parts = [
@@ -63,14 +63,14 @@ def posture_depends_on_context(read: Reader) -> Finding:
     less_p = dependence_below(*contexts.postures, margins.SPREAD, np.random.default_rng(SEED))
     tests = [test]
     against = [replace(test, value=margins.SPREAD - test.value, p=less_p)]
-    guesses = [contexts_of(read, label) for label in read.placebos(ASCENDING)]
+    guesses = [contexts_of(read, label) for label in read.guesses(ASCENDING)]
     farthest = max(guesses, key=lambda each: each.apart)
-    for placebo in (farthest, contexts_of(read, EC1_BY_SUBTASK)):
-        more = contexts.apart - placebo.apart
-        beyond = replace(test, value=more, n=(contexts.n, placebo.n))
-        tests.append(replace(beyond, p=contexts.p_beyond(placebo)))
-        against.append(replace(beyond, value=-more, p=placebo.p_beyond(contexts)))
-        parts.append(f"{methods.name_of(placebo.method)}: {number(placebo.apart, 2)} apart")
+    for compared in (farthest, contexts_of(read, EC1_BY_SUBTASK)):
+        more = contexts.apart - compared.apart
+        beyond = replace(test, value=more, n=(contexts.n, compared.n))
+        tests.append(replace(beyond, p=contexts.p_beyond(compared)))
+        against.append(replace(beyond, value=-more, p=compared.p_beyond(contexts)))
+        parts.append(f"{methods.name_of(compared.method)}: {number(compared.apart, 2)} apart")
     for label in CONTROLS:
         with suppress(MissingError):
             apart = contexts_of(read, label).apart
@@ -108,7 +108,7 @@ def arm_coarticulation(read: Reader) -> Finding:
             arm = read.sign("arm", task, label)
             comparisons += [
                 Higher(arm, by=margins.TICKS),
-                Higher(arm, read.sign("arm", task, PLACEBO)),
+                Higher(arm, read.sign("arm", task, GUESSES)),
             ]
             if label == EC4:
                 comparisons.append(Higher(arm, read.sign("arm", task, EC4_BY_SUBTASK)))
@@ -119,31 +119,31 @@ def arm_coarticulation(read: Reader) -> Finding:
 def other_arm_coarticulation(read: Reader) -> Finding:
     """The waiting arm brings its hand nearer to its next goal."""
     arm = read.sign("other arm", TASK_1, EC4)
-    placebos = [read.sign("other arm", TASK_1, label) for label in (PLACEBO, EC4_BY_SUBTASK)]
+    others = [read.sign("other arm", TASK_1, label) for label in (GUESSES, EC4_BY_SUBTASK)]
     shown = [
         partial(read.sign, "other arm", TASK_1, EC4, replay=True),
         partial(read.sign, "other arm", TASK_1, EC3),
     ]
-    return all_higher([Higher(arm), *(Higher(arm, other) for other in placebos)], there(shown))
+    return all_higher([Higher(arm), *(Higher(arm, other) for other in others)], there(shown))
 
 
 def slower_hands_are_chosen(read: Reader) -> Finding:
-    """Whether more runs than of the placebo choose a hand that is slower for its goal alone."""
+    """Whether more runs than of guesses choose a hand that is slower for its goal alone."""
     task, labels = TASK_1, (EC2, EC3)
     initial = read.initial_execution(task).hands
     chosen = {label: chosen_slower(read.cell(task, label), initial) for label in labels}
     guesses = {
-        label: chosen_slower(read.cell(task, label), initial) > 0 for label in read.placebos(task)
+        label: chosen_slower(read.cell(task, label), initial) > 0 for label in read.guesses(task)
     }
-    placebo, of_placebo = max(guesses.items(), key=lambda item: item[1].mean())
+    label_guessed, guessed = max(guesses.items(), key=lambda item: item[1].mean())
     tests, against, parts = [], [], []
     for label in labels:
         does = chosen[label] > 0
         count, total = int(does.sum()), len(does)
-        table = [[count, total - count], [int(of_placebo.sum()), int((~of_placebo).sum())]]
+        table = [[count, total - count], [int(guessed.sum()), int((~guessed).sum())]]
         p = float(stats.fisher_exact(table, alternative="greater").pvalue)
-        more = min(does.mean() - of_placebo.mean(), does.mean() - margins.FEW)
-        tests.append(Estimate(more, p=p, n=(total, len(of_placebo))))
+        more = min(does.mean() - guessed.mean(), does.mean() - margins.FEW)
+        tests.append(Estimate(more, p=p, n=(total, len(guessed))))
         against.append(share_test(count, total, margins.FEW, "less"))
         parts.append(f"{task} {who_is(label)}: {count} of {total} runs")
         if count:
@@ -153,7 +153,7 @@ def slower_hands_are_chosen(read: Reader) -> Finding:
             rewards = np.array([run.reward for run in read.cell(task, label).runs], dtype=float)
             better = estimate(difference_of_means(rewards[does], rewards[~does]), 1)
             parts[-1] += f", which end with {better} ticks more reward than the others"
-    parts.append(f"{methods.name_of(placebo)}: {of_placebo.sum()} of {len(of_placebo)} runs")
+    parts.append(f"{methods.name_of(label_guessed)}: {guessed.sum()} of {len(guessed)} runs")
     best = min(tests, key=lambda test: (test.value <= 0, test.p))
     test = replace(best, p=min(1.0, best.p * len(tests)))
     contrary = max(against, key=lambda test: test.p)
@@ -179,8 +179,8 @@ CLAIMS_OF_COARTICULATION = [
         place="Results, Exploration Condition 1, Figure 5",
         quote="the reward incurred after making the first movement is more negative",
         test="one-tailed bootstrap tests: the first movement takes more than 1 tick longer than in "
-        "the initial solution, it takes longer than in either placebo (the best of random guesses, "
-        "the learner rewarded by subtask), and the whole task is faster",
+        "the initial solution, it takes longer than in guesses and in the learner rewarded "
+        "by subtask, and the whole task is faster",
         judge=first_movement_sacrificed,
         group="beside",
         short="the first movement is sacrificed",
@@ -192,9 +192,8 @@ CLAIMS_OF_COARTICULATION = [
         place="Results, Exploration Condition 1, Figure 5",
         quote="the joint configuration the robot used to hit the first goal differed",
         test="permutation tests: postures at goal 1 lie more than 1 pooled SD apart, and further "
-        "apart than those of either placebo (the best of random guesses, the learner rewarded by "
-        "subtask). For the opposite: fewer than 5 % of bootstrap samples are, or a placebo's lie "
-        "further apart",
+        "apart than those of guesses and of the learner rewarded by subtask. For the opposite: "
+        "fewer than 5 % of bootstrap samples are, or one of the others lies further apart",
         judge=posture_depends_on_context,
         group="beside",
         short="the posture depends on the next goal",
@@ -221,8 +220,8 @@ CLAIMS_OF_COARTICULATION = [
         quote="how the corresponding arm was used",
         test="one-tailed bootstrap tests: from the learned posture of base and chosen arm the "
         "corrective process reaches the next goal more than 1 tick sooner than from the posture in "
-        "which it would itself have hit the goal, and by more than in the placebos (the best of "
-        "random guesses; of EC4 also the learner rewarded by subtask). The waiting arm is where it "
+        "which it would itself have hit the goal, and by more than in guesses "
+        "and, under EC4, in the learner rewarded by subtask. The waiting arm is where it "
         "was before the movement. Mean over the goals of a run that others follow",
         judge=arm_coarticulation,
         group="beside",
@@ -237,7 +236,7 @@ CLAIMS_OF_COARTICULATION = [
         quote="possibly in way so that the robot would be able to hit",
         test="one-tailed bootstrap tests that what the arm does since its own last hit brings its "
         "hand nearer (0 where it keeps still), as a share of the initial distance, and nearer than "
-        "in the placebos (the best of random guesses, the learner rewarded by subtask); mean over "
+        "in guesses and in the learner rewarded by subtask; mean over "
         "the goals of a run",
         judge=other_arm_coarticulation,
         group="beside",
@@ -264,7 +263,7 @@ CLAIMS_OF_COARTICULATION = [
         place="Method, Two-Armed Task 1; Discussion, Figure 6",
         quote="Coarticulation was seen in terms of which arm was used",
         test="one-tailed Fisher's exact tests: in one of the cells more than 25% of the runs, and "
-        "more than of the placebo's, hit a goal that others follow with a hand that is slower for "
+        "more than of guesses, hit a goal that others follow with a hand that is slower for "
         "that goal alone and is not the initial solution's (smallest p times their number). For "
         "the opposite: in each cell fewer than 25% of the runs do (exact binomial tests)",
         judge=slower_hands_are_chosen,

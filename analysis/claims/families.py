@@ -10,7 +10,7 @@ from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
 from coartic.analysis.claims.judging import Finding, tests_over_tasks
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
-from coartic.analysis.methods import EC1, EC2, EC3, EC4, LEARNER, LEARNERS, PLACEBO, most_exploring
+from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, LEARNER, LEARNERS, most_exploring
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.topics.instances import best_of_instances
 from coartic.analysis.words import estimate
@@ -176,13 +176,13 @@ CLAIMS_ON_FAMILIES = [
         place="Results, Exploration Condition 1",
         quote="the reward incurred after making the first movement is more negative",
         test="one-tailed bootstrap tests over instances, against the corrective process with the "
-        "same hands: the first movement takes more than 1 tick longer, and longer than in the best "
-        "of random guesses (placebo); the whole task is faster",
+        "same hands: the first movement takes more than 1 tick longer, and longer than in "
+        "guesses; the whole task is faster",
         judge=lambda read: in_every_family(
             read,
             OF_ONE_ARM,
             shows(read, "first", by=margins.TICKS),
-            shows(read, "first", beyond=PLACEBO),
+            shows(read, "first", beyond=GUESSES),
             shows(read, "whole"),
         ),
         group="families",
@@ -195,12 +195,12 @@ CLAIMS_ON_FAMILIES = [
         place="Discussion",
         quote="Coarticulation was seen in terms of which arm was used",
         test="one-tailed bootstrap tests over instances, in each family, of the difference of the "
-        "shares of such goals, and of that to the best of random guesses (placebo)",
+        "shares of such goals, and of that to guesses",
         judge=lambda read: in_every_family(
             read,
             OF_TWO_ARMS,
             shows(read, "hand", beyond=EC2),
-            shows(read, "hand", beyond=PLACEBO),
+            shows(read, "hand", beyond=GUESSES),
         ),
         group="families",
     ),
@@ -213,13 +213,13 @@ CLAIMS_ON_FAMILIES = [
         test="one-tailed bootstrap tests over instances, in each family: from the learned posture "
         "of base and chosen arm the corrective process reaches the next goal more than 1 tick "
         "sooner than from the posture in which it would itself have hit the goal, and by more "
-        "ticks than in the best of random guesses (placebo). On both sides the waiting arm is "
+        "ticks than in guesses. On both sides the waiting arm is "
         "where it was before the movement. EC1 on one arm, EC4 on two; mean over goals",
         judge=lambda read: in_every_family(
             read,
             EVERY_FAMILY,
             shows(read, "arm", by=margins.TICKS),
-            shows(read, "arm", beyond=PLACEBO),
+            shows(read, "arm", beyond=GUESSES),
         ),
         group="families",
     ),
@@ -231,12 +231,12 @@ CLAIMS_ON_FAMILIES = [
         quote="possibly in way so that the robot would be able to hit",
         test="one-tailed bootstrap tests over instances, in each family, that the hand of the "
         "waiting arm gets nearer (0 where it keeps still; runs with both hands), and nearer than "
-        "in the best of random guesses (placebo)",
+        "in guesses",
         judge=lambda read: in_every_family(
             read,
             OF_TWO_ARMS,
             shows(read, "other arm"),
-            shows(read, "other arm", beyond=PLACEBO),
+            shows(read, "other arm", beyond=GUESSES),
         ),
         group="families",
     ),

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Task
-from coartic.analysis.methods import LEARNER, PLACEBO, PLACEBOS, name_of
+from coartic.analysis.methods import ALL_GUESSES, GUESSES, LEARNER, name_of
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
+from coartic.analysis.topics.guesses import guesses_on, most_guessed
 from coartic.analysis.topics.instances import signs
-from coartic.analysis.topics.placebo import of_placebo, placebos
 from coartic.analysis.topics.published import (
     Summary,
     published_alone,
@@ -37,7 +37,7 @@ class Measurement:
 
     task: str
     who: str
-    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random guesses``."""
+    """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``guesses``."""
     numbers: Array
     """Shape ``(runs,)``; ``()`` of one number, which is exact."""
     quantity: str = ""
@@ -94,7 +94,7 @@ class Reader:
                 "the mean of the others would mislead"
             )
         runs = cell.good
-        if label.startswith((LEARNER, *PLACEBOS)):
+        if label.startswith((LEARNER, *ALL_GUESSES)):
             trials = sorted(set(cell.runs.trials))
             if trials != [TRIALS]:
                 raise MissingError(
@@ -155,28 +155,28 @@ class Reader:
     def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
         """A sign of coarticulation, of the runs that have one; of an instance, computed once.
 
-        Of the placebo, that of the widths and hands that show most of it on the task, or in the
+        Of guesses, that of the widths and hands that show most of it on the task, or in the
         family.
         """
         sign, words = SIGNS[name], SIGNS[name].words
-        for each in (label, *(self.placebos(task) if label == PLACEBO else ())):
+        for each in (label, *(self.guesses(task) if label == GUESSES else ())):
             self.runs(task, each)
         if replay:
             values = sign.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {words}"
         elif self.task(task).family is not None:
             values = signs(self.study)[task, label].get(name, np.empty(0))
-        elif label == PLACEBO:
-            values = of_placebo(self.study, task, name)
+        elif label == GUESSES:
+            values = most_guessed(self.study, task, name)
         else:
             values = sign.of(self.study.executed(task, label))
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)
 
-    def placebos(self, task: str) -> list[str]:
-        """Labels of the placebos that solved a task."""
-        return placebos(self.study, task) or [PLACEBO]
+    def guesses(self, task: str) -> list[str]:
+        """Labels of the guesses that solved a task."""
+        return guesses_on(self.study, task) or [GUESSES]
 
     def initial_execution(self, task: str) -> Execution:
         """A task's initial solution: the corrective process alone with the task's hands."""

@@ -119,22 +119,22 @@ def smallest_p(first: int, second: int, resamples: int = RESAMPLES) -> float:
 
 def beyond_p(
     method: Sequence[Array],
-    placebo: Sequence[Array],
+    other: Sequence[Array],
     rng: np.random.Generator,
     *,
     contrast: Sequence[float] | Array = (1.0, -1.0),
     resamples: int = RESAMPLES,
 ) -> float:
-    """Test whether a method's contexts lie further apart than a placebo's, by permutation.
+    """Test whether a method's contexts lie further apart than another's, by permutation.
 
     How far contexts lie apart is the length of the sum of their mean configurations, each times its
     number in ``contrast``: their distance for two, the slope for several positions. Within each
     context the runs of both are divided anew at random, and the statistic is the method's length
-    less the placebo's.
+    less the other's.
 
     Parameters
     ----------
-    method, placebo : sequence of arrays, shape (runs, dof)
+    method, other : sequence of arrays, shape (runs, dof)
         Configurations in every context, length unit and rad.
     rng : numpy.random.Generator
         Divides the runs.
@@ -155,10 +155,10 @@ def beyond_p(
     >>> beyond_p(moved, still, rng) < 0.001 < beyond_p(still, still, rng)
     True
     """
-    if min(map(len, (*method, *placebo))) < 2:
+    if min(map(len, (*method, *other))) < 2:
         return math.nan
     weights = np.asarray(contrast, dtype=np.float64)
-    pools = [np.concatenate(runs) for runs in zip(method, placebo, strict=True)]
+    pools = [np.concatenate(runs) for runs in zip(method, other, strict=True)]
 
     def length(means: Sequence[Array]) -> Array:
         total = sum(weight * mean for weight, mean in zip(weights, means, strict=True))
@@ -166,13 +166,13 @@ def beyond_p(
 
     null = np.empty(resamples)
     for rows in slices(resamples, IN_MEMORY):
-        of_method, of_placebo = [], []
+        of_method, of_other = [], []
         for pool, runs in zip(pools, method, strict=True):
             ours = len(runs)
             chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
             total = pool[chosen].sum(axis=1)
             of_method.append(total / ours)
-            of_placebo.append((pool.sum(axis=0) - total) / (len(pool) - ours))
-        null[rows] = length(of_method) - length(of_placebo)
-    observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, placebo))
+            of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))
+        null[rows] = length(of_method) - length(of_other)
+    observed, theirs = (length([q.mean(axis=0) for q in runs]) for runs in (method, other))
     return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))

@@ -142,10 +142,10 @@ class TwoContexts:
         """P-value of the permutation test over runs; NaN where a context has one run."""
         return permutation_p(*self.postures, self._rng("context dependence"))
 
-    def p_beyond(self, placebo: TwoContexts) -> float:
-        """P-value of the test that these runs lie further apart than a placebo's; NaN where a
+    def p_beyond(self, other: TwoContexts) -> float:
+        """P-value of the test that these runs lie further apart than others; NaN where a
         context has one run."""
-        return beyond_p(self.postures, placebo.postures, self._rng(f"beyond {placebo.method}"))
+        return beyond_p(self.postures, other.postures, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
         """A generator for each test, the same in every folder."""

@@ -30,7 +30,7 @@ from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.topics import placebo
+from coartic.analysis.topics.guesses import context_beyond_p, guesses_beside, selects
 from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
@@ -63,7 +63,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     return next((contexts for label in order for contexts in shared_goals(study, label)), None)
 
 
-@table("method, place, runs, distance, dependence, p_holm, p_placebo, equivalent, other")
+@table("method, place, runs, distance, dependence, p_holm, p_guesses, equivalent, other")
 def list_contexts(study: Study) -> Rows:
     """Postures at a shared goal before different successors; p is corrected by method (Holm)."""
     for label in dict.fromkeys(label for _, label in study.cells):
@@ -78,7 +78,7 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.apart,
                 "dependence": shared.spreads,
                 "p_holm": adjusted,
-                "p_placebo": placebo.context_beyond_p(study, shared),
+                "p_guesses": context_beyond_p(study, shared),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
@@ -182,11 +182,11 @@ def next_goal(study: Study) -> str:
     shared = shared_goal(study)
     if shared is None:
         return ""
-    # A method whose runs differ by chance takes a test, and one that selects needs a placebo.
+    # A method whose runs differ by chance takes a test, and one that selects needs guesses.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
     drawn = study.plan.methods[cells[0].method].stochastic
-    needed = placebo.selects(study, shared.method)
-    guesses = placebo.placebo_of(study, shared) if needed else None
+    needed = selects(study, shared.method)
+    guesses = guesses_beside(study, shared) if needed else None
     beyond = math.nan if guesses is None else shared.p_beyond(guesses)
     runs = counted(shared.n, "run")
     spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
@@ -195,7 +195,7 @@ def next_goal(study: Study) -> str:
     apart = f"{spreads}{number(shared.apart, 2)} (length units, rad) apart ({p})"
     beside = ""
     if guesses is not None:
-        beside = f"; random guesses lie {number(guesses.apart, 2)} apart ({p_value(beyond)})"
+        beside = f"; guesses lie {number(guesses.apart, 2)} apart ({p_value(beyond)})"
     if drawn and not smallest_p(*map(len, shared.postures)) < LEVEL:
         text = (
             f"Too few runs to tell whether the next goal changes postures at goal {shared.goal} "
@@ -209,8 +209,8 @@ def next_goal(study: Study) -> str:
         text = f"Not shown: the {who} {apart}{beside}."
     else:
         text = (
-            f"Undecided: the {who} {apart}, and no placebo with as many trials ran. Add the method "
-            "placebo/guesses."
+            f"Undecided: the {who} {apart}, and no guesses with as many trials ran. Add the method "
+            "`guesses`."
         )
     return text + failed_runs(cells, " and are not counted")
 

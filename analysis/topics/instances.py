@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import pandas as pd
 
-from coartic.analysis.methods import LEARNERS, PLACEBO, most_exploring
+from coartic.analysis.methods import GUESSES, LEARNERS, most_exploring
 from coartic.analysis.optima import gap_share, locks_base
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.placebo import placebos
+from coartic.analysis.topics.guesses import guesses_on
 from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum
@@ -59,21 +59,21 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
 
 @cached
 def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signs (n,) on every instance, of the learner by condition and of the placebo.
+    """Values of signs (n,) on every instance, of the learner by condition and of guesses.
 
     By the instance's name and the method's label, then by the sign's name in :data:`SIGNS`; a
-    value for each run that has one. A sign without any is left out. Label ``PLACEBO`` has each sign
-    of the placebo that shows most of it over the instances of the family.
+    value for each run that has one. A sign without any is left out. Label ``GUESSES`` has each sign
+    of the guesses that show most of it over the instances of the family.
     """
     by_cell: dict[tuple[str, str], dict[str, Array]] = {}
     for name in best_of_instances(study):
-        for label in (*LEARNERS, *placebos(study, name)):
+        for label in (*LEARNERS, *guesses_on(study, name)):
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.executed(name, label)
                 measured = {sign: SIGNS[sign].of(runs) for sign in SIGNS}
                 by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
-    # Of each family and sign, the placebo with the highest mean over instances.
+    # Of each family and sign, the guesses with the highest mean over instances.
     means = pd.DataFrame(
         [(study.tasks[name].family, sign, label, each.mean())
          for (name, label), of_cell in by_cell.items() if label not in LEARNERS
@@ -81,9 +81,9 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
         columns=["family", "sign", "label", "mean"],
     ).groupby(["family", "sign", "label"], sort=False)["mean"].mean()  # fmt: skip
     most = means.groupby(["family", "sign"], sort=False).idxmax().to_dict()
-    for name in [name for name, label in by_cell if label == PLACEBO]:
+    for name in [name for name, label in by_cell if label == GUESSES]:
         chosen = {sign: most.get((study.tasks[name].family, sign), ("",))[-1] for sign in SIGNS}
-        by_cell[name, PLACEBO] = {
+        by_cell[name, GUESSES] = {
             sign: by_cell[name, label][sign]
             for sign, label in chosen.items()
             if sign in by_cell.get((name, label), {})

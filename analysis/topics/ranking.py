@@ -20,7 +20,7 @@ from coartic.analysis.topics import scores
 from coartic.analysis.words import capital, interval, listed, marked, number, p_value
 from coartic.text import counted
 
-TRIES = *methods.PLACEBOS, "corrective-alone/every"
+TRIES = *methods.ALL_GUESSES, "corrective-alone/every"
 """Methods that take the best of their trials and learn nothing between them."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
@@ -233,9 +233,9 @@ def nearest(study: Study) -> str:
     rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
     if rank and not by_settings:
         standing = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
-        guesses = by_trial.gap[by_trial.method == methods.PLACEBO]
+        guesses = by_trial.gap[by_trial.method == methods.GUESSES]
         text += f" The paper's learner is {standing}, at {gap(learn.iloc[rank])}"
-        text += "".join(f"; random guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
+        text += "".join(f"; guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
         text += f" The best planner that knows the reward as a formula ends {gap(best)} away"

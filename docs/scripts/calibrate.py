@@ -1,8 +1,8 @@
 """How intervals and tests do where the truth is known: ``python docs/scripts/calibrate.py``.
 
-With a folder of many runs of the placebo on ascending and descending, how often it passes as a sign
-of coarticulation: ``coartic run comparison --tasks ascending,descending --methods placebo/guesses
---runs 400 --out results/placebo``, then ``python docs/scripts/calibrate.py results/placebo``.
+With a folder of many runs of guesses on ascending and descending, how often they pass as a sign
+of coarticulation: ``coartic run comparison --tasks ascending,descending --methods guesses
+--runs 400 --out results/guesses``, then ``python docs/scripts/calibrate.py results/guesses``.
 
 Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
 hold the truth in 95 % of them; tests at 5 % should reject a true hypothesis in 5 % at most. The
@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.claims import margins
-from coartic.analysis.methods import PLACEBO
+from coartic.analysis.methods import GUESSES
 from coartic.analysis.signatures.context_tests import beyond_p, context_dependence, permutation_p
 from coartic.analysis.statistics import estimates
 from coartic.analysis.statistics.estimates import LEVEL
@@ -111,38 +111,38 @@ def rates() -> Iterator[tuple[str, str, int, float]]:
             yield from ((str(what), name, n, rate) for what, rate in seen.mean().items())
 
 
-STUDIES, PLACEBO_RUNS = 200, 20
-"""Simulated studies, and runs of the method and of the placebo in each."""
+STUDIES, GUESSES_RUNS = 200, 20
+"""Simulated studies, and runs of the method and of guesses in each."""
 
 
-def placebo_rates(study: Study) -> Iterator[tuple[str, float]]:
-    """In what share of simulated studies the placebo passes as a sign, by rule.
+def rates_of_guesses(study: Study) -> Iterator[tuple[str, float]]:
+    """In what share of simulated studies guesses pass as a sign, by rule.
 
-    A study takes runs of the placebo without replacement, half of them as a method's. By the rules
-    of the claims *context* and *first-movement-sacrificed*, each with and without a placebo.
+    A study takes runs of guesses without replacement, half of them as a method's. By the rules
+    of the claims *context* and *first-movement-sacrificed*, each with and without guesses.
     """
     tasks = ("ascending", "descending")
-    cells = [study.executed(task, PLACEBO) for task in tasks]
+    cells = [study.executed(task, GUESSES) for task in tasks]
     shown = [cell.postures[:, 0] for cell in cells]
     slower = [cell.against_same_hands[:, 0].astype(np.float64) for cell in cells]
     rng, passed = np.random.default_rng(0), []
     for _ in range(STUDIES):
-        picks = [rng.permutation(len(runs))[: 2 * PLACEBO_RUNS] for runs in shown]
+        picks = [rng.permutation(len(runs))[: 2 * GUESSES_RUNS] for runs in shown]
         pairs = list(zip(shown, picks, strict=True))
-        method = pairs[0][0][pairs[0][1][:PLACEBO_RUNS]], pairs[1][0][pairs[1][1][:PLACEBO_RUNS]]
-        rest = pairs[0][0][pairs[0][1][PLACEBO_RUNS:]], pairs[1][0][pairs[1][1][PLACEBO_RUNS:]]
+        method = pairs[0][0][pairs[0][1][:GUESSES_RUNS]], pairs[1][0][pairs[1][1][:GUESSES_RUNS]]
+        rest = pairs[0][0][pairs[0][1][GUESSES_RUNS:]], pairs[1][0][pairs[1][1][GUESSES_RUNS:]]
         apart = context_dependence(*method) > margins.SPREAD
         apart &= bool(permutation_p(*method, rng, resamples=RESAMPLES) < LEVEL)
         beyond = beyond_p(method, rest, rng, resamples=RESAMPLES) < LEVEL
         ticks = [
-            (t[p[:PLACEBO_RUNS]], t[p[PLACEBO_RUNS:]]) for t, p in zip(slower, picks, strict=True)
+            (t[p[:GUESSES_RUNS]], t[p[GUESSES_RUNS:]]) for t, p in zip(slower, picks, strict=True)
         ]
         first = [bootstrap_test(a, margins.TICKS, resamples=RESAMPLES).p < LEVEL for a, _ in ticks]
         more = [bootstrap_test(a, b, resamples=RESAMPLES).p < LEVEL for a, b in ticks]
         passed.append({
-            "context, without a placebo": apart,
+            "context, without guesses": apart,
             "context": apart and beyond,
-            "first movement, without a placebo": all(first),
+            "first movement, without guesses": all(first),
             "first movement": all(first) and all(more),
         })  # fmt: skip
     for rule, share in pd.DataFrame(passed).mean().items():
@@ -152,7 +152,9 @@ def placebo_rates(study: Study) -> Iterator[tuple[str, float]]:
 def main() -> None:
     """Print the rates in per cent, a row for each procedure and population."""
     if len(sys.argv) > 1:
-        rates_by_rule = pd.DataFrame(placebo_rates(load(sys.argv[1])), columns=["rule", "passes"])
+        rates_by_rule = pd.DataFrame(
+            rates_of_guesses(load(sys.argv[1])), columns=["rule", "passes"]
+        )
         print(rates_by_rule.to_csv(index=False, float_format="%.3f"))
         return
     frame = pd.DataFrame(rates(), columns=["procedure", "rewards", "n", "rate"])

@@ -24,7 +24,7 @@ from coartic.analysis import (
     write_study,
 )  # fmt: skip
 
-GUESSES = "placebo/guesses"
+GUESSES = "guesses"
 """The best of random guesses, which selects its solution and learns nothing."""
 KEYS = ["group", "counted", "dose"]
 MEASURES = {
@@ -115,14 +115,14 @@ def judge_claims(study, runs):
         "dose-moves-postures": (
             "The reward of the whole task moves postures: where it counts in full, what is learned "
             "leaves the next goal nearer than where each movement counts by itself, and nearer "
-            "than random guesses do.",
+            "than guesses do.",
             "one-tailed bootstrap tests over random tasks, of noiseless replays: with γ = 1 "
             "postures of base and chosen arm leave the next goal nearer by more than 1 tick more "
-            "than with γ = 0, and nearer than those of the best of random guesses",
+            "than with γ = 0, and nearer than those of guesses",
             all_of(
                 mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
                             "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
-                mean_beyond("than those of random guesses by {} ticks",
+                mean_beyond("than those of guesses by {} ticks",
                             nearer["all 1"] - nearer["guesses"]),
             ),
         ),
@@ -180,7 +180,7 @@ def judge_claims(study, runs):
 LOOKS = {
     "all": {"label": "all movements count", "color": figures.PALETTE[0]},
     "later": {"label": "later ones alone", "color": figures.PALETTE[1], "linestyle": "--"},
-    "guesses": {"label": "random guesses", "color": figures.GREY, "linestyle": ":"},
+    "guesses": {"label": "guesses", "color": figures.GREY, "linestyle": ":"},
 }
 """How a line is called and drawn, by what counts."""
 

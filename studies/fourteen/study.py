@@ -33,7 +33,7 @@ from coartic.analysis import (
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
-    "random-search/climbing", "placebo/guesses", "corrective-alone/given",
+    "random-search/climbing", "guesses", "corrective-alone/given",
 ]  # fmt: skip
 ARMS = ["one arm", "two arms"]
 MANY = ["fourteen-one/v1", "fourteen-two/v1"]

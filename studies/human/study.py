@@ -35,7 +35,7 @@ def measure_effects(study):
     """A row for each finding, model and test, in their order.
 
     ``value`` with its interval, of ``tasks``; ``over_guesses``: by how much it exceeds that of
-    random guesses, where solutions are picked from trials; ``of_test``, the verdict of the test,
+    guesses, where solutions are picked from trials; ``of_test``, the verdict of the test,
     and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
     ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
     """
@@ -76,11 +76,11 @@ def judge_test(measured, model, test, level, silent):
     elif tasks >= FEWEST_TASKS and agrees != disagrees:
         verdict = "agrees" if agrees else "disagrees"
     if tasks and model in GROUPS["picked from trials"]:
-        both = [values, measured(name, "random guesses")]
+        both = [values, measured(name, "guesses")]
         *over, common = bootstrap(both, statistic, level)
         exceeds = min(side * over[1], side * over[2]) > 0 and common >= FEWEST_TASKS
         if verdict == "agrees" and not exceeds:
-            verdict, because = "undecided", "it is not shown to exceed random guesses"
+            verdict, because = "undecided", "it is not shown to exceed guesses"
     return {
         "measure": name, "bound": f"{word} {bound:g}",
         "value": value, "value_low": low, "value_high": high, "tasks": tasks,

@@ -22,11 +22,11 @@ from coartic import load_task
 from coartic.analysis import beyond_p, figures, load, write_study
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 
-GUESSES = "placebo/guesses"  # which methods that select one of their trials have to exceed
+GUESSES = "guesses"  # which methods that select one of their trials have to exceed
 SELECTS = ["dual-process/EC1", "cma-es/bandit"]
 DRAWN = {  # methods in the figure, and their names
     "dual-process/EC1": "learner",
-    "placebo/guesses": "random guesses",
+    "guesses": "guesses",
     "cma-es/bandit": "CMA-ES",
     "nullspace-qp/next-goal": "null-space QP",
     "posture-based/two-goals": "postures for two goals",
@@ -52,7 +52,7 @@ def tabulate(runs):
     """Means over runs of a method on a task, ticks more than the corrective process takes.
 
     ``first``: for the first movement. ``total``: for all of them. ``first_p``: of the two-sided
-    bootstrap test of ``first`` against random guesses, for methods that select a trial.
+    bootstrap test of ``first`` against guesses, for methods that select a trial.
     """
     groups = runs.assign(row=runs.task + " " + runs.method).groupby("row", sort=False)
     table = groups[["method", "moving", "by"]].first().assign(runs=groups.size())
@@ -94,8 +94,8 @@ def regress(postures):
 def tabulate_slopes(runs):
     """How the posture at a goal follows its neighbour that moves, as :func:`regress` measures it.
 
-    ``p_holm`` is corrected over the tests of a method; ``p_placebo`` is of the test that postures
-    follow the neighbour more than those of random guesses.
+    ``p_holm`` is corrected over the tests of a method; ``p_guesses`` is of the test that postures
+    follow the neighbour more than those of guesses.
     """
     rows = {}
     for (goal, moving), method in product(BESIDE, runs.method.unique()):
@@ -105,7 +105,7 @@ def tabulate_slopes(runs):
         row |= {"runs": sum(map(len, ours)), **regress(ours)}
         if method in SELECTS:
             rng = np.random.default_rng([0, goal, moving])
-            row["p_placebo"] = beyond_p(ours, guesses, rng, contrast=WEIGHTS)
+            row["p_guesses"] = beyond_p(ours, guesses, rng, contrast=WEIGHTS)
         rows[f"ascending {method} goal {goal} of {moving} right"] = row
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
     names, p_holm = load_task("ascending").robot.joint_names, table.groupby("method").p_holm

@@ -1,8 +1,8 @@
-"""Tests against the placebo: random guesses, of which the best of many is selected.
+"""Tests against guesses: random targets, of which the best of many is selected.
 
 A method that selects its solution from trials by their rewards shows signs that selection alone
-shows, and has to exceed the placebo's. A folder may have placebos of several widths, and one that
-draws hands. On each task, or in each family, the one that shows most of a sign counts.
+shows, and has to exceed those of guesses. A folder may have guesses of several widths, and with
+every hand sequence. On each task, or in each family, the one that shows most of a sign counts.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from coartic.analysis.methods import PLACEBOS
+from coartic.analysis.methods import ALL_GUESSES
 from coartic.analysis.signatures.signs import SIGNS
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
@@ -19,32 +19,34 @@ from coartic.analysis.topics.scores import BY_TRIAL, groups
 from coartic.robot import Array
 
 
-def placebos(study: Study, task: str) -> list[str]:
-    """Labels of the placebos that solved a task."""
+def guesses_on(study: Study, task: str) -> list[str]:
+    """Labels of the guesses that solved a task."""
     return [
         label
         for (name, label), cell in study.cells.items()
-        if name == task and cell.method in PLACEBOS and len(cell.good)
+        if name == task and cell.method in ALL_GUESSES and len(cell.good)
     ]
 
 
-def of_placebo(study: Study, task: str, sign: str) -> Array:
-    """A sign of the placebo whose runs show most of it in the mean, shape ``(n,)``; empty where
+def most_guessed(study: Study, task: str, sign: str) -> Array:
+    """A sign of the guesses whose runs show most of it in the mean, shape ``(n,)``; empty where
     none has a value."""
-    signs = [SIGNS[sign].of(study.executed(task, each)) for each in placebos(study, task)]
+    signs = [SIGNS[sign].of(study.executed(task, each)) for each in guesses_on(study, task)]
     return max((values for values in signs if len(values)), key=np.mean, default=np.empty(0))
 
 
 def selects(study: Study, label: str) -> bool:
     """Whether a method's solution may be one of many trials, selected by its reward."""
-    return label.partition(" ")[0] not in PLACEBOS and groups(study)[label] == BY_TRIAL
+    return label.partition(" ")[0] not in ALL_GUESSES and groups(study)[label] == BY_TRIAL
 
 
-def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """The placebo whose postures lie farthest apart in the same two contexts; None without one
+def guesses_beside(study: Study, contexts: TwoContexts) -> TwoContexts | None:
+    """The guesses whose postures lie farthest apart in the same two contexts; None without one
     that made as many trials."""
     names, pairs = [task.name for task in contexts.tasks], []
-    for label in (each for each in placebos(study, names[0]) if each in placebos(study, names[1])):
+    for label in (
+        each for each in guesses_on(study, names[0]) if each in guesses_on(study, names[1])
+    ):
         most, wanted = (
             [study.cells[name, who].runs.trials.max() for name in names]
             for who in (label, contexts.method)
@@ -56,11 +58,11 @@ def placebo_of(study: Study, contexts: TwoContexts) -> TwoContexts | None:
 
 
 def context_beyond_p(study: Study, contexts: TwoContexts) -> float:
-    """P of the test that a method's postures lie further apart than the placebo's.
+    """P of the test that a method's postures lie further apart than those of guesses.
 
-    NaN for a method that selects nothing, and without a placebo that made as many trials.
+    NaN for a method that selects nothing, and without guesses that made as many trials.
     """
     if not selects(study, contexts.method):
         return math.nan
-    placebo = placebo_of(study, contexts)
-    return math.nan if placebo is None else contexts.p_beyond(placebo)
+    guesses = guesses_beside(study, contexts)
+    return math.nan if guesses is None else contexts.p_beyond(guesses)
