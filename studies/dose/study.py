@@ -1,4 +1,4 @@
-"""How much of the whole task's reward does it take?
+"""How much of the whole-task reward is needed?
 
     coartic run studies/dose/suite.toml
     python studies/dose/study.py results/dose
