@@ -193,7 +193,6 @@ def play() -> Iterator[str]:
     """The figure to play with, its text and its styles; ``play.html`` is its page."""
     yield "```{raw} html"
     yield f"<style>{text_of('play.css')}</style>"
-    yield text_of("try.html.jinja")
     yield figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
     yield '<p><a href="play.html">On a page of its own</a>; with a task of yours:'
     yield " <code>coartic play TASK</code></p>"

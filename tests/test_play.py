@@ -210,7 +210,7 @@ SOLVE = """(task, seeds, trials, horizons) => {
   const found = seeds.map((seed) => {
     const search = new coartic.Search(problem, seed, trials);
     while (search.left > 0) search.step();
-    return { ...shown(search.learned()), trials: search.rewards.length };
+    return { ...shown(search.learned()), trials: search.trials };
   });
   return [found, horizons.map((horizon) => shown(coartic.receding_horizon(problem, horizon)))];
 }"""

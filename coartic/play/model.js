@@ -288,7 +288,7 @@ function execute(problem, movements) {
   return trial;
 }
 
-/* coartic/motion/ticks.py: the configuration at every tick, and the row in which each goal is hit. */
+/* coartic/trajectories.py: the configuration at every tick, and the row in which each goal is hit. */
 function trajectory(problem, trial) {
   const { step } = problem.model;
   const rows = [];
@@ -694,7 +694,7 @@ class Strategy {
    one whose upper confidence bound is highest. */
 class Search {
   constructor(problem, seed, trials) {
-    Object.assign(this, { problem, left: trials, trials: 0, rewards: [], best: null, strategies: [] });
+    Object.assign(this, { problem, left: trials, trials: 0, best: null, strategies: [] });
     this.rng = new Generator(seed);
     this.exploration = 0.2;
   }
@@ -703,7 +703,6 @@ class Search {
     const trial = make_trial(this.problem, hands, targets);
     this.trials += 1;
     this.left -= 1;
-    this.rewards.push(trial.reward);
     if (trial.going && (!this.best || trial.reward > this.best.reward)) this.best = trial;
     return trial;
   }

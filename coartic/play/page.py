@@ -51,7 +51,7 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
         .get_template("figure.html.jinja")
         .render(
             still=still or text_of("still.svg"),
-            data=as_json({"presets": presets, **more}),
+            data=as_json({"presets": presets, "version": coartic.__version__, **more}),
             model="\n".join(map(text_of, ("model.js", "worker.js"))),
             script="\n".join(map(text_of, ("picture.js", "play.js", "begin.js"))),
         )

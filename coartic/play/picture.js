@@ -27,7 +27,7 @@ class Picture {
   /* Begin anew, with a box of the world in sight. */
   begin([left, bottom, right, top]) {
     const { canvas, context } = this;
-    const density = window.devicePixelRatio || 1;
+    const density = this.density || window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (canvas.width !== Math.round(width * density) || canvas.height !== Math.round(height * density)) {
       canvas.width = Math.round(width * density);
@@ -52,19 +52,23 @@ class Picture {
     return [this.centre[0] + (x - this.size[0] / 2) / this.scale, this.centre[1] - (y - this.size[1] / 2) / this.scale];
   }
 
-  line(points, width, dash = []) {
+  line(points, width, dash) {
+    this.path(points.map((point) => this.toScreen(point)), width, dash);
+  }
+
+  path(points, width, dash = []) {
     const { context } = this;
     context.lineWidth = width;
     context.setLineDash(dash);
     context.beginPath();
-    points.map((point) => this.toScreen(point)).forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+    points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
     context.stroke();
     context.setLineDash([]);
   }
 
-  /* A grid of length units. */
-  grid(colour) {
-    const { context, size } = this;
+  /* A grid of length units, one of which is named. */
+  grid(colour, ink) {
+    const { context, size, scale } = this;
     const [left, top] = this.toWorld([0, 0]);
     const [right, bottom] = this.toWorld(size);
     context.strokeStyle = colour;
@@ -72,44 +76,68 @@ class Picture {
     for (let x = Math.ceil(left); x <= right; x += 1) this.line([[x, bottom], [x, top]], 0.5);
     for (let y = Math.ceil(bottom); y <= top; y += 1) this.line([[left, y], [right, y]], 0.5);
     context.globalAlpha = 1;
+    context.strokeStyle = ink;
+    const [from, to] = [12, 12 + scale].map((x) => this.toWorld([x, size[1] - 12]));
+    this.line([from, to], 1.5);
+    this.text("1 length unit", [18 + scale, size[1] - 12], ink, "left", 12);
+  }
+
+  /* What the box slides on, below it or beside it. */
+  rail([x, y], off, level, colour) {
+    const [[left, top], [right, bottom]] = [[0, 0], this.size].map((point) => this.toWorld(point));
+    this.context.strokeStyle = colour;
+    this.line(level ? [[left, y - off], [right, y - off]] : [[x, bottom], [x, top]], 3);
   }
 
   /* A robot; the arm at work is thick. Joints of the left arm are squares, those of the right one circles. */
-  robot(problem, q, { colour, alpha = 1, weight = 1, chosen = null, joints = true }) {
+  robot(problem, q, { colour, alpha = 1, weight = 1, chosen = null, thin = false }) {
     const { context } = this;
     const unit = Math.max(1.6, Math.min(3, this.scale / 26)) * weight;
     const [width, height] = problem.robot.base_size;
     context.globalAlpha = alpha;
     context.strokeStyle = colour;
-    const [left, top] = this.toScreen([q[0] - width / 2, q[1] + height / 2]);
-    context.lineWidth = unit * 0.7;
-    if (weight >= 1) {
-      context.fillStyle = this.colour("base");
-      context.fillRect(left, top, width * this.scale, height * this.scale);
-    }
-    context.strokeRect(left, top, width * this.scale, height * this.scale);
+    context.fillStyle = this.colour("base");
+    context.lineWidth = thin ? 0.7 : unit * 0.7;
+    context.beginPath();
+    context.roundRect(...this.toScreen([q[0] - width / 2, q[1] + height / 2]), width * this.scale, height * this.scale, 3);
+    if (!thin) context.fill();
+    context.stroke();
     problem.hands.forEach((hand) => {
-      const points = joint_positions(problem, q, hand);
-      this.line(points, unit * (chosen === hand && problem.hands.length > 1 ? 2.1 : 1.5));
-      if (!joints) return;
-      points.map((point) => this.toScreen(point)).forEach(([x, y], k) => {
-        const r = unit * (k === points.length - 1 ? 1.9 : 1.3);
-        context.fillStyle = hand === LEFT ? this.colour("page") : colour;
-        context.lineWidth = unit * 0.7;
+      const places = joint_positions(problem, q, hand);
+      if (thin) {
+        this.line(places, 1);
+        return;
+      }
+      const points = places.map((point) => this.toScreen(point));
+      const wide = unit * (chosen === hand && problem.hands.length > 1 ? 1.25 : 1);
+      const radius = (k) => wide * (2.6 - (1.5 * k) / (points.length - 1));
+      context.fillStyle = colour;
+      context.beginPath();
+      points.slice(1).forEach((to, k) => {
+        const from = points[k];
+        const way = Math.atan2(to[1] - from[1], to[0] - from[0]);
+        context.moveTo(from[0] - radius(k) * Math.sin(way), from[1] + radius(k) * Math.cos(way));
+        context.arc(...from, radius(k), way + Math.PI / 2, way + 1.5 * Math.PI);
+        context.arc(...to, radius(k + 1), way - Math.PI / 2, way + Math.PI / 2);
+        context.closePath();
+      });
+      context.fill();
+      context.fillStyle = this.colour("page");
+      points.slice(0, -1).forEach(([x, y], k) => {
+        const r = 0.45 * radius(k);
         context.beginPath();
         if (hand === LEFT) context.rect(x - r, y - r, 2 * r, 2 * r);
         else context.arc(x, y, r, 0, 7);
         context.fill();
-        context.stroke();
       });
     });
     context.globalAlpha = 1;
   }
 
-  trail(points, colour, dashed) {
+  trail(points, colour, alpha, dashed) {
     this.context.strokeStyle = colour;
-    this.context.globalAlpha = 0.45;
-    this.line(points, 1.4, dashed ? [5, 4] : []);
+    this.context.globalAlpha = alpha;
+    this.line(points, 2, dashed ? [5, 4] : []);
     this.context.globalAlpha = 1;
   }
 
@@ -127,16 +155,13 @@ class Picture {
     }
     context.beginPath();
     context.arc(px, py, r, 0, 7);
-    context.fillStyle = hit ? this.colour("hit") : this.colour("page");
+    context.fillStyle = hit ? colour : this.colour("page");
     context.fill();
     context.strokeStyle = colour;
     context.lineWidth = 2;
     context.stroke();
     context.fillStyle = colour;
-    context.font = "600 15px system-ui, sans-serif";
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.fillText(label, px + r + 11, py - r - 6);
+    this.text(label, [px + r + 11, py - r - 6], colour, "center", 15, 600);
   }
 
   text(words, [x, y], colour, align = "left", size = 13, weight = 400) {

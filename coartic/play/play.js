@@ -2,24 +2,31 @@
 /* The page on which goals are moved and the robot answers. `Play` is one such figure; its data come
    from coartic/play/page.py, or from a report, which has runs of its own to show. */
 
-const SEEDS = 5;
+const SEEDS = 5; // of which runs two robots are seen
 const TRIALS = 10000; // of a run
 const PACE = 90; // ticks a second
 const HOLD_S = 0.9; // at a hit
 const MOST_GOALS = 6;
-const FAR = 12; // length units: no goal is moved farther
+const FAR = 12; // length units: no goal lies farther
+const STRIDE = 2; // length units, to a new goal
 const ROLES = ["first", "second"];
 const NAMES = {
   alone: "one goal at a time", learner: "the learner", "cma-es": "evolution (CMA-ES)", plan: "the planner", you: "you",
 };
+const LEARNS = ["learner", "cma-es"];
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => count.toLocaleString("en").replace(",", "\u202f");
+const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
+const capital = (words) => words[0].toUpperCase() + words.slice(1);
+const within = (place) => place.map((value) => Math.round(100 * Math.max(-FAR, Math.min(FAR, value))) / 100);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/* What the reader has chosen; all of it is in the link. */
+/* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first. `told`
+   has the place from which a goal has just moved. Of `own` postures, each with its hand, one without joints is left to
+   the robot. Before tick 0 the robots stand where they hit the goal they share. */
 const AT_FIRST = {
-  preset: 0, who: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null, others: null, trials: 0, tick: 0,
-  own: null, edited: 1,
+  open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null,
+  others: null, told: null, trials: 0, tick: -1, own: null, edited: 1,
 };
 
 /* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
@@ -46,17 +53,8 @@ function read(link, first) {
 class Mover {
   constructor(problem, trial, role) {
     const { rows, hits } = trajectory(problem, trial);
-    Object.assign(this, { problem, trial, role, rows, hits });
-  }
-
-  get last() {
-    return this.rows.length - 1;
-  }
-
-  trail(hand, row) {
-    this.trails = this.trails || {};
-    this.trails[hand] = this.trails[hand] || this.rows.map((q) => joint_positions(this.problem, q, hand).at(-1));
-    return this.trails[hand].slice(0, row + 1);
+    const trails = Object.fromEntries(problem.hands.map((hand) => [hand, rows.map((q) => joint_positions(problem, q, hand).at(-1))]));
+    Object.assign(this, { problem, trial, role, rows, hits, trails, last: rows.length - 1 });
   }
 
   seen() {
@@ -81,17 +79,15 @@ class Play {
     this.worker.onmessage = ({ data: message }) => this.hear(message);
     this.fresh = new Set(); // what answers the present question
     root.classList.add("live");
-    this.restore(saved);
-    // Until somebody does something: it plays as soon as it is seen, or, where less motion is asked for, stands at a hit.
-    this.waits = !this.state.tick && this.state.who !== "you";
+    // Until somebody does something it plays as soon as it has learned and is seen, unless less motion is asked for.
     ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
-    this.answer();
+    this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
     new MutationObserver(() => this.refresh()).observe(document.body, { attributeFilter: ["data-theme"] }); // of the site
     new IntersectionObserver((entries) => {
       this.inSight = entries.at(-1).isIntersecting;
-      if (this.inSight && this.waits && !this.calm.matches) this.play();
+      this.refresh();
     }, { threshold: 0.3 }).observe(this.find("stage"));
   }
 
@@ -103,11 +99,30 @@ class Play {
 
   /* The tasks in view, one or two, which share the start and the first goal. */
   get tasks() {
-    const { task } = this.preset;
     const { goals, others } = this.state;
-    return [goals, ...(others ? [[goals[0], ...others]] : [])].map((each) => ({
-      ...task, goals: each, initial_hands: task.initial_hands.length === each.length ? task.initial_hands : "best-of-all",
-    }));
+    return [goals, ...(others ? [[goals[0], ...others]] : [])].map((each) => this.taskWith(each));
+  }
+
+  taskWith(goals) {
+    const { task } = this.preset;
+    return { ...task, goals, initial_hands: task.initial_hands.length === goals.length ? task.initial_hands : "best-of-all" };
+  }
+
+  /* Who moves a robot. */
+  by(k) {
+    return k && this.state.who === "you" ? this.state.mate : this.state.who;
+  }
+
+  /* The goal that the button moves, from 0: the third, or the last of fewer. */
+  get moved() {
+    return Math.min(2, this.state.goals.length - 1);
+  }
+
+  /* Where a goal has just moved: its number, and the task as it was. */
+  get told() {
+    const { who, told, goals, others } = this.state;
+    if (!told || others || who !== "learner" || !this.moved) return null;
+    return { goal: this.moved, task: this.taskWith(goals.with(this.moved, told[0])) };
   }
 
   /* Runs of a results folder, as long as nobody has changed the task. */
@@ -118,25 +133,23 @@ class Play {
     return run && kept ? run : null;
   }
 
-  get rules() {
-    const { reward, explores, who } = this.state;
-    if (who === "cma-es") return "cma-es";
+  rules(who) {
+    const { reward, explores } = this.state;
+    if (who === "cma-es") return who;
     const two = this.problems[0].hands.length > 1;
     const rules = two ? CONDITIONS[explores] || CONDITIONS.EC4 : { ...CONDITIONS.EC1, hands: this.problems[0].hands };
     return reward === "movement" ? { ...rules, credit: "subtask" } : rules;
   }
 
-  /* Goals, robot or method have changed: the fast answer at once, the others from the worker. After
-     `told`, a goal has moved and the learner makes its next trial beside the planner. */
-  ask(told = null) {
-    this.told = told;
-    if (!(this.state.who in NAMES || this.stored(this.state.who))) {
-      this.state.who = "learner";
-      this.showControls();
-    }
+  /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
+  ask() {
+    const { state } = this;
+    const known = (who) => (who in NAMES || this.stored(who) ? who : "learner");
+    [state.who, state.mate] = [known(state.who), known(state.mate === "you" ? "learner" : state.mate)];
     this.problems = this.tasks.map((task) => problem_of(task));
     this.alone = this.problems.map((problem) => corrective_trial(problem, initial_hands(problem)));
     this.stale = true;
+    this.showControls();
     this.send();
     this.answer();
   }
@@ -144,38 +157,41 @@ class Play {
   send() {
     if (this.busy && this.held) return;
     this.stale = false;
-    this.busy = true;
     this.order += 1;
-    this.fresh = new Set();
-    const { who } = this.state;
-    const learns = who === "learner" || who === "cma-es";
+    const { told } = this;
     const jobs = [];
+    const order = (key, task, job) => jobs.push({ key, task, trials: 1, turn: 1, ...job });
     this.tasks.forEach((task, k) => {
-      if (!this.alone[k].going) return; // a goal is out of reach
-      if (learns && !this.stored(who) && !this.told) {
-        const seeds = this.state.others ? SEEDS : 1;
-        for (let seed = 0; seed < seeds; seed += 1) {
-          jobs.push({ key: `${k} run ${seed}`, task, rules: this.rules, seed, trials: TRIALS, turn: seed && seed + 1 });
-        }
+      const who = this.by(k);
+      if (!this.alone[k].going || this.stored(who)) return; // or a goal is out of reach
+      const seeds = this.state.others && this.state.who !== "you" ? SEEDS : 1;
+      for (let seed = 0; LEARNS.includes(who) && seed < seeds; seed += 1) {
+        order(`${k} run ${seed}`, told ? told.task : task, { rules: this.rules(who), seed, trials: TRIALS, turn: seed && seed + 1 });
       }
-      if (who === "plan") jobs.push({ key: `${k} plan`, task, horizon: this.state.ahead, trials: 1 });
-      else if (!this.stored(who)) jobs.push({ key: `${k} far`, task, horizon: MOST_GOALS, trials: 1, turn: 1 });
+      if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
+      else order(`${k} far`, task, { horizon: MOST_GOALS });
     });
-    this.asked = jobs.length;
-    if (!jobs.length) this.busy = false;
-    this.worker.postMessage({ order: this.order, jobs });
+    if (told) order("0 before", told.task, { horizon: MOST_GOALS });
+    this.asked = new Map(jobs.map((job) => [job.key, JSON.stringify(job)]));
+    // What is known need not be found again.
+    this.fresh = new Set([...this.asked.keys()].filter((key) => {
+      const { done, job } = this.results.get(key) || {};
+      return done && job === this.asked.get(key);
+    }));
+    const left = jobs.filter(({ key }) => !this.fresh.has(key));
+    this.busy = left.length > 0;
+    this.worker.postMessage({ order: this.order, jobs: left });
   }
 
   hear({ order, reports }) {
     if (order !== this.order) return;
     this.busy = false;
-    reports.forEach(({ key, made, done, snapshots, rewards }) => {
+    reports.forEach(({ key, made, done, snapshots }) => {
       // The answer to an earlier question stands until there is one to this.
-      if (!this.fresh.has(key)) this.results.set(key, { snapshots: [], rewards: [], made: 0 });
+      if (!this.fresh.has(key)) this.results.set(key, { snapshots: [], job: this.asked.get(key) });
       this.fresh.add(key);
       const result = this.results.get(key);
       result.snapshots.push(...snapshots);
-      for (let k = 0; k < rewards.length; k += 1) result.rewards.push(rewards[k]);
       Object.assign(result, { made, done });
     });
     this.answer();
@@ -194,10 +210,13 @@ class Play {
 
   /* The solution of a task, as movements; null while there is none. */
   solution(k) {
-    const { who } = this.state;
+    const who = this.by(k);
     const stored = this.stored(who);
     if (stored) return stored.films[k].movements;
-    if (who === "you") return this.own.map(({ hand, q }, goal) => ({ goal, hand, kind: "learned", target: q }));
+    if (who === "you") {
+      return this.own.map(([hand, ...q], goal) => (q.length
+        ? { goal, hand, kind: "learned", target: Float64Array.from(q) } : { goal, hand, kind: "corrective", target: null }));
+    }
     const found = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
     return who === "alone" || !found ? null : found.movements;
   }
@@ -211,13 +230,9 @@ class Play {
       return new Mover(problem, trial, ROLES[k]);
     });
     const planned = this.told && this.fresh.has("0 far") && this.snapshot("0 far", Infinity);
-    if (planned) {
-      this.movers.push(new Mover(this.problems[0], execute(this.problems[0], planned.movements), "second"));
-      this.state.tick = this.meeting;
-    }
+    if (planned) this.movers.push(new Mover(this.problems[0], execute(this.problems[0], planned.movements), "second"));
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
-    if (this.waits && this.calm.matches) this.state.tick = this.stops[0] || 0;
     this.plan = this.problems.map((_, k) => (this.stale || !this.fresh.has(`${k} far`) ? null : this.snapshot(`${k} far`, Infinity)));
     this.refresh();
   }
@@ -236,7 +251,13 @@ class Play {
     return this.main.length > 1 ? Math.max(...this.main.map((mover) => mover.hits[this.shared] || 0)) : 0;
   }
 
-  row(mover, tick) {
+  get tick() {
+    const { tick } = this.state;
+    return tick < 0 ? this.meeting || this.stops[0] || 0 : Math.min(tick, this.last);
+  }
+
+  row(mover) {
+    const { tick } = this;
     if (this.main.length < 2) return Math.min(tick, mover.last);
     const hit = mover.hits[this.shared] || 0;
     return tick <= this.meeting ? Math.min(tick, hit) : Math.min(hit + tick - this.meeting, mover.last);
@@ -257,7 +278,7 @@ class Play {
   play() {
     if (this.playing) return;
     this.playing = true;
-    if (this.state.tick >= this.last) this.state.tick = 0;
+    if (this.state.tick < 0 || this.state.tick >= this.last) this.state.tick = 0;
     let [at, before, held] = [this.state.tick, null, 0];
     const frame = (time) => {
       if (!this.playing) return;
@@ -284,12 +305,6 @@ class Play {
     this.refresh();
   }
 
-  pause() {
-    this.playing = false;
-    this.refresh();
-    this.keep();
-  }
-
   /* ---- Pictures ---- */
 
   /* Draw soon, once for all that has changed. */
@@ -309,44 +324,46 @@ class Play {
     colours.ghost = colours.dim;
     this.colours = colours;
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
-    if (!this.box || !this.held) this.box = around(points, 0.9);
+    if (!this.box || !this.held) this.box = around(points, 0.7);
     if (!this.held) this.glide(); // the place under the pointer stays
     stage.begin(this.view);
-    stage.grid(colours.line);
-    const tick = Math.min(state.tick, this.last);
+    stage.grid(colours.line, colours.soft);
+    const [{ free, start, robot }] = this.problems;
+    if (free[0] !== free[1]) stage.rail(start, robot.base_size[1] / 2, free[0], colours.line);
     if (!this.editing) this.movers.forEach((mover) => {
-      const row = this.row(mover, tick);
-      mover.problem.hands.forEach((hand) => stage.trail(mover.trail(hand, row), colours[mover.role], hand === LEFT));
+      const row = this.row(mover);
+      mover.problem.hands.forEach((hand) => [[mover.last, 0.15], [row, 0.5]].forEach(([to, alpha]) => (
+        stage.trail(mover.trails[hand].slice(0, to + 1), colours[mover.role], alpha, hand === LEFT))));
     });
     this.problems.forEach((problem, k) => problem.goals.forEach((goal, g) => {
       if (k && !g) return;
       const mover = this.main[k];
       stage.goal(goal, problem.radius, {
         label: `${g + 1}`, movable: !this.editing, held: this.held && this.held.name === `${k} ${g}`,
-        colour: this.problems.length > 1 && g ? colours[ROLES[k]] : colours.ink,
-        hit: mover.hits[g] !== undefined && mover.hits[g] <= this.row(mover, tick),
+        colour: this.problems.length > 1 && !g ? colours.ink : colours[ROLES[k]],
+        hit: mover.hits[g] !== undefined && mover.hits[g] <= this.row(mover),
       });
     }));
+    const stands = (mover, look) => stage.robot(mover.problem, mover.rows[mover.hits[this.shared] || 0], { colour: colours[mover.role], ...look });
     if (this.editing) {
-      this.own.forEach(({ q }, g) => stage.robot(this.problems[0], q, {
-        colour: colours.first, alpha: g === this.state.edited - 1 ? 1 : 0.2, weight: g === this.state.edited - 1 ? 1 : 0.8,
+      this.main.slice(1).forEach((mover) => stands(mover, { alpha: 0.5 }));
+      this.postures.forEach(({ q }, g) => stage.robot(this.problems[0], q, {
+        colour: colours.first, alpha: g === state.edited - 1 ? 1 : 0.2, weight: g === state.edited - 1 ? 1 : 0.8,
       }));
     } else {
-      if (this.meeting && tick > this.meeting) {
-        this.main.forEach((mover) => stage.robot(mover.problem, mover.rows[mover.hits[this.shared] || 0], { colour: colours[mover.role], alpha: 0.25, weight: 0.9 }));
-      }
+      if (this.meeting && this.tick > this.meeting) this.main.forEach((mover) => stands(mover, { alpha: 0.2, weight: 0.9 }));
       this.movers.forEach((mover) => {
-        const row = this.row(mover, tick);
+        const row = this.row(mover);
         const hit = mover.hits.filter((at) => at < row).length;
         stage.robot(mover.problem, mover.rows[row], {
           colour: colours[mover.role], chosen: mover.trial.hands[Math.min(hit, mover.trial.hands.length - 1)],
-          alpha: mover.role === "ghost" ? 0.55 : 1, weight: mover.role === "ghost" ? 0.8 : 1,
+          alpha: mover.role === "ghost" ? 0.5 : 0.9, weight: mover.role === "ghost" ? 0.8 : 1,
         });
       });
     }
     this.place();
-    this.drawInset();
-    this.drawCurve();
+    this.compare();
+    if (this.state.open) this.drawCurve();
   }
 
   /* The view follows the box in a few frames. */
@@ -359,52 +376,57 @@ class Play {
     }
   }
 
-  /* Postures in which the shared goal is hit: of each run thin, their mean thick. */
-  postures() {
-    if (this.main.length < 2) return null;
-    const { who } = this.state;
-    if (this.told) return this.main.map((mover, k) => ({ runs: [this.told.before[k]], mean: mover.trial.reached[this.shared] }));
-    return this.main.map((mover, k) => {
-      const stored = this.stored(who);
-      const runs = stored ? [...stored.films[k].reached] : [];
-      for (let seed = 0; !stored && (who === "learner" || who === "cma-es") && seed < SEEDS; seed += 1) {
-        const found = this.snapshot(`${k} run ${seed}`);
-        const complete = this.fresh.has(`${k} run ${seed}`) && (this.results.get(`${k} run ${seed}`).done || found.trials >= this.shown);
-        if (seed && found && complete) runs.push(found.reached[0]);
-        if (!seed && mover.trial.reached.length) runs.push(mover.trial.reached[0]);
+  /* Postures in which the robots hit the shared goal: of each run, and their mean. */
+  get runs() {
+    const { told, shared } = this;
+    return this.main.map(({ trial }, k) => {
+      const who = this.by(k);
+      let runs = [trial.reached[shared]];
+      if (told) runs = [this.snapshot("0 run 0"), this.snapshot("0 before", Infinity)].slice(k, k + 1).map((each) => each && each.reached[shared]);
+      else if (this.stored(who)) runs = this.stored(who).films[k].reached;
+      else if (LEARNS.includes(who)) {
+        for (let seed = 1; seed < SEEDS; seed += 1) {
+          const found = this.fresh.has(`${k} run ${seed}`) && this.snapshot(`${k} run ${seed}`);
+          if (found && (found.trials >= this.shown || this.results.get(`${k} run ${seed}`).done)) runs.push(found.reached[0]);
+        }
       }
-      if (!runs.length && mover.trial.reached.length) runs.push(mover.trial.reached[0]);
-      const mean = runs.length ? runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length) : null;
+      runs = runs.filter(Boolean);
+      const mean = told ? trial.reached[shared] : runs.length && runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length);
       return { runs, mean };
     });
   }
 
-  drawInset() {
-    const both = this.postures();
-    const box = this.find("together");
-    box.hidden = !both || !both.every(({ mean }) => mean);
+  /* How far apart the robots hit the goal they share, in words and as a picture. */
+  compare() {
+    const both = this.main.length > 1 ? this.runs : [];
+    this.find("together").hidden = !both.length || !both.every(({ runs, mean }) => runs.length && mean);
     this.difference = null;
-    if (box.hidden) return;
-    const { inset, colours } = this;
-    const [problem] = this.problems;
-    const points = both.flatMap(({ runs, mean }) => [...runs, mean].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
-    inset.begin(around([...points, ...both.map(({ mean }) => [mean[0] - 0.5, mean[1] - 0.1])], 0.25));
-    both.forEach(({ runs, mean }, k) => {
-      runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, weight: 0.35, joints: false }));
-      inset.robot(problem, mean, { colour: colours[ROLES[k]], weight: 1 });
-    });
-    inset.goal(problem.goals[this.shared], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
+    if (this.find("together").hidden) return;
     const distance = apart(both[0].mean, both[1].mean);
     const [n, m] = both.map(({ runs }) => runs.length);
     const squares = both.reduce((sum, { runs, mean }) => sum + runs.reduce((part, q) => part + apart(q, mean) ** 2, 0), 0);
     const spread = n > 1 && m > 1 ? Math.sqrt(squares / (n + m - 2)) : 0;
-    this.difference = { distance, n, m, spreads: spread ? distance / spread : null, chance: Math.sqrt(1 / n + 1 / m) };
+    this.difference = {
+      distance, runs: Math.min(n, m), spreads: spread ? distance / spread : null, chance: Math.sqrt(1 / n + 1 / m),
+      shifts: both.map(({ runs: [before], mean }) => apart(mean, before)),
+    };
+    if (!this.state.open) return;
+    const { inset, colours, problems: [problem] } = this;
+    const points = both.flatMap(({ runs, mean }) => [...runs, mean].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
+    inset.begin(around([...points, ...both.map(({ mean }) => [mean[0] - 0.5, mean[1] - 0.1])], 0.4));
+    const thin = this.told ? " Thin: before the goal moved." : n > 1 || m > 1 ? " Thin: single runs; thick: their mean." : "";
+    this.find("enlarged").textContent = `At goal ${this.shared + 1}, enlarged.${thin}`;
+    both.forEach(({ runs, mean }, k) => {
+      runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
+      inset.robot(problem, mean, { colour: colours[ROLES[k]], alpha: 0.9 });
+    });
+    inset.goal(problem.goals[this.shared], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
   }
 
-  /* Ticks needed against trials, on a logarithmic scale: what was learned, and the range of what was tried. */
+  /* Ticks needed against trials, on a logarithmic scale. */
   drawCurve() {
     const { curve, colours } = this;
-    const learns = ["learner", "cma-es"].includes(this.state.who) && !this.stored(this.state.who) && !this.told;
+    const learns = LEARNS.includes(this.state.who) && !this.told;
     this.find("learning").hidden = !learns;
     if (!learns) return;
     const runs = this.problems.map((_, k) => this.results.get(`${k} run 0`)).filter(Boolean);
@@ -428,125 +450,117 @@ class Play {
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
       curve.text(`${ticks}`, [left - 5, y(ticks)], colours.soft, "right", 12);
     }
-    context.save();
-    context.beginPath();
-    context.rect(left, top, right - left, bottom - top);
-    context.clip();
     this.problems.forEach((_, k) => {
-      const colour = colours[ROLES[k]];
-      const run = this.results.get(`${k} run 0`);
-      context.strokeStyle = colour;
-      const level = (ticks, dash) => {
-        if (!Number.isFinite(ticks)) return;
-        context.setLineDash(dash);
-        context.lineWidth = 1.2;
-        context.beginPath();
-        context.moveTo(left, y(ticks));
-        context.lineTo(right, y(ticks));
-        context.stroke();
-        context.setLineDash([]);
-      };
-      level(-this.alone[k].reward, [2, 4]);
-      if (this.plan[k]) level(-this.plan[k].reward, [8, 4]);
-      if (!run) return;
-      // Each column of the picture has the range of its trials.
-      context.globalAlpha = 0.15;
-      let [column, least, most] = [-1, Infinity, -Infinity];
-      run.rewards.forEach((reward, trial) => {
-        const now = Math.floor(x(trial + 1));
-        if (now !== column) {
-          if (most > -Infinity) context.fillRect(column, y(most), 1.2, Math.max(1, y(least) - y(most)));
-          [column, least, most] = [now, Infinity, -Infinity];
-          context.fillStyle = colour;
-        }
-        if (Number.isFinite(reward)) [least, most] = [Math.min(least, -reward), Math.max(most, -reward)];
-      });
-      context.globalAlpha = 1;
-      context.lineWidth = 2.5;
-      context.beginPath();
-      run.snapshots.forEach(({ trials, reward }, i) => {
-        if (i) context.lineTo(x(trials), y(-run.snapshots[i - 1].reward));
-        context[i ? "lineTo" : "moveTo"](x(trials), y(-reward));
-      });
-      context.stroke();
+      const level = (reward, dash) => { if (Number.isFinite(reward)) curve.path([[left, y(-reward)], [right, y(-reward)]], 1.2, dash); };
+      const { snapshots = [] } = this.results.get(`${k} run 0`) || {};
+      context.strokeStyle = colours[ROLES[k]];
+      level(this.alone[k].reward, [2, 4]);
+      level(this.plan[k] && this.plan[k].reward, [8, 4]);
+      curve.path(snapshots.flatMap(({ trials, reward }, i) => [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)])), 2.5);
     });
     const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
     context.fillRect(x(at) - 0.75, top, 1.5, bottom - top);
-    context.restore();
   }
 
   /* ---- Words ---- */
 
-  say() {
-    const { state, main } = this;
-    const ticks = (trial) => (trial.going ? `${-trial.reward}` : "–");
-    const words = (parts) => parts.filter(Boolean).join(" ");
-    const run = this.results.get("0 run 0");
-    const learns = ["learner", "cma-es"].includes(state.who) && !this.stored(state.who);
-    const at = Math.min(this.shown, run ? run.made : 0);
-    const missed = main.findIndex((mover) => !mover.trial.going);
-    this.find("score").replaceChildren();
-    const score = (role, name, value) => {
-      const line = document.createElement("span");
-      line.className = role;
-      line.textContent = `${name} `;
-      const figure = document.createElement("strong");
-      figure.textContent = `${value} ticks`;
-      line.append(figure);
-      this.find("score").append(line);
-    };
-    const name = this.stored(state.who) ? this.stored(state.who).name : NAMES[state.who];
-    const pair = this.told ? ["The learner's next trial", "The planner"] : ["Blue", "Orange"];
-    if (main.length > 1) main.forEach((mover, k) => score(mover.role, pair[k], ticks(mover.trial)));
-    else {
-      score("first", name[0].toUpperCase() + name.slice(1), ticks(main[0].trial));
-      if (state.who !== "alone") score("ghost", "One goal at a time", ticks(this.alone[0]));
-      if (this.plan[0] && state.who !== "plan") score("plan", "Planner that sees all goals", ticks({ going: Number.isFinite(this.plan[0].reward), ...this.plan[0] }));
+  /* What is to be seen, of one robot or of two. */
+  get lead() {
+    const { who } = this.state;
+    const [{ free, goals, hands }] = this.problems;
+    const two = this.main.length > 1;
+    const box = ["The box stands", "The box slides on its rail", "The box slides"][free.filter(Boolean).length];
+    let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
+    if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
+    if (this.told) seen = `goal ${this.told.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
+    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.`;
+    return `${capital(this.nameOf(who))}: ${seen} ${box}, the joints turn.${this.editing ? "" : " Goals can be dragged."}`;
+  }
+
+  nameOf(who) {
+    return (this.stored(who) || { name: NAMES[who] }).name;
+  }
+
+  /* What comes out, and what its words mean. */
+  get finding() {
+    const { state, main, told, difference } = this;
+    const missed = main.find((mover) => !mover.trial.going);
+    if (missed) return [`Goal ${missed.trial.reached.length + 1} is out of the robot's reach.`];
+    const far = "Distances are of box and joints together, in length units and radians.";
+    if (told) {
+      const [learner, planner] = difference && main.length > 1 ? difference.shifts.map(short) : ["…", "…"];
+      return [`At goal ${told.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, far];
     }
-    let finding = "";
-    if (missed >= 0) finding = `Goal ${main[missed].trial.reached.length + 1} is out of the robot's reach.`;
-    else if (this.told) {
-      const [learner, planner] = main.map((mover, k) => short(apart(mover.trial.reached[this.shared], this.told.before[k])));
-      finding = `Goal ${this.told.goal + 1} has moved. At goal ${this.told.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner || "…"}.`;
-    } else if (main.length < 2 && state.who !== "alone") {
+    if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
+    if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
-      finding = `${Math.abs(saved)} tick${Math.abs(saved) === 1 ? "" : "s"} ${saved < 0 ? "more" : "fewer"} than one goal at a time.`;
-      if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) finding = "You are as fast as the planner!";
-    } else if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) {
-      finding = "They hit goal 1 with different hands.";
-    } else if (this.difference) {
-      const { spreads, distance, n, m, chance } = this.difference;
-      if (spreads === null) {
-        finding = distance < 0.005 ? "At goal 1 the two robots stand alike." : `At goal 1 their postures lie ${short(distance)} apart.`;
-      } else {
-        finding = `At goal 1 their postures lie ${spreads.toFixed(1)} standard deviations apart (${Math.min(n, m)} runs each; by chance: about ${chance.toFixed(1)}).`;
-      }
+      return [`${saved ? counted(Math.abs(saved), "tick") : "No tick"} ${saved < 0 ? "more" : "fewer"} than one goal at a time.`];
     }
-    this.find("finding").textContent = finding;
-    const progress = learns ? `${grouped(at)} trials` : "";
-    this.find("progress").textContent = progress;
-    if (state.who === "you") this.find("hand").value = this.own[state.edited - 1].hand;
-    this.find("told").disabled = !this.moved || !this.snapshot("0 run 0") || !this.snapshot("0 far", Infinity);
-    const slider = this.find("trials");
-    slider.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
-    slider.setAttribute("aria-valuetext", progress);
+    if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
+    if (!difference) return [""];
+    const { spreads, distance, runs, chance } = difference;
+    if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
+    if (spreads === null) return [`At goal 1 the robots' postures lie ${short(distance)} apart.`, far];
+    return [
+      `At goal 1 the robots' postures lie ${spreads.toFixed(1)} standard deviations apart.`,
+      `One standard deviation is how far single runs lie from their mean (${runs} runs each). By chance: about ${chance.toFixed(1)}.`,
+    ];
+  }
+
+  /* Who needs how many ticks: role, name, trial. */
+  get scores() {
+    const { state, main } = this;
+    if (main.length > 1 && state.who !== "you") {
+      const names = this.told ? ["The learner's next trial", "The planner"] : ["Blue", "Orange"];
+      return main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
+    }
+    const scores = [["first", capital(this.nameOf(state.who)), main[0].trial.reward]];
+    if (state.who !== "alone") scores.push(["ghost", "One goal at a time", this.alone[0].reward]);
+    if (this.plan[0] && state.who !== "plan") scores.push(["plan", "Planner that sees all goals", this.plan[0].reward]);
+    return scores;
+  }
+
+  say() {
+    const { state } = this;
+    const learns = LEARNS.includes(state.who);
+    const run = this.results.get("0 run 0");
+    const at = learns && run ? Math.min(this.shown, run.made) : 0;
+    const write = (name, words) => { this.find(name).textContent = words; };
+    const [finding, meaning = ""] = this.finding;
+    const scores = this.scores.map(([role, name, reward]) => {
+      const line = document.createElement("span");
+      const figure = document.createElement("strong");
+      line.className = role;
+      figure.textContent = Number.isFinite(reward) ? counted(-reward, "tick") : "no end";
+      line.append(`${name} `, figure);
+      return line;
+    });
+    this.find("score").replaceChildren(...scores);
+    write("lead", this.lead);
+    write("finding", finding);
+    write("meaning", meaning);
+    write("progress", learns ? counted(at, "trial") : "");
+    write("count", `${this.tick + 1} of ${this.last + 1} ticks`);
+    write("play", this.playing ? "Pause" : "Play");
+    if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
+    this.find("practice").hidden = !learns;
+    const trials = this.find("trials");
+    trials.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
+    trials.setAttribute("aria-valuetext", counted(at, "trial"));
     const tick = this.find("tick");
     tick.max = this.last;
-    tick.value = state.tick;
-    tick.setAttribute("aria-valuetext", `tick ${state.tick + 1} of ${this.last + 1}`);
-    this.find("count").textContent = `${state.tick + 1} of ${this.last + 1} ticks`;
-    this.find("play").textContent = this.playing ? "Pause" : "Play";
-    this.find("stage").setAttribute("aria-label", words([
-      `${main.length > 1 ? "Two robots" : "A robot"} and ${this.problems[0].goals.length} goals; ${name}.`, finding,
-    ]));
-    const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked;
+    tick.value = this.tick;
+    tick.setAttribute("aria-valuetext", `tick ${this.tick + 1} of ${this.last + 1}`);
+    this.find("stage").setAttribute("aria-label", `${this.lead} ${finding}`);
+    const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked.size;
     this.root.toggleAttribute("data-settled", !open);
-    const spoken = words([...this.find("score").children].map((line) => `${line.textContent};`).concat(finding));
+    const spoken = [...scores.map((line) => `${line.textContent};`), finding].join(" ");
     if (!this.playing && !open && !this.held && spoken !== this.spoken) {
-      this.find("status").textContent = spoken;
+      write("status", spoken);
       this.spoken = spoken;
     }
+    if (!open && this.waits && this.inSight && !this.calm.matches) this.play();
   }
 
   /* ---- Handles ---- */
@@ -555,12 +569,11 @@ class Play {
   place() {
     const wanted = new Map();
     if (this.editing) {
-      const { q } = this.own[this.state.edited - 1];
-      wanted.set("base", { at: [q[0], q[1]], label: "Base", move: (to) => this.bend("base", to) });
+      const { hand: chosen, q } = this.postures[this.state.edited - 1];
+      wanted.set("base", { at: [q[0], q[1]], label: "Box", move: (to) => this.bend("base", to) });
       this.problems[0].hands.forEach((hand) => {
-        const chosen = hand === this.own[this.state.edited - 1].hand;
         joint_positions(this.problems[0], q, hand).forEach((at, k, all) => {
-          if (k && !(chosen && k === all.length - 1)) {
+          if (k && !(hand === chosen && k === all.length - 1)) {
             wanted.set(`${hand} ${k}`, { at, label: `${HANDS[hand]} arm, ${k === all.length - 1 ? "hand" : `elbow ${k}`}`, move: (to) => this.bend([hand, k], to) });
           }
         });
@@ -631,50 +644,46 @@ class Play {
     });
   }
 
-  /* While a goal moves, the robots stand at the goal they share. */
+  /* The robots stand at the goal they share. */
   showMeeting() {
-    if (this.main.length > 1 && !this.editing) {
-      this.playing = false;
-      this.state.tick = this.meeting;
-    }
+    if (this.main.length < 2 || this.editing) return;
+    this.playing = false;
+    this.state.tick = -1;
   }
 
-  moveGoal(k, g, [x, y]) {
-    const place = [x, y].map((value) => Math.round(100 * Math.max(-FAR, Math.min(FAR, value))) / 100);
-    if (k) this.state.others = this.state.others.map((goal, i) => (i === g - 1 ? place : goal));
-    else this.state.goals = this.state.goals.map((goal, i) => (i === g ? place : goal));
-    this.state.own = null;
+  moveGoal(k, g, to) {
+    const { state } = this;
+    if (k) state.others = state.others.with(g - 1, within(to));
+    else state.goals = state.goals.with(g, within(to));
+    Object.assign(state, { own: null, told: null });
     this.ask();
-    if (this.main.length > 1) this.state.tick = this.meeting;
   }
 
   /* ---- Postures by hand ---- */
-
-  /* The goal that the button moves, from 0: the third, or the last of fewer. */
-  get moved() {
-    return Math.min(2, this.state.goals.length - 1);
-  }
 
   get editing() {
     return this.state.who === "you" && !this.playing && !this.watching;
   }
 
-  /* One posture for each goal; at first those of one goal at a time. */
+  /* Of each goal the hand and the joints; at first only the hand. */
   get own() {
-    const [trial] = this.alone;
+    const [{ goals, hands, dof }] = this.problems;
     const { own } = this.state;
-    const [problem] = this.problems;
-    const fits = own && own.length === problem.goals.length && own.every((row) => row.length === problem.dof + 1);
-    if (fits) return own.map(([hand, ...q]) => ({ hand: problem.hands.includes(hand) ? hand : problem.hands[0], q: Float64Array.from(q) }));
-    return problem.goals.map((_, goal) => ({ hand: trial.hands[goal] || problem.hands[0], q: trial.reached[goal] || problem.start }));
+    const fits = own && own.length === goals.length && own.every((row) => row.length === 1 || row.length === dof + 1);
+    return fits ? own.map(([hand, ...q]) => [hands.includes(hand) ? hand : hands[0], ...q]) : goals.map((_, goal) => [this.alone[0].hands[goal] ?? hands[0]]);
+  }
+
+  /* The postures that you place, or in which the robot hits the goals. */
+  get postures() {
+    const { start } = this.problems[0];
+    return this.own.map(([hand, ...q], goal) => ({ hand, q: Float64Array.from(q.length ? q : this.main[0].trial.reached[goal] || start) }));
   }
 
   /* Bring a part of the robot to a place; the hand at work stays on its goal if it can. */
   bend(part, to) {
     const [problem] = this.problems;
     const goal = this.state.edited - 1;
-    const own = this.own.map((each) => ({ ...each, q: Float64Array.from(each.q) }));
-    const { hand, q } = own[goal];
+    const { hand, q } = this.postures[goal];
     const joints = (arm, from, end) => Array.from({ length: Math.max(0, end - from) }, (_, k) => arm.first + from + k);
     const mine = problem.arms[hand];
     const free = problem.free.flatMap((each, axis) => (each ? [axis] : []));
@@ -693,7 +702,8 @@ class Play {
       project(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
       if (moved === hand) settle(k);
     }
-    this.state.own = own.map((each) => [each.hand, ...Array.from(each.q, (value) => Math.round(1e4 * value) / 1e4)]);
+    this.state.own = this.own.with(goal, [hand, ...Array.from(q, (value) => Math.round(1e4 * value) / 1e4)]);
+    this.showControls();
     this.answer();
   }
 
@@ -702,21 +712,28 @@ class Play {
   listen() {
     const on = (name, kind, act) => this.find(name).addEventListener(kind, act);
     const change = (name, value) => {
-      this.state[name] = value;
-      this.showControls();
+      Object.assign(this.state, { [name]: value, told: null });
       this.ask();
       this.keep();
     };
-    on("preset", "change", (event) => {
-      const { who, reward } = this.state;
+    /* The task as it is chosen. */
+    const choose = (preset) => {
+      const { who, mate, reward, open } = this.state;
       const live = who in NAMES ? who : this.first.who;
-      this.restore(written({ ...this.first, preset: Number(event.target.value), who: live, reward }, this.first));
+      this.restore(written({ ...this.first, preset, who: live, mate, reward, open }, this.first));
+      this.keep();
+    };
+    on("preset", "change", (event) => choose(Number(event.target.value)));
+    on("reset", "click", () => choose(this.state.preset));
+    on("more", "toggle", (event) => {
+      this.state.open = Number(event.target.open);
+      this.refresh();
       this.keep();
     });
     on("who", "change", (event) => {
-      this.playing = this.playing && event.target.value !== "you";
+      const { state } = this;
       this.watching = false;
-      if (event.target.value === "you") this.state.others = null;
+      if (event.target.value === "you") [state.mate, this.playing] = [state.who, false];
       change("who", event.target.value);
     });
     on("stored", "change", (event) => { if (event.target.value) change("who", event.target.value); });
@@ -725,42 +742,31 @@ class Play {
     on("ahead", "change", (event) => change("ahead", Number(event.target.value)));
     on("two", "change", (event) => {
       const [first, ...rest] = this.state.goals;
-      if (event.target.checked && this.state.who === "you") this.state.who = "learner";
-      change("others", event.target.checked ? rest.map(([x, y]) => [x, Math.round(100 * (2 * first[1] - y)) / 100]) : null);
+      const mirrored = (list, [x, y]) => [...list, this.spot(list, [x, 2 * first[1] - y])];
+      change("others", event.target.checked ? rest.reduce(mirrored, [first]).slice(1) : null);
     });
     const count = (by) => {
-      const { goals, others } = this.state;
-      const grown = (list) => {
-        if (by < 0) return list.slice(0, -1);
-        const [a, b] = [list.at(-2) || goals[0], list.at(-1) || goals[0]];
-        const next = [b[0] + 0.6 * (b[0] - a[0]) + (a === b ? 0.8 : 0.2), b[1] + 0.6 * (b[1] - a[1]) + (a === b ? 0.8 : 0)];
-        return [...list, next.map((value) => Math.round(10 * value) / 10)];
-      };
-      if (others) this.state.others = grown(others);
-      this.state.own = null;
-      this.state.edited = 1;
-      change("goals", grown(goals));
+      const { state } = this;
+      const grown = (list) => (by < 0 ? list.slice(0, -1) : [...list, this.spot(list)]);
+      state.goals = grown(state.goals);
+      if (state.others) state.others = state.goals.length > 1 ? grown([state.goals[0], ...state.others]).slice(1) : null;
+      Object.assign(state, { own: null, edited: 1 });
+      change("goals", state.goals);
     };
     on("told", "click", () => {
-      const goal = this.moved;
-      const [learned, plan] = ["0 run 0", "0 far"].map((key) => this.snapshot(key, Infinity));
-      const [from, to] = [this.state.goals[goal - 1], this.state.goals[goal]];
+      const { moved, state } = this;
+      const [from, to] = state.goals.slice(moved - 1);
       const way = [to[0] - from[0], to[1] - from[1]];
       const length = Math.hypot(...way) || 1;
-      this.state.others = null;
-      this.state.goals = this.state.goals.with(goal, [to[0] - way[1] / length, to[1] + way[0] / length].map((value) => Math.round(100 * value) / 100));
-      this.showControls();
-      this.ask({ goal, before: [learned, plan].map(({ reached }) => reached[goal - 1]) });
+      Object.assign(state, { goals: state.goals.with(moved, within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, told: [to], tick: -1 });
+      this.playing = false;
+      this.ask();
       this.keep();
     });
-    on("more", "click", () => count(1));
+    on("add", "click", () => count(1));
     on("fewer", "click", () => count(-1));
     on("posture", "change", (event) => change("edited", Number(event.target.value)));
-    on("hand", "change", (event) => {
-      this.state.own = this.own.map(({ hand, q }, goal) => [goal === this.state.edited - 1 ? Number(event.target.value) : hand, ...q]);
-      this.bend("base", this.own[this.state.edited - 1].q);
-      this.keep();
-    });
+    on("hand", "change", (event) => change("own", this.own.with(this.state.edited - 1, [Number(event.target.value)])));
     on("trials", "input", (event) => {
       const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(TRIALS))));
       this.state.trials = trials < TRIALS ? trials : 0;
@@ -769,11 +775,13 @@ class Play {
     });
     on("trials", "change", () => this.keep());
     on("play", "click", () => {
-      this.watching = this.state.who === "you";
-      if (this.playing) {
-        this.watching = false;
-        this.pause();
-      } else this.play();
+      this.watching = this.state.who === "you" && !this.playing;
+      if (!this.playing) this.play();
+      else {
+        this.playing = false;
+        this.refresh();
+        this.keep();
+      }
     });
     on("tick", "input", (event) => {
       this.watching = true;
@@ -782,27 +790,46 @@ class Play {
       this.refresh();
     });
     on("tick", "change", () => this.keep());
-    on("png", "click", () => this.save(this.find("stage"), "coartic.png"));
-    on("record", "click", () => (this.recorder ? this.recorder.stop() : this.record()));
-    this.find("record").hidden = !(window.MediaRecorder && this.find("stage").captureStream);
+    on("png", "click", () => this.save());
     on("link", "click", () => this.copyLink());
     // A finger that drags a goal does not scroll the page.
     this.find("handles").addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   }
 
+  /* A place for one more goal of a list: the one that is wished for, or a stride from the last in some direction; in
+     reach of the robot, and apart from all other goals. */
+  spot(list, wish) {
+    const [last, before = [last[0] - 1, last[1]]] = [list.at(-1), list.at(-2)];
+    const way = Math.atan2(last[1] - before[1], last[0] - before[0]);
+    const turned = [2, -2, 3, -3, 1, -1, 4, -4, 0, 5, -5, 6].map((k) => way + (k * Math.PI) / 6);
+    const taken = [...this.state.goals, ...(this.state.others || []), ...list];
+    const places = [...(wish ? [wish] : []), ...turned.map((angle) => [last[0] + STRIDE * Math.cos(angle), last[1] + STRIDE * Math.sin(angle)])].map(within);
+    return places.find((place) => {
+      const problem = problem_of(this.taskWith([...list, place]));
+      return taken.every((goal) => Math.hypot(goal[0] - place[0], goal[1] - place[1]) >= STRIDE / 2) && corrective_trial(problem, initial_hands(problem)).going;
+    }) || places[0];
+  }
+
   /* Show what a link holds, with the goals of the preset where it has none. */
   restore(link) {
     this.state = read(link, this.first);
-    if (!this.data.presets[this.state.preset]) this.state.preset = this.first.preset;
-    const { task, others } = this.preset;
     const { state } = this;
-    if (!state.goals || !state.goals.length) state.goals = task.goals;
-    if (!state.others) state.others = others || null;
-    else if (!state.others.length) state.others = null;
+    if (!this.data.presets[state.preset]) state.preset = this.first.preset;
+    const { task, others = null } = this.preset;
+    const most = Math.max(MOST_GOALS, task.goals.length);
+    const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, most).map(within);
+    const [goals, second, told] = ["goals", "others", "told"].map(places);
+    state.goals = goals && goals.length ? goals : task.goals;
+    state.others = second ? (second.length && state.goals.length > 1 ? second : null) : others;
+    state.told = told && told.length ? told : null;
+    if (!(state.trials >= 1 && state.trials < TRIALS)) state.trials = 0;
+    [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
+    this.find("more").open = Boolean(state.open);
     this.results.clear();
     this.box = null;
     this.view = null;
-    this.showControls();
+    this.playing = false;
+    this.waits = state.tick < 0 && state.who !== "you";
     this.ask();
   }
 
@@ -816,7 +843,9 @@ class Play {
       select.replaceChildren(...options.map(([value, text]) => new Option(text, value)));
     };
     const hands = preset.task.hands.length;
-    fill("preset", this.data.presets.map(({ label }, k) => [k, label]));
+    const changed = !same([state.goals, state.others], [preset.task.goals, preset.others || null]);
+    fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
+    this.find("reset").disabled = !changed && !state.own;
     this.find("preset").value = state.preset;
     const runs = preset.runs || [];
     fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
@@ -825,31 +854,32 @@ class Play {
     this.root.querySelectorAll('[data-is="who"] input').forEach((input) => { input.checked = input.value === state.who; });
     this.root.querySelectorAll('[data-is="reward"] input').forEach((input) => { input.checked = input.value === state.reward; });
     fill("ahead", state.goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
-    state.ahead = Math.min(state.ahead, state.goals.length - 1);
+    state.ahead = Math.max(0, Math.min(Math.round(state.ahead), state.goals.length - 1));
     this.find("ahead").value = state.ahead;
     this.find("explores").value = state.explores;
     this.find("two").checked = Boolean(state.others);
     this.find("two").disabled = state.goals.length < 2;
     this.find("told").textContent = `Move goal ${this.moved + 1} now`;
-    this.find("more").disabled = state.goals.length >= MOST_GOALS;
+    this.find("told").disabled = !this.moved;
+    this.find("add").disabled = state.goals.length >= MOST_GOALS;
     this.find("fewer").disabled = state.goals.length < 2;
     this.find("for-learner").hidden = state.who !== "learner";
     this.find("for-two").hidden = state.who !== "learner" || hands < 2;
     this.find("for-plan").hidden = state.who !== "plan";
     this.find("for-you").hidden = state.who !== "you";
     fill("posture", state.goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
-    state.edited = Math.min(state.edited, state.goals.length);
+    state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
     this.find("posture").value = state.edited;
     this.find("by-hand").hidden = hands < 2;
   }
 
-  /* ---- To keep: link, picture, recording ---- */
+  /* ---- To keep: link and picture ---- */
 
   get link() {
-    const { goals, others } = this.state;
-    const { task, others: second = null } = this.preset;
+    const { state, preset: { task, others: second = null } } = this;
     return written({
-      ...this.state, goals: same(goals, task.goals) ? null : goals, others: same(others, second) ? null : others || [],
+      ...state, goals: same(state.goals, task.goals) ? null : state.goals, others: same(state.others, second) ? null : state.others || [],
+      mate: state.who === "you" ? state.mate : this.first.mate, tick: state.tick < 0 ? -1 : this.tick,
     }, this.first);
   }
 
@@ -866,57 +896,45 @@ class Play {
     this.play();
   }
 
-  note(words) {
-    this.find("note").textContent = words;
-  }
-
   async copyLink() {
     this.keep();
     const address = this.data.address(this.link);
+    let said = "The link is in the clipboard.";
     try {
       await navigator.clipboard.writeText(address);
-      this.note("The link is in the clipboard.");
     } catch {
-      this.note(`The link is ${address}`);
+      said = `The link is ${address}`;
     }
+    const file = decodeURIComponent(new URL(address).pathname.split("/").at(-1));
+    if (address.startsWith("file:")) said += ` It opens on this machine only: to share it, send ${file} as well, to whose address the part from # on is added.`;
+    this.find("note").textContent = said;
   }
 
-  save(what, name) {
-    const give = (blob) => {
+  /* The stage at twice its size, with the words beside it. */
+  save() {
+    const { stage, data, colours } = this;
+    stage.density = 2;
+    this.draw();
+    const [width, height] = stage.size;
+    const picture = new Picture(document.createElement("canvas"));
+    const { canvas, context } = picture;
+    const words = [[...this.find("score").children].map((line) => line.textContent).join("; "), ...this.finding, `${[this.find("preset").selectedOptions[0].text, this.nameOf(this.state.who), this.find("progress").textContent].filter(Boolean).join(", ")}; coartic ${data.version}`];
+    context.font = "28px system-ui, sans-serif";
+    const lines = words.flatMap((text) => text.split(" ").reduce((all, word) => {
+      const longer = all.length ? `${all.at(-1)} ${word}` : word;
+      return all.length && context.measureText(longer).width < 2 * width - 48 ? all.with(-1, longer) : [...all, word];
+    }, []));
+    Object.assign(canvas, { width: 2 * width, height: 2 * height + 40 * lines.length + 24 });
+    context.fillStyle = stage.colour("page");
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(stage.canvas, 0, 0);
+    lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
+    stage.density = 0;
+    this.draw();
+    canvas.toBlob((blob) => {
       const address = URL.createObjectURL(blob);
-      const anchor = document.createElement("a");
-      Object.assign(anchor, { href: address, download: name });
-      anchor.click();
+      Object.assign(document.createElement("a"), { href: address, download: "coartic.png" }).click();
       setTimeout(() => URL.revokeObjectURL(address), 60000);
-    };
-    if (what instanceof Blob) give(what);
-    else what.toBlob(give);
-  }
-
-  /* What the stage shows, as the browser records it. */
-  record() {
-    const parts = [];
-    const recorder = new MediaRecorder(this.find("stage").captureStream());
-    recorder.ondataavailable = ({ data }) => parts.push(data);
-    recorder.onstop = () => {
-      this.recorder = null;
-      this.find("record").textContent = "Record";
-      this.save(new Blob(parts, { type: recorder.mimeType }), `coartic.${recorder.mimeType.split(/[/;]/)[1]}`);
-      this.note("The recording is saved.");
-    };
-    let begun = false;
-    recorder.onstart = () => {
-      begun = true;
-      this.find("record").textContent = "Stop and save";
-      this.note("Recording the picture.");
-    };
-    // A recorder begins with a picture that is drawn, on a busy machine a second and many pictures later.
-    const draw = () => {
-      this.draw();
-      if (!begun) requestAnimationFrame(draw);
-    };
-    this.recorder = recorder;
-    recorder.start();
-    draw();
+    });
   }
 }

@@ -7,7 +7,7 @@ const REPORT_MS = 60;
 class Job {
   constructor({ key, task, rules, seed, horizon, trials, turn = 0 }) {
     const problem = problem_of(task);
-    Object.assign(this, { key, trials, turn, made: 0, due: 1, rewards: [], snapshots: [], done: false });
+    Object.assign(this, { key, trials, turn, made: 0, due: 1, snapshots: [], done: false });
     if (rules === "cma-es") this.method = new Search(problem, seed, trials);
     else if (rules) this.method = new Learner(problem, rules, seed);
     else this.method = { trials: 0, learned: () => receding_horizon(problem, horizon), step: () => { this.trials = 1; } };
@@ -15,8 +15,7 @@ class Job {
 
   step() {
     const { method } = this;
-    const trial = method.step();
-    if (trial) this.rewards.push(trial.reward);
+    method.step();
     this.made = method.trials || 1;
     this.done = this.made >= this.trials || method.left <= 0;
     if (this.made >= this.due || this.done) {
@@ -29,9 +28,8 @@ class Job {
   /* What is new since the last report. */
   report() {
     const { key, made, done, snapshots } = this;
-    const rewards = this.rewards.length ? this.rewards : (this.method.rewards || []).splice(0);
-    [this.snapshots, this.rewards] = [[], []];
-    return { key, made, done, snapshots, rewards: Float64Array.from(rewards) };
+    this.snapshots = [];
+    return { key, made, done, snapshots };
   }
 }
 
