@@ -135,11 +135,19 @@ def test_degenerate_samples():
 
 def test_tests_that_cannot_be_made():
     assert math.isnan(hypotheses.bootstrap_test([1.0], [2.0, 3.0]).p)
-    assert math.isnan(hypotheses.bootstrap_test([1.0, 1.0], 2.0).p)
-    assert math.isnan(hypotheses.bootstrap_test([0.1] * 3, 0.3).p)  # no mean of 0.1 is 0.1
+    assert math.isnan(hypotheses.bootstrap_test([2.0, 2.0], 2.0).p)
+    assert math.isnan(hypotheses.bootstrap_test([0.1] * 3, [0.1] * 4).p)  # no mean of 0.1 is 0.1
     assert math.isnan(hypotheses.sign_flip_test([1.0]).p)
     one_constant = hypotheses.bootstrap_test([5.0, 6, 7], [1.0] * 3)
     assert 0 < one_constant.p < 0.2
+
+
+@pytest.mark.parametrize(("alternative", "share"), [("greater", 1), ("two-sided", 2)])
+def test_without_spread_it_is_an_exact_test(alternative, share):
+    """By signs of three values, all alike; by exchange of two and three."""
+    assert hypotheses.bootstrap_test([2.0] * 3, 1.0, alternative).p == share / 8
+    assert hypotheses.bootstrap_test([2.0] * 3, [1.0] * 2, alternative).p == share / 10
+    assert hypotheses.bootstrap_test([2.0] * 3, [1.0] * 2, "less").p == 1
 
 
 @pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])

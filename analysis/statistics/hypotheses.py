@@ -55,15 +55,25 @@ def bootstrap_test(
     Unlike in the book, the p-value is (1 + resamples at least as extreme) / (1 + resamples), never
     0 (Davison & Hinkley 1997): with the default, 0.0001 is the smallest there is.
 
-    NaN with fewer than two values in a sample, or no spread in any.
+    Without spread in any sample p is that of the exact test of so many values, by signs or by
+    exchange. NaN with fewer than two values in a sample, or without spread and difference.
     """
     samples = samples_of(first, second)
     difference = float(samples[0].mean() - sum(other.mean() for other in samples[1:]))
     n = tuple(map(len, samples))
     shifted = list(map(centred, samples))
     size = max(np.abs(values).max() for values in shifted)
-    if min(n) < 2 or not size:
+    # No less is credible than an exact test of so few values could give: by signs, or by exchange.
+    tails = 2 if alternative == "two-sided" else 1
+    ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
+    least = max(tails / ways, 1 / (1 + resamples))
+    differs = abs(difference) > NEGLIGIBLE * np.abs(first).max()
+    if min(n) < 2 or not (size or differs):
         return Estimate(difference, n=n)
+    if not size:
+        as_asked = tails == 2 or (difference > 0) == (alternative == "greater")
+        p = least if as_asked else 1.0
+        return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
     observed = difference / math.sqrt(sum(values.var(ddof=1) / len(values) for values in shifted))
     rng = np.random.default_rng(SEED)
     sums, variances = np.zeros(resamples), np.zeros(resamples)
@@ -82,10 +92,6 @@ def bootstrap_test(
     extreme = null <= observed if alternative == "less" else null >= observed
     extreme |= np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)
     p = float(1 + extreme.sum()) / (1 + resamples)
-    # No less is credible than an exact test of so few values could give: by signs, or by exchange.
-    tails = 2 if alternative == "two-sided" else 1
-    ways = math.comb(sum(n), n[0]) if len(n) > 1 else 2 ** n[0]
-    least = max(tails / ways, 1 / (1 + resamples))
     return Estimate(difference, p=p, n=n, resamples=resamples, least_p=least)
 
 
