@@ -48,7 +48,7 @@ def table(
     and ``gap_high``), ``ours±`` a standard deviation (``ours_sd``), and ``on *`` stands for all
     columns that begin so. Every table ends with the ids of the runs behind each row; its
     ``attrs`` have people's names of tasks by id, for headers, and of methods that go by others in
-    this folder.
+    this folder, and whether the optimum of any task is known.
     """
 
     def as_table(rows: Callable[[Study], Rows]) -> Callable[[Study], pd.DataFrame]:
@@ -70,6 +70,7 @@ def table(
             table = rows_by_name.reindex(columns=names).rename_axis("row")
             table.attrs["tasks"] = {name: marked(task) for name, task in study.tasks.items()}
             table.attrs["methods"] = names_of_settings(study)
+            table.attrs["known"] = bool(study.optima)
             return table
 
         return frame

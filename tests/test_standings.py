@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from scipy import stats
 
 from coartic.analysis import frames
-from coartic.analysis.sections import TABLES
+from coartic.analysis.report import about
+from coartic.analysis.report.render import columns_of
+from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
 from coartic.analysis.topics import costs, ranking, scores
@@ -199,6 +202,67 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     assert test.least_p == pytest.approx(max(2 / 4**runs, 2 / (1 + RESAMPLES)))
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
+
+
+def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
+    """-293 and -480 of the learner, and -292 of the shipped optimum where one is known."""
+    mine = {("ascending", "mine"): [-300, -293], ("two-armed-1", "mine"): [-500, -490]}
+    seen = study(LEARNER | mine)
+    unknown = study_of(seen.runs.assign(commit=""), optima={})
+    ranked = TABLES["ranking"](unknown)
+    learned = (8.5 / 293, 1.5 / 480)
+    assert ranked.gap.iloc[0] == pytest.approx(sum(learned) / 2)
+    assert ranked.loc["mine", ["on ascending", "on two-armed-1"]].tolist() == pytest.approx(
+        [3.5 / 293, 15 / 480]
+    )
+    assert columns_of(ranked)["gap"].startswith("gap to the best of this folder (%)")
+    plot, sentence = FIGURES["ranking"](unknown), ranking.nearest(unknown)
+    assert "best of folder" in plot.figure.axes[0].get_xlabel()
+    assert "comes nearest to the best of this folder: 1.6 % [" in sentence
+    for words in (sentence, plot.alt, *columns_of(ranked).values()):
+        assert not re.search("optimum|known", words)
+    assert (
+        "No optimum of Ascending and Two-armed 1 † is known" in about.notes_of(unknown, ranked)[0]
+    )
+    assert TABLES["runtimes"](unknown).empty  # no targets
+    one = MadeUp(seen, optima=made_up_optima("ascending"))
+    assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
+    assert "best known reward or best of this folder" in ranking.nearest(one)
+
+
+def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
+    rewards = LEARNER | CMA | {("two-armed-2", "mine"): [-310, -308]}
+    seen = study(rewards)
+    assert scores.common_tasks(MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))) == [
+        "ascending", "two-armed-1"
+    ]  # fmt: skip
+    known = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))
+    words = "mine, not of this project, ends 0.3 % from the best of this folder on Two-armed 2 †."
+    assert words in ranking.nearest(known)
+
+
+@pytest.mark.parametrize(("runs", "better", "words"), [
+    (3, math.nan, "learner's on 2 of 2 tasks (the runs are too few, or too alike, for a test)."),
+    (10, 2, "significantly better than the learner on 2 tasks and worse on 0."),
+])  # fmt: skip
+def test_runs_without_spread_are_tested_by_their_number(runs, better, words):
+    """A plan that is run once, and the learner's runs all alike, 3 ticks behind it."""
+    tasks = ("ascending", "dual-process/EC1", -303), ("two-armed-1", "dual-process/EC4", -485)
+    learned = {(task, learner): [reward] * runs for task, learner, reward in tasks}
+    seen = study(learned | {(task, "mine"): [reward + 3] for task, _, reward in tasks})
+    seen.plan.methods["mine"] = replace(seen.plan.methods["mine"], stochastic=False)
+    row_of = TABLES["ranking"](seen).loc["mine"]
+    assert row_of.better == pytest.approx(better, nan_ok=True)
+    assert ranking.nearest(seen).endswith(words)
+
+
+def test_on_one_task_a_method_stands_beside_the_learners_reward():
+    few = {("ascending", "mine"): [-309, -301]}
+    sentence = ranking.nearest(study(TEN | few))
+    assert "mine, not of this project, ends 4.5 % away on Ascending; its mean reward is" in sentence
+    assert f"−305.0, the learner's −303.0 (p{chr(160)}=" in sentence
+    once = ranking.nearest(study(TEN | {("ascending", "mine"): [-309]}))
+    assert once.endswith("−303.0 (the runs are too few, or too alike, for a test).")
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():

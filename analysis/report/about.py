@@ -69,7 +69,14 @@ def limits(study: Study) -> dict[str, Any]:
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
     """Notes that belong to numbers of these columns."""
-    unproven, columns = limits(study)["unproven"], set(columns)
-    if not unproven or not columns & {"gap", "optimum"}:
-        return []
-    return [f"The optimum of {listed(unproven)} is not proven: it is the best known reward."]
+    unproven, unknown, columns = limits(study)["unproven"], limits(study)["unknown"], set(columns)
+    notes = []
+    if unproven and columns & {"gap", "optimum"}:
+        notes.append(
+            f"The optimum of {listed(unproven)} is not proven: it is the best known reward."
+        )
+    if unknown and "gap" in columns:
+        notes.append(
+            f"No optimum of {listed(unknown)} is known: gaps are to the best of this folder."
+        )
+    return notes

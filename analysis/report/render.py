@@ -56,6 +56,8 @@ def columns_of(frame: pd.DataFrame) -> dict[str, str]:
     for name in names:
         if not name.endswith(_COMPANIONS) and column_of(name).page:
             header = column_of(name).header or name.replace("_", " ")
+            if name == "gap" and not frame.attrs.get("known", True):
+                header = "gap to the best of this folder (%)"
             if name.startswith("on ") and name[3:] in tasks:
                 header = f"{tasks[name[3:]]} (%)"
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()

@@ -85,12 +85,15 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
 
 
 def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
-    """Cells of each method that ran on all of :func:`.scores.common_tasks`, in lists' order."""
-    tasks, compared = scores.common_tasks(study), scores.compared(study)
+    """Cells of each method on those of :func:`.scores.common_tasks` whose optimum is known, in
+    lists' order; of methods that ran on all of them."""
+    known, compared = scores.initial_and_optimum(study), scores.compared(study)
+    tasks = [task for task in scores.common_tasks(study) if task in known]
     return {
         method: [cell for task, cell in compared[method].items() if task in tasks]
         for method in in_order(compared)
-        if compared[method].keys() >= {*tasks}
+        if tasks
+        and compared[method].keys() >= {*tasks}
         and not (len(tasks) == 1 and method.startswith(TOGETHER))
     }
 

@@ -1,8 +1,9 @@
-"""Ranking: gaps of methods to the optimum over all tasks."""
+"""Ranking: gaps of methods to the optimum, or to the best of the folder, over all tasks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -87,9 +88,9 @@ def list_against_learner(study: Study) -> Rows:
 
 @table("method, knows, gap[], better, worse, on *, runs")
 def list_ranking(study: Study) -> Rows:
-    """Gap to the optimum over all tasks and on each, grouped by the use of the reward."""
+    """Gap over all tasks and on each, grouped by the use of the reward."""
     over, tested = main_gaps(study).set_index("method"), list_against_learner(study)
-    single = [t for t in scores.initial_and_optimum(study) if study.tasks[t].family is None]
+    single = [t for t in scores.best_rewards(study) if study.tasks[t].family is None]
     # Methods without a mean gap that solved every run on some task, by their gaps on the first.
     others = [
         (place, scores.cell_gap(study, cell), method)
@@ -152,49 +153,53 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
 
 
 @figure(
-    "Gap to the optimum",
-    "Gap from the mean reward to the optimum, as a share of the optimum (mean over all tasks where "
-    f"there are several), with its {style.COVERAGE} bootstrap interval over runs. Methods that "
-    "are run once have no interval. Diamonds and bold names: the paper's learner.",
+    "Gap to the best reward",
+    "Gap from the mean reward to the optimum, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs; to the best known reward where no optimum is "
+    "proven, to the best of this folder where none is known. Means over all tasks where there are "
+    "several. The axis is logarithmic from 0.1 % on. Methods that are run once have no interval. "
+    "Diamonds and bold names: the paper's learner.",
 )
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap to the optimum of every method, a mean over tasks."""
+    """Draw the gap of every method, a mean over tasks, with its name beside it."""
     rows = main_gaps(study)
     if not len(rows):
         return None
     percent = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
-    groups = [(group, percent[percent.knows == group]) for group in scores.GROUPS]
-    groups = [(group, of_group) for group, of_group in groups if len(of_group)]
-    heights = [len(of_group) + 0.8 for _, of_group in groups]
-    size = style.ONE, 0.55 + 0.165 * (len(rows) + len(groups))
-    drawing, panels = style.panels((len(groups), 1), size, sharex=True, height_ratios=heights)
-    looks = looks_in(study, rows.method)
-    for axes, (group, of_group) in zip(panels, groups, strict=True):
-        axes.set_title(capital(group.removeprefix("using the ")))
-        names = {label: name_in(study, label) for label in of_group.method}
-        style.name_rows(axes, list(names.values()))
-        for place, row in enumerate(of_group.to_dict("records")):
-            color, learner = looks[row["method"]]["color"], methods.is_learner(row["method"])
-            mark: Any = {"color": color, "clip_on": False, "markersize": 3.5}
-            end = row["gap"]
-            if not math.isnan(row["gap_low"]):
-                end = max(row["gap"], row["gap_high"])
-                ends = [row["gap_low"], row["gap_high"]]
-                axes.plot(ends, [-place, -place], color=color, linewidth=1.4)
-            (dot,) = axes.plot(row["gap"], -place, "D" if learner else "o", **mark)
-            words = interval(row, "gap", unit=" %")
-            style.tip(dot, f"{names[row['method']]}: {words}, {row['runs']} runs")
-            beside: Any = {"textcoords": "offset points", "va": "center"}
-            axes.annotate(number(row["gap"], 1), (end, -place), (5, 0), **beside)
-            if learner:
-                axes.get_yticklabels()[place].set_fontweight("bold")
-        axes.axvline(0, **style.OPTIMUM)
-    farthest = float(np.nanmax(percent[["gap", "gap_high"]]))
-    panels[-1].set_xlim(-0.02 * farthest, 1.08 * farthest)
-    first, *more = scores.common_tasks(study)
-    where = f"to {scores.optimum_in_words(study).removesuffix(' reward')}"
-    panels[-1].set_xlabel(f"gap {where if more else f'on {study.tasks[first].label}'} (%)")
-    alt = f"Gap to the optimum by method: {spoken(percent, '{method} {gap:.1f} %')}."
+    looks, line, of_groups = looks_in(study, rows.method), 0.0, percent.groupby("knows")
+    size = style.ONE, 0.45 + 0.155 * (len(rows) + 1.4 * of_groups.ngroups)
+    drawing, (axes,) = style.panels((1, 1), size)
+    style.gap_axis(axes, percent[["gap", "gap_low", "gap_high"]])
+    for group in [group for group in scores.GROUPS if group in of_groups.groups]:
+        at = axes.get_yaxis_transform()
+        axes.text(0.01, line, capital(group), color=style.GREY, va="center", transform=at)
+        for row in of_groups.get_group(group).to_dict("records"):
+            line += 1
+            learner, low, high = methods.is_learner(row["method"]), row["gap"], row["gap"]
+            look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
+            if row["gap_low"] < row["gap_high"]:
+                low, high = row["gap_low"], row["gap_high"]
+                axes.plot([low, high], [line, line], "|-", markersize=6, linewidth=1, **look)
+            mark = "D" if learner else "o"
+            (dot,) = axes.plot(row["gap"], line, mark, markersize=2.6, markeredgewidth=0, **look)
+            name, gap = name_in(study, row["method"]), number(row["gap"], 1)
+            style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
+            right = style.across(axes, high) < 1 - style.across(axes, low)  # there is more room
+            beside: Any = {"textcoords": "offset points", "va": "center_baseline"}
+            beside |= {"ha": "left"} if right else {"ha": "right"}
+            beside |= {"weight": "bold"} if learner else {}
+            text, place = (f"{gap}  {name}", (high, 6)) if right else (f"{name}  {gap}", (low, -6))
+            axes.annotate(text, (place[0], line), (place[1], 0), **beside)
+        line += 1.4
+    axes.set_ylim(line - 0.8, -0.6)
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+    tasks = scores.common_tasks(study)
+    to = scores.reference(study, tasks)
+    where = "" if len(tasks) > 1 else f"{study.tasks[tasks[0]].label}: "
+    short = to.removesuffix(" reward").replace("this ", "").replace("optimum", "the optimum")
+    axes.set_xlabel(f"{where}gap to {short} (%)")
+    alt = f"Gap to the {to} by method: {spoken(percent, '{method} {gap:.1f} %')}."
     return drawing, rows, alt, study.tasks.values()
 
 
@@ -226,7 +231,7 @@ def nearest(study: Study) -> str:
     things = "settings" if by_settings else "algorithms"
     among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
     first, away = among if len(learn) > 1 else capital(who), gap(rows.iloc[0])
-    reference = scores.optimum_in_words(study)
+    reference = scores.reference(study, scores.common_tasks(study))
     place = f"comes nearest to the {reference}: {away} away{beside}"
     place = place if following else f"ends {away} from the {reference}"  # one alone is not nearest
     text = f"{first} {place}{declared(rows.method[0])}."
@@ -249,23 +254,40 @@ def from_files(study: Study) -> str:
     """Sentences about methods that are not built in, beside the learner where it ran."""
     rows, text = list_ranking(study), ""
     rows = rows[~rows.method.map(methods.is_built_in).astype(bool)]
-    learner = any(methods.is_learner(label) for _, label in study.cells)
+    usual = scores.reference(study, scores.common_tasks(study))
     for row in rows.head(MOST_FOREIGN).to_dict("records"):
-        gap, on = row["gap"], ""
+        gap, away, on = row["gap"], "away", ""
         if math.isnan(gap):  # the mean of the tasks on which it solved every run
             there = {t: g for t in study.tasks if (g := row.get(f"on {t}", math.nan)) == g}
             if not there:
                 continue
-            gap, on = (
-                np.mean([*there.values()]),
-                f" on {listed(marked(study.tasks[t]) for t in there)}",
-            )
-        text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % away{on}"
-        if learner and math.isnan(row["better"]):
-            text += "; the runs are too few, or too alike, to tell it from the learner"
-        elif learner:
-            text += f"; against the learner it is better on {counted(int(row['better']), 'task')}"
-            text += f" and worse on {number(row['worse'])}"
-        text += "."
+            gap, to = float(np.mean([*there.values()])), scores.reference(study, there)
+            away = "away" if to == usual else f"from the {to}"
+            on = f" on {listed(marked(study.tasks[task]) for task in there)}"
+        text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % {away}{on}"
+        text += beside_learner(study, row) + "."
     more = len(rows) - MOST_FOREIGN
     return f"{text} And {more} more in the ranking." if more > 0 else text
+
+
+def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:
+    """The part of a sentence on whether a method of the ranking is better than the learner."""
+    tests = list_against_learner(study)
+    tests = tests[tests.method == row["method"]]
+    tasks, too_few = len(tests), " (the runs are too few, or too alike, for a test)"
+    tested = not math.isnan(row["better"])
+    if not tasks:
+        return ""
+    if tasks == 1:
+        reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
+        text = f"; its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
+        return text + (f" ({p_value(p)})" if tested else too_few)
+    if not tested:
+        higher = sum(tests.reward > tests.learner)
+        text = f"; its mean reward is higher than the learner's on {higher} of {tasks} tasks"
+        return text + too_few
+    if row["better"] or row["worse"]:
+        better = counted(int(row["better"]), "task")
+        worse = number(row["worse"])
+        return f"; significantly better than the learner on {better} and worse on {worse}"
+    return f"; not significantly different from the learner on any of {tasks} tasks"

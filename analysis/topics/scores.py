@@ -1,7 +1,7 @@
 """Scores: a frame of the runs that are compared, and the table of methods.
 
-Methods are compared on tasks whose optimum and initial solution are known. The learner explores
-one-armed and two-armed tasks under different conditions, so that one method joins them:
+Methods are compared by their gap to the best reward of a task (:func:`best_rewards`). The learner
+explores one-armed and two-armed tasks under different conditions, so that one method joins them:
 ``dual-process (EC1, EC4)`` is EC1 where a task has one arm and EC4 where it has two.
 """
 
@@ -63,14 +63,34 @@ def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
 
 
 @cached
+def best_rewards(study: Study) -> dict[str, float]:
+    """The reward that gaps are to, by task: the optimum of :func:`initial_and_optimum`, and on a
+    task of which none is known the best of this folder with a free base."""
+    best = {name: float(pair[1]) for name, pair in initial_and_optimum(study).items()}
+    for (task, _), cell in study.cells.items():
+        if task not in study.optima and len(cell.good) and not locks_base(cell.runs):
+            best[task] = max(best.get(task, -math.inf), cell.rewards.max())
+    return {task: best[task] for task in study.tasks if best.get(task)}
+
+
+def reference(study: Study, tasks: Iterable[str]) -> str:
+    """What gaps on these tasks are to: ``optimum``, ``best known reward``, or ``best of this
+    folder`` where no optimum is known."""
+    known = {task in study.optima for task in tasks}
+    if known == {True, False}:
+        return "best known reward or best of this folder"
+    return optimum_in_words(study) if True in known else "best of this folder"
+
+
+@cached
 def labels_by_task(study: Study) -> dict[str, dict[str, str]]:
-    """Labels by task of every method, on tasks of :func:`initial_and_optimum`.
+    """Labels by task of every method, on tasks of :func:`best_rewards`.
 
     A method has its own label on all tasks; the learner's conditions together have several.
     """
     by_method: dict[str, dict[str, str]] = {}
     for task, label in study.cells:
-        if task in initial_and_optimum(study):
+        if task in best_rewards(study):
             by_method.setdefault(label, {})[task] = label
     one_armed = by_method.get(EC1, {})
     for more in (EC4, EC3):
@@ -103,11 +123,14 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
 
 @cached
 def common_tasks(study: Study) -> list[str]:
-    """The tasks that a mean is over: all, or the first where no method ran on all of them."""
-    tasks = list(initial_and_optimum(study))
-    ran = [task for task in tasks for cells in compared(study).values() if task in cells]
-    everywhere = any(len(cells) == len(tasks) for cells in compared(study).values())
-    return tasks if everywhere else ran[:1]
+    """The tasks that a mean is over: all; where no method ran on all of them, those with a known
+    optimum; where none did on these, the first."""
+    ran_on = [cells.keys() for cells in compared(study).values()]
+    every, known = list(best_rewards(study)), list(initial_and_optimum(study))
+    for tasks in (every, known or every):
+        if any(ran >= {*tasks} for ran in ran_on):
+            return tasks
+    return [task for task in known or every if any(task in ran for ran in ran_on)][:1]
 
 
 @cached
@@ -115,7 +138,7 @@ def scores(study: Study) -> pd.DataFrame:
     """Return a row for each run of the compared methods, for :func:`coartic.analysis.ranking`.
 
     Columns ``method`` (label, or the learner's conditions together), ``task``, ``run``, ``seed``,
-    ``reward`` (NaN for a run without a solution) and ``best_known``.
+    ``reward`` (NaN for a run without a solution) and ``best_known`` (:func:`best_rewards`).
     """
     columns = ["method", "task", "run", "seed", "reward", "best_known"]
     parts = [
@@ -123,7 +146,7 @@ def scores(study: Study) -> pd.DataFrame:
             method=method,
             task=task,
             reward=cell.runs.reward.where(cell.runs.status == "ok").astype(float),
-            best_known=initial_and_optimum(study)[task][1],
+            best_known=best_rewards(study)[task],
         )[columns]
         for method, cells in compared(study).items()
         for task, cell in cells.items()
@@ -164,11 +187,13 @@ def best_condition(study: Study, task: str) -> str | None:
 
 
 def cell_gap(study: Study, cell: CellRuns) -> float:
-    """Gap of a cell's mean reward to the optimum; NaN where either is unknown."""
-    best = study.optima.get(cell.task)
-    if best is None or best.reward == 0 or not len(cell.good) or locks_base(cell.runs):
+    """Gap of a cell's mean reward to the optimum, or to the best of this folder where none is
+    known; NaN without a reward."""
+    known = study.optima.get(cell.task)
+    best = known.reward if known else best_rewards(study).get(cell.task)
+    if not best or not len(cell.good) or locks_base(cell.runs):
         return math.nan
-    return float(gap_share(cell.rewards.mean(), best.reward))
+    return float(gap_share(cell.rewards.mean(), best))
 
 
 def failed_runs(cells: Iterable[CellRuns], consequence: str) -> str:

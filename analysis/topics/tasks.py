@@ -41,9 +41,9 @@ def list_tasks(study: Study) -> Rows:
 
 @figure(
     "Tasks",
-    "Start configuration and goals of each task. Open squares mark the left arm, closed circles "
-    "the right arm. Open circles are the goals, drawn to scale and hit in the order of their "
-    "numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
+    "Start configuration and goals of each task. Open squares on grey mark the left arm, closed "
+    "circles the right arm. Open circles are the goals, drawn to scale and hit in the order of "
+    "their numbers. After Figure 4 of Shah, Barto & Fagg (2013).",
 )
 def draw_tasks(study: Study) -> Parts | None:
     """Draw start configuration and goals, a panel for each task."""
@@ -69,7 +69,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
     rows, columns = style.grid(len(tasks))
-    above, around = 0.62, 0.55  # inches of a panel for title and axes
+    above, around = 0.75, 0.55  # inches of a panel for title and axes
     scale = min(
         (style.TWO / columns - around) / width,
         (style.TALLEST - 0.3 - rows * above) / rows / height,
@@ -81,6 +81,9 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0)
+        if len(task.hands) > 1:  # what shows of an arm under the other one
+            left = task.robot.joint_positions(task.q0, "left").T
+            axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
         draw_goals(axes, task)
         number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
@@ -95,6 +98,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_aspect("equal")
         axes.set_xlabel("x (length unit)")
         axes.set_ylabel("y (length unit)")
+    style.letters(panels if len(tasks) > 1 else ())
     hands = {hand for task in tasks for hand in task.hands}
     arms = [
         style.legend_line(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
