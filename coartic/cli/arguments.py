@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.inputs import check_limits
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
@@ -30,6 +33,24 @@ MethodFiles = Annotated[
         "--method-file", readable=False, metavar="FILE", help="Methods of your own (Python)."
     ),
 ]
+
+
+def number(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
+    """An option that is a number from ``least`` to ``most``, a whole one where ``least`` is an int.
+    Raises CoarticError for anything else when it is read."""
+
+    def read(text: str) -> float:
+        value: Any = text
+        for kind in (float, int):
+            with suppress(ValueError):
+                value = kind(text)
+        try:
+            check_limits(option, value, least, most)
+        except ValueError as error:
+            raise CoarticError(str(error)) from None
+        return value
+
+    return typer.Option(option, parser=read, metavar=unit, help=what)
 
 
 def id_named(name: str, names: Mapping[str, str]) -> str:

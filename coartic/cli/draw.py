@@ -68,9 +68,7 @@ def animate(
     initial: Annotated[
         bool, typer.Option("--initial", help="Show the initial solution beside it.")
     ] = False,
-    width: Annotated[
-        int, typer.Option(min=200, max=3840, metavar="N", help="Width in pixels.")
-    ] = 800,
+    width: Annotated[int, given.number("--width", "Width in pixels.", 200, 3840)] = 800,
     replace: given.Replace = False,
 ) -> None:
     """Make a film of a run, alone or beside another one."""

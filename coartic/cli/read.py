@@ -15,6 +15,7 @@ from coartic.cli import arguments as given
 from coartic.cli.terminal import say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.inputs import MOST_RUNS
 from coartic.interruption import interruptible
 from coartic.text import counted, one_line, unknown
 
@@ -123,7 +124,7 @@ def trace(
 
 def verify(
     folder: given.Results,
-    again: Annotated[int, typer.Option(min=0, metavar="N", help="Also perform N runs again.")] = 0,
+    again: Annotated[int, given.number("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""

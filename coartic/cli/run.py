@@ -14,6 +14,7 @@ from coartic.cli.read import answers_in_words
 from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
+from coartic.inputs import MOST_RUNS, MOST_SECONDS, MOST_SEED, MOST_TRIALS
 from coartic.interruption import interruptible
 from coartic.text import counted, one_line, unknown
 from coartic.threads import MOST_JOBS
@@ -36,11 +37,12 @@ def run(
             "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each cell.")] = None,
-    trials: Annotated[int | None, typer.Option(metavar="N", help="Trials of each run.")] = None,
+    runs: Annotated[int | None, given.number("--runs", "Runs of each cell.", 1, MOST_RUNS)] = None,
+    trials: Annotated[
+        int | None, given.number("--trials", "Trials of each run.", 1, MOST_TRIALS)
+    ] = None,
     jobs: Annotated[
-        int | None,
-        typer.Option(min=1, max=MOST_JOBS, metavar="N", help="Processes; by default one a core."),
+        int | None, given.number("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
     ] = None,
     tasks: Annotated[
         str | None,
@@ -55,12 +57,14 @@ def run(
         list[Path] | None,
         typer.Option(readable=False, metavar="FILE", help="A family of your own (TOML)."),
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the suite.")] = 0,
+    seed: Annotated[int, given.number("--seed", "Seed of the suite.", 0, MOST_SEED)] = 0,
     time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Most CPU time of a run.")
+        float | None,
+        given.number("--time-limit", "Most CPU time of a run.", 1e-3, MOST_SECONDS, "SECONDS"),
     ] = None,
     trial_budget: Annotated[
-        int | None, typer.Option(metavar="N", help="Most trials that a run may make.")
+        int | None,
+        given.number("--trial-budget", "Most trials that a run may make.", 1, MOST_TRIALS),
     ] = None,
     scheduler: Annotated[
         str | None,
