@@ -9,6 +9,7 @@ from shlex import quote
 from typing import Any, get_args
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import escape
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
@@ -16,6 +17,7 @@ from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import TONES, html_table, latex_table
+from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
 from coartic.analysis.words import id_of, listed, number
@@ -31,18 +33,23 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
 
     ``for_paper``: tables as LaTeX beside those as CSV, and figures as SVG and PDF.
 
-    Raises CoarticError where the folder holds the results themselves or anything that no report
-    wrote.
+    Raises CoarticError where the folder holds the results themselves, the report of other results,
+    or anything that no report wrote.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
             f"{folder} holds the results themselves, or lies above them. Give the report a folder "
             "of its own."
         )
+    make_folder(folder, ["report.html"])
+    home, report = os.path.relpath(study.folder, folder), folder / "report.html"
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
-    make_folder(folder, ["report.html"])
-    files = {"report.html": page(study).encode()}
+    elif report.exists() and f'"coartic-results" content="{escape(home)}"' not in report.read_text(
+        "utf-8"
+    ):
+        raise CoarticError(f"{folder} holds the report of other results: choose another folder")
+    files = {"report.html": page(study, home).encode()}
     captions = {id_of(section.table): section.caption for section in SECTIONS}
     for name, table in TABLES.items():
         frame = table(study)
@@ -90,8 +97,9 @@ def sections(study: Study) -> list[dict[str, Any]]:
     return allowed
 
 
-def page(study: Study) -> str:
-    """The page of HTML, which needs no other file and no network."""
+def page(study: Study, home: str) -> str:
+    """The page of HTML, which needs no other file and no network; ``home`` leads from its folder to
+    the results."""
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -121,6 +129,8 @@ def page(study: Study) -> str:
         verdicts=verdicts,
         tones=TONES,
         suite=study.suite,
+        home=home,
+        stamp=stamp(study.runs),
         folder=quote(str(study.folder)),
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",

@@ -13,7 +13,7 @@ from coartic.analysis.methods import name_of
 from coartic.analysis.report.render import columns_of, texts_of
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
-from coartic.runs.plan import label_of
+from coartic.runs.plan import hash_of, label_of
 from coartic.text import plain
 
 
@@ -43,6 +43,17 @@ def rows_of(table: Path) -> pd.DataFrame:
     except ValueError as error:
         raise CoarticError(f"{table} is no table of a report: {plain(str(error))}") from None
     return frame
+
+
+def stamp(runs: pd.DataFrame) -> str:
+    """Hash of what runs came to, by which a report says which runs it is of."""
+    return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
+
+
+def beginnings(frame: pd.DataFrame) -> list[tuple[str, str]]:
+    """The rows of a table by id, with the first two columns that the page shows."""
+    texts = [texts_of(frame, name) for name in [*columns_of(frame.drop(columns="run_ids"))][:2]]
+    return [(row, ", ".join(first)) for row, *first in zip(frame.index, *texts, strict=True)]
 
 
 def values_of(frame: pd.DataFrame, row: str, tasks: Mapping[str, Task]) -> list[tuple[str, str]]:

@@ -39,7 +39,7 @@ def number(option: str, what: str, least: float, most: float, unit: str = "N") -
     """An option that is a number from ``least`` to ``most``, a whole one where ``least`` is an int.
     Raises CoarticError for anything else when it is read."""
 
-    def read(text: str) -> float:
+    def read(text: str) -> Any:
         value: Any = text
         for kind in (float, int):
             with suppress(ValueError):
@@ -74,9 +74,11 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 def method_names(registered: Registry) -> Mapping[str, str]:
     """People's names of methods by id, empty where they have none."""
     from coartic.analysis.methods import name_of
+    from coartic.learner.conditions import CONDITIONS, VARIANTS
 
     names = {name: name_of(name) for name in registered}
-    return {name: words if words != name else "" for name, words in names.items()}
+    named = {name: words if words != name else "" for name, words in names.items()}
+    return named | dict.fromkeys((*CONDITIONS, *VARIANTS), "")
 
 
 def methods_meant(names: Sequence[str], registered: Registry) -> list[str]:

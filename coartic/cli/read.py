@@ -93,7 +93,7 @@ def trace(
         raise CoarticError(unknown("table", table, tables))
     frame = traced.rows_of(tables[table])
     if row is None:
-        say(*frame.index)
+        say_pairs(traced.beginnings(frame))
         return
     if row not in frame.index:
         raise CoarticError(unknown("row", row, frame.index))
@@ -105,7 +105,7 @@ def trace(
     with open_store(results) as store:
         runs, plan = store.runs(), store.plan()
     behind = runs[runs.run_id.isin(ids)]
-    if len(behind) < len(ids):
+    if traced.stamp(runs) not in (tables[table].parents[1] / "report.html").read_text("utf-8"):
         again = f"coartic report {quote(str(results))}"
         raise CoarticError(f"the report is older than the runs of {results}: {again}")
     say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])

@@ -157,7 +157,8 @@ def overview(registered: Registry) -> Iterator[tuple[str, str]]:
     from coartic.benchmarks.suites import suites
     from coartic.tasks.families import shipped_families
 
-    yield "Tasks", ", ".join(f"{name} ({load_task(name).label})" for name in builtin_tasks())
+    yield "Tasks", ""
+    yield from ((f"  {name}", load_task(name).label) for name in builtin_tasks())
     yield "Families", ", ".join(shipped_families())
     yield "Suites", ""
     for name, suite in suites().items():
@@ -175,13 +176,15 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     """
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import name_of
-    from coartic.benchmarks.suites import suites
+    from coartic.benchmarks.suites import load_suite, suites
+    from coartic.inputs import read_toml
     from coartic.tasks.families import shipped_families
     from coartic.tasks.task import address_of
 
     (name,) = given.tasks_meant([name])
-    if name in suites():
-        suite = suites()[name]
+    is_file = name.endswith(".toml")
+    if name in suites() or (is_file and "goals" not in read_toml(Path(name))):
+        suite = load_suite(name)
         yield "Suite", f"{name}: {suite.title}"
         yield "", suite.description
         runs = sorted({block.runs or suite.runs for block in suite.cells})
@@ -192,14 +195,14 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "Tasks", ", ".join(dict.fromkeys(tasks))
         yield "Methods", ", ".join(dict.fromkeys(m for block in suite.cells for m in block.methods))
         yield "Run it", f"coartic run {name}"
-    elif name in builtin_tasks() or address_of(name):
+    elif name in builtin_tasks() or address_of(name) or is_file:
         task = load_task(name)
         yield "Task", f"{name} ({task.label}): {task.description}"
         yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
         yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
         yield "Base", f"locked in {', '.join(task.locked_base)}" if task.locked_base else "free"
-        source = "reconstructed" if task.reconstructed else "printed in the paper"
-        yield "Goals are", "drawn at random" if task.family else source
+        if name in builtin_tasks():
+            yield "Goals are", "reconstructed" if task.reconstructed else "printed in the paper"
     elif name in shipped_families() or f"{name}/v1" in shipped_families():
         family = shipped_families().get(name) or shipped_families()[f"{name}/v1"]
         yield "Family", f"{family.name}: {family.description}"
@@ -229,6 +232,7 @@ def reproduce(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Perform a run again and say whether the result is identical."""
+    from coartic.analysis.methods import name_of
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
@@ -239,7 +243,7 @@ def reproduce(
     result = f"reward {run.reward}, hands {run.hands}"
     say_pairs(
         [
-            ("Run", f"{run.id}: {asked.method} on {asked.task.name}, run {run.number}"),
+            ("Run", f"{run.id}: {asked.task.label}, {name_of(asked.method)}, run {run.number}"),
             ("Seed", str(run.seed)),
             ("Parameters", ", ".join(f"{k}={v}" for k, v in asked.parameters.items())),
             ("Result", result if run.status == "ok" else f"{run.status}: {run.reason}"),
@@ -265,21 +269,26 @@ def check(
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check a method or a task file against the rules."""
+    from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
+    from coartic.tasks.task import address_of
 
+    (task,) = given.tasks_meant([subject])
+    if subject.endswith(".py"):
+        raise CoarticError(f"name a method of it: coartic check METHOD --method-file {subject}")
+    if task in builtin_tasks() or address_of(task):
+        raise CoarticError(
+            f"{task} is a task, not a method. `coartic draw {task} --out FOLDER` writes its file, "
+            "which can be checked."
+        )
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
         if not Path(subject).is_file():
             raise CoarticError(f"{subject}: there is no such file.")
         broken = show_laws(subject, check_task_file(Path(subject), registered))
     else:
-        try:
-            names = given.methods_meant([subject], registered)
-        except CoarticError as error:
-            raise CoarticError(
-                f"{error} A task is checked by its file, which `coartic draw` writes."
-            ) from None
+        names = given.methods_meant([subject], registered)
         broken = sum(show_laws(name, check_method(registered[name])) for name in names)
     if broken:
         sys.exit(1)

@@ -431,8 +431,10 @@ def open_store(folder: Path) -> Iterator[Store]:
     """
     path = folder / RUNS_FILE
     if not os.path.lexists(path):
-        inside = [f"; did you mean {each.parent}?" for each in folder.glob(f"*/{RUNS_FILE}")]
-        hint = min(inside, default="")
+        near = [*folder.parent.glob(RUNS_FILE), *folder.glob(f"*/{RUNS_FILE}")]
+        hint = min((f"; did you mean {each.parent}?" for each in near), default="")
+        if not os.path.lexists(folder):
+            raise CoarticError(f"there is no folder {folder}{hint}")
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
     check_files(folder)
     with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
