@@ -115,9 +115,9 @@ def cards_of_file(path: Path) -> Iterator[MethodCard]:
     """The methods of a file, which a process of its own imports: what it does there changes
     nothing here. Raises CoarticError where there is none that can be used."""
     shown = plain(str(path), LONGEST_LINE)
+    check_file(path)
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file ends in .py")
-    check_file(path)
     reader = Reader(path, shown)
     for card in _CARDS.validate_python(reader("", "cards")):
         READERS[str(path)] = reader

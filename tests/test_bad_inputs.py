@@ -15,6 +15,7 @@ from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN
 
+NO_METHOD = Path(__file__).parents[1] / "LICENSE"
 FAMILY = """
 title = "Mine"
 description = "Mine."
@@ -230,11 +231,21 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["check", "/dev/zero.toml"], "no such file"),
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
         (["list", "two-armed1"], "two-armed-1"),
+        (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
+        (["check", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["check", "two-armed/v1/i003"], "coartic draw"),
+        (["run", "paper", "--runs", "two"], "--runs is 'two'; it must be a whole number from 1"),
+        (["run", "paper", "--jobs", "0"], "--jobs is 0; it must be a whole number from 1"),
+        (
+            ["run", "paper", "--time-limit", "0"],
+            "--time-limit is 0; it must be a number from 0.001",
+        ),
+        (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
+        (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
         (["run"], "name a suite: ablations, "),
         (["run", "papr"], "did you mean 'paper'"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
-        (["report", "nowhere"], "nowhere"),
+        (["report", "nowhere"], "there is no folder nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),
         (["animate", "0123456", "--in", "nowhere", "--out", "x.gif"], "nowhere"),
         (["draw", "ascending", "--out", "x.bmp"], ".bmp"),

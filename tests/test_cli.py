@@ -235,10 +235,12 @@ def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_list(coartic):
+def test_list(coartic, tmp_path):
     assert coartic("list")[0] == 0
-    for name in ("two-armed-1", "comparison", "long", "dual-process/EC4", "EC4"):
-        assert coartic("list", name)[0] == 0
+    (tmp_path / "mine.toml").write_text(GOOD, encoding="utf-8")
+    names = "two-armed-1", "comparison", "long", "dual-process/EC4", "ec4", tmp_path / "mine.toml"
+    for name in (*names, ROOT / "benchmarks" / "suites" / "paper.toml"):
+        assert coartic("list", name)[0] == 0, name
 
 
 def test_draw(coartic, tmp_path):

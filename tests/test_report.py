@@ -80,8 +80,9 @@ def test_trace_goes_from_a_row_to_its_runs(traced, tables_by_name, report, coart
     for run, seed, reward in zip(runs, stored.seed, stored.reward, strict=True):
         line = [line for line in text.splitlines() if run[:SHORT_ID] in line][-1]
         assert {str(seed), f"−{-reward}"} <= set(line.split())
-    assert coartic("trace", "methods", "--in", results)[1].split("\n")[:-1] == names
-    delete(results / RUNS_FILE, runs[0])
+    listed = coartic("trace", "methods", "--in", results)[1].splitlines()
+    assert [line.partition("  ")[0] for line in listed if not line.startswith(" ")] == names
+    delete(results / RUNS_FILE, frame.run_ids.iloc[1].split()[0])  # of another row
     for command, said in (
         (("trace", "methods", "nothing", "--in", results), "unknown row 'nothing'"),
         (("trace", "methods", names[0], "--in", results), "the report is older than the runs of"),
@@ -221,6 +222,9 @@ def test_few_runs_say_so(tmp_path):
     text = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert load_task("ascending").label in text
     assert set(re.findall(r'href="#([^"]+)"', text)) <= set(re.findall(r'\bid="([^"]+)"', text))
+    with pytest.raises(CoarticError, match="report holds the report of other results"):
+        write_report(few, tmp_path / "report", for_paper=False)
+    write_report(without, tmp_path / "report", for_paper=False)
 
 
 def test_a_folder_of_settings_says_which_is_best(tmp_path):
