@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
@@ -9,7 +10,6 @@ from shlex import quote
 from typing import Any, get_args
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import escape
 
 from coartic import CoarticError
 from coartic.analysis.claims.judging import Verdict
@@ -45,8 +45,8 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
     home, report = os.path.relpath(study.folder, folder), folder / "report.html"
     if study.folder.absolute() in folder.absolute().parents:
         check_inside(study.folder, folder)
-    elif report.exists() and f'"coartic-results" content="{escape(home)}"' not in report.read_text(
-        "utf-8"
+    elif report.exists() and f'-results" content="{home}"' not in html.unescape(
+        report.read_text("utf-8").partition("<title>")[0]
     ):
         raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     files = {"report.html": page(study, home).encode()}
