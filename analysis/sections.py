@@ -39,14 +39,16 @@ class Section:
     """It returns None where the folder's runs do not allow it."""
     sentence: Callable[[Study], str] | None = None
     """Returns the finding in words, for enough runs and for too few, with the number that failed;
-    empty where the runs say nothing."""
+    empty where the runs say nothing. Its first line stands alone on the first screen."""
     answer: str = ""
-    """Word before the sentence on the terminal and on the first screen of the page; empty: it
-    stands on neither."""
+    """Word before the finding on the terminal; empty: it is neither there nor on the first
+    screen of the page."""
     note: str = ""
     """Explains picture and table."""
     single: bool = True
     """Whether it is about single tasks: left out for many random ones."""
+    folded: bool = False
+    """Whether the page shows its table only when asked."""
 
 
 SECTIONS = (
@@ -93,7 +95,7 @@ SECTIONS = (
         "Claims",
         "Do the paper's claims hold?",
         table=verdicts.list_claims,
-        caption="Claims; open one to see its evidence",
+        caption="Claims",
         sentence=verdicts.claims_hold,
         answer="Paper",
         note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
@@ -128,8 +130,9 @@ SECTIONS = (
         figure=costs.draw_runtimes,
         sentence=costs.what_it_costs,
         answer="Cost",
-        note="Kinematics: number of forward-kinematics evaluations, a cost that is the same on "
-        "every machine. ∞: not reached within the budget of trials.",
+        note="The figure shows methods that learn, guesses and the best planner. Kinematics: "
+        "number of forward-kinematics evaluations, a cost that is the same on every machine. ∞: "
+        "not reached within the budget of trials.",
     ),
     Section(
         "hands",
@@ -138,6 +141,7 @@ SECTIONS = (
         table=rewards.list_hands,
         caption="Learned rewards by hand sequence, published and ours (ticks)",
         sentence=rewards.changed_hands,
+        folded=True,
     ),
     Section(
         "learning",
@@ -148,6 +152,7 @@ SECTIONS = (
         figure=learning.draw_learning_curves,
         sentence=learning.how_fast,
         note="Gain: improvement over the initial solution. ∞: never improved.",
+        folded=True,
     ),
     Section(
         "signatures",
@@ -159,6 +164,7 @@ SECTIONS = (
         note="Ticks are compared with those of the corrective process with the same hands. A first "
         "movement that gets slower while the whole task gets faster is sacrificed for it. Waiting "
         "hand nearer: share of the way to its next goal that a hand covers while waiting.",
+        folded=True,
     ),
     Section(
         "families",
@@ -178,6 +184,7 @@ SECTIONS = (
         table=tasks.list_tasks,
         caption="Tasks with their initial and best possible rewards (ticks)",
         figure=tasks.draw_tasks,
+        sentence=tasks.how_long,
         note="Initial: the corrective process alone, with the task's initial hands. Best known: "
         "the optimum where the proven bound equals it. Proven bound: a reward that no solution can "
         "exceed.",
@@ -187,9 +194,10 @@ SECTIONS = (
         "All methods",
         "What did every method do on every task?",
         table=scores.list_methods,
-        caption="Reward, gap to the optimum, hands and costs of a run (medians)",
+        caption="Reward, gap to the optimum, hands with their runs, and costs of a run (medians)",
         note="Every method works on the same robot. Its movements are scored by a function hidden "
         "from the method. Times are seconds of solving.",
+        folded=True,
     ),
 )
 TABLES = {id_of(each.table): each.table for each in SECTIONS}

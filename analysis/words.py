@@ -57,6 +57,12 @@ def number(value: float, digits: int | None = None) -> str:
     return sign + text.replace(",", NARROW_SPACE)
 
 
+def spelled(count: int) -> str:
+    """A small number in letters, others in figures."""
+    names = "no", "one", "two", "three", "four", "five", "six"
+    return names[count] if count < len(names) else number(count)
+
+
 def p_value(p: float) -> str:
     """``p < 0.001`` or ``p = 0.012``, which no line breaks; empty for NaN."""
     if math.isnan(p):

@@ -6,8 +6,11 @@ from dataclasses import replace
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+from coartic.analysis.methods import name_of
+from coartic.analysis.sections import TABLES
 from coartic.analysis.study import typical_run
 from coartic.analysis.topics.coarticulation import shared_goal
+from coartic.analysis.topics.ranking import differences
 
 pytestmark = pytest.mark.browser
 
@@ -51,7 +54,11 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     assert {verdict for _, verdict in chosen} == {"undecided"}
     page.select_option("#claims-verdict", "")
     assert claims_in_sight(page) == before
-    # Tables are sorted by their headers.
+    # A table that is folded opens for a link to a row, and is sorted by its headers.
+    assert not page.locator("#table-methods").is_visible()
+    row = page.locator("#table-methods tbody tr").nth(2).get_attribute("id")
+    page.goto(f"{address}#{row}")
+    assert page.locator(f"#{row}").is_visible()
     head = page.locator("#table-methods thead button", has_text="reward").first
     column = page.locator("#table-methods thead th").all_inner_texts()
     place = next(k for k, text in enumerate(column) if text.startswith("reward"))
@@ -67,6 +74,29 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     claim = page.locator("#table-claims tbody tr").nth(3).get_attribute("id")
     page.goto(f"{address}#{claim}")
     assert page.locator(f"#{claim} dl").is_visible()
+
+
+def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
+    page = opened(permissions=["clipboard-read", "clipboard-write"])
+    page.locator("#table-ranking").locator("xpath=../preceding-sibling::p[1]/button").click()
+    page.get_by_text("rows are in the clipboard").wait_for()
+    lines = page.evaluate("navigator.clipboard.readText()").split("\n")
+    rows = [line.split("\t") for line in lines]
+    table = TABLES["ranking"](traced)
+    assert [row[0] for row in rows[1:]] == [name_of(method) for method in table.method]
+    assert rows[0][1].startswith("gap")
+    assert [float(row[1].split()[0]) for row in rows[1:] if row[1] != "–"] == pytest.approx(
+        list(100 * table.gap.dropna()), abs=0.05
+    )
+
+
+def test_two_methods_are_compared(opened, traced):
+    page, said = opened(), differences(traced)
+    tools = page.locator("[data-differences]")
+    first, *_, second = said
+    tools.locator("select").first.select_option(first)
+    tools.locator("select").last.select_option(second)
+    assert tools.locator("output").inner_text() == said[first][second]
 
 
 def part(page, name):

@@ -113,7 +113,9 @@ def test_claims_are_counted_by_verdict():
     assert counts(entries.verdict) == numbers
     half = verdicts.verdicts_in_words(entries)
     assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
-    assert verdicts.verdicts_in_words(entries[:-1]).startswith("Supported: the posture depends")
+    assert verdicts.verdicts_in_words(entries[:-1]).startswith(
+        "1 of 2 central claims are supported.\nSupported: the posture depends"
+    )
 
 
 def test_p_values_are_the_largest_of_a_claim_corrected_over_the_claims():

@@ -16,7 +16,7 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.analysis.methods import name_of
 from coartic.analysis.report import render
-from coartic.analysis.report.about import answers, limits
+from coartic.analysis.report.about import answers, cards, limits
 from coartic.analysis.report.build import write_report
 from coartic.analysis.report.trace import rows_of, runs_behind, tables_of
 from coartic.analysis.sections import FIGURES, TABLES
@@ -203,6 +203,11 @@ def test_answers_name_failed_runs_behind_them(traced):
     assert not told["Coarticulation"][1]  # the learner's on one-armed tasks
     assert told["Nearest"][0].endswith(f" 2 of {of + 1} runs of {name_of(planner)} and learner EC4")
     assert told["Cost"][0].endswith(f" 1 of {of} runs of learner EC4")  # a planner makes no trials
+    for study in (traced, spoiled):
+        assert len(cards(study)) == 4
+        for section, card in cards(study):
+            assert len(re.findall(r"[\w.]+", card)) <= 15, card
+            assert dict(answers(study))[section].startswith(card)
 
 
 def test_few_runs_say_so(tmp_path):

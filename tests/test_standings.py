@@ -87,11 +87,32 @@ def test_tasks_count_alike_in_a_paired_test():
     assert paired_difference(seen, "mine", "yours").p == pytest.approx(p)
 
 
+def test_two_methods_differ_by_the_difference_of_their_gaps():
+    """With the interval of the one that varies, where the other is exact."""
+    plan = {(task, "my-plan"): [reward] for task, reward in
+            (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
+    seen = study(TEN | plan)
+    declared = replace(seen.plan.methods["my-plan"], stochastic=False)
+    seen.plan.methods["my-plan"] = declared
+    rows = ranking.main_gaps(seen).set_index("method")
+    both = "dual-process (EC1, EC4)"
+    found = ranking.difference_of_gaps(seen, both, "my-plan")
+    ends = rows.loc[both, ["gap", "gap_low", "gap_high"]] - rows.gap["my-plan"]
+    assert [found.value, found.low, found.high] == pytest.approx(list(ends), abs=3e-4)
+    there, back = (
+        np.array(re.findall(r"[\d.]+", text), float)
+        for text in (ranking.differences(seen)[a][b] for a, b in
+                     itertools.permutations(ranking.differences(seen), 2))
+    )  # fmt: skip
+    assert sorted(there) == sorted(back)
+    assert len(there) == 3
+
+
 def test_the_learners_place_is_said():
     both = study(TEN | strangers(("mine", 2), ("yours", -3), runs=10))
-    assert "The paper's learner is number 2, at" in ranking.nearest(both)
+    assert "; the learner is number 2 of the three that learn (" in ranking.nearest(both)
     last = study(TEN | strangers(("mine", 2), runs=10))
-    assert "The paper's learner is last, at" in ranking.nearest(last)
+    assert "; the learner is last of the two that learn (" in ranking.nearest(last)
 
 
 def test_the_learner_stands_by_the_form_that_explores_most():
@@ -218,7 +239,7 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     assert columns_of(ranked)["gap"].startswith("gap to the best of this folder (%)")
     plot, sentence = FIGURES["ranking"](unknown), ranking.nearest(unknown)
     assert "best of folder" in plot.figure.axes[0].get_xlabel()
-    assert "comes nearest to the best of this folder: 1.6 % [" in sentence
+    assert sentence.startswith("The learner comes nearest to the best of this folder (1.6 %).")
     for words in (sentence, plot.alt, *columns_of(ranked).values()):
         assert not re.search("optimum|known", words)
     assert "Ascending and Two-armed 1 is known: gaps are" in about.notes_of(unknown, ranked)[0]

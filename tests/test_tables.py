@@ -140,7 +140,9 @@ def test_runtimes(study):
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
     assert len(table) == 3
-    assert "1000 [200, 1000] trials; CMA-ES needs 10" in costs.what_it_costs(study)
+    text = costs.what_it_costs(study)
+    assert "the learner needs 1000 trials; CMA-ES needs 10.\n" in text
+    assert "the learner 1000 [200, 1000]; CMA-ES 10 trials" in text
 
 
 def test_learning(study):

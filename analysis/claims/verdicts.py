@@ -9,8 +9,7 @@ from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.topics.rewards import beside_paper
 from coartic.analysis.topics.scores import failed_runs
-from coartic.analysis.words import capital, listed
-from coartic.text import counted
+from coartic.analysis.words import capital, listed, number, spelled
 
 
 def papers_claims(study: Study) -> pd.DataFrame:
@@ -36,29 +35,28 @@ def list_claims(study: Study) -> Rows:
 
 
 def verdicts_in_words(judged: pd.DataFrame) -> str:
-    """Verdicts on the claims that carry the paper's point, and how many others have each."""
+    """Verdicts on the claims that carry the paper's point, and how many of all have each."""
     n = counts(judged.verdict)
     if 2 * n["undecided"] >= len(judged):  # they lack runs or trials
         return (
             f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
-            f"undecided, {n['supported']} supported. Tasks, methods, runs or trials are missing."
+            f"undecided.\nSupported: {n['supported']}. Tasks, methods, runs or trials are missing."
         )
-    central: dict[str, list[str]] = {}
-    for name, verdict in judged.verdict.items():
-        if short := CLAIMS[str(name)].short:
-            central.setdefault(verdict, []).append(short)
-    others = judged[[not CLAIMS[str(name)].short for name in judged.index]]
-    lacking = others.evidence.str.startswith("Not judged")
-    of_others = [
-        *counts(others.verdict[~lacking]).items(),
-        ("without the runs here", lacking.sum()),
+    short = judged.verdict.rename(lambda name: CLAIMS[name].short)
+    central = short[short.index != ""]
+    held = (central == "supported").sum()
+    which = f"All {spelled(held)}" if held == len(central) else f"{held} of {len(central)}"
+    words = [
+        f"{capital(verdict)}: {listed(names.index)}."
+        for verdict, names in central.groupby(central, sort=False)
     ]
-    words = [f"{capital(verdict)}: {listed(texts)}." for verdict, texts in central.items()]
-    if list(central) == ["supported"]:
-        words = [f"All central claims are supported: {listed(central['supported'])}."]
-    each = ", ".join(f"{verdict} {count}" for verdict, count in of_others if count)
-    words += [f"Of {counted(len(others), 'other claim')}: {each}."] * bool(each)
-    return " ".join(words)
+    each = ", ".join(f"{verdict} {count}" for verdict, count in n.items() if count)
+    lacking = judged.evidence.str.startswith("Not judged").sum()
+    without = f" Of the undecided, {number(lacking)} lack runs here." if lacking else ""
+    return (
+        f"{which} central claims are supported.\n{' '.join(words)} "
+        f"Of all {len(judged)} claims: {each}.{without}"
+    )
 
 
 def claims_hold(study: Study) -> str:

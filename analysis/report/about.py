@@ -26,17 +26,28 @@ def visible_sections(study: Study) -> list[Section]:
 
 
 @cached
-def sentences(study: Study) -> dict[str, str]:
-    """Sentences of findings by the section's id; sections without one are left out."""
+def sentences(study: Study) -> dict[str, list[str]]:
+    """Lines of findings by the section's id; sections without any are left out."""
     visible = visible_sections(study)
     texts = {each.id: each.sentence(study) for each in visible if each.sentence is not None}
-    return {name: shown(text) for name, text in texts.items() if text}
+    return {
+        name: [shown(line.strip()) for line in text.strip().split("\n")]
+        for name, text in texts.items()
+        if text
+    }
 
 
 def answers(study: Study) -> list[tuple[Section, str]]:
-    """Sections whose sentences are the answers of the first screen, with these."""
-    texts = sentences(study)
-    return [(each, texts[each.id]) for each in SECTIONS if each.answer and each.id in texts]
+    """Sections that answer a question in short, with their findings."""
+    found = sentences(study)
+    return [
+        (each, " ".join(found[each.id])) for each in SECTIONS if each.answer and each.id in found
+    ]
+
+
+def cards(study: Study) -> list[tuple[Section, str]]:
+    """The same sections with the first lines of their findings, for the first screen."""
+    return [(each, sentences(study)[each.id][0]) for each, _ in answers(study)]
 
 
 @cached
@@ -59,7 +70,7 @@ def limits(study: Study) -> dict[str, Any]:
         "few": fewest if fewest < RUNS else 0,
         "seed": study.plan.seed,
         "unproven": [marked(task) for task, best in optima if best and not best.proven],
-        "unknown": [task.label for task, best in optima if best is None],
+        "unknown": [marked(task) for task, best in optima if best is None],
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],

@@ -20,6 +20,7 @@ from coartic.analysis.report.render import TONES, html_table, latex_table
 from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
+from coartic.analysis.topics.ranking import differences
 from coartic.analysis.words import id_of, listed, number
 from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
@@ -90,7 +91,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
                 "rows": len(frame),
                 "html": html_table(frame, name, section.caption) if len(frame) else "",
                 "example": f"'{frame.index[0]}'" if len(frame) else "",
-                "finding": about.sentences(study).get(section.id, ""),
+                "finding": about.sentences(study).get(section.id, []),
                 "figure": plot and for_page(plot),
             }
             allowed.append(vars(section) | words)
@@ -116,14 +117,15 @@ def page(study: Study, home: str) -> str:
         links = []
     verdicts, claims = list(get_args(Verdict)), TABLES["claims"](study).reset_index(names="id")
     claims = claims.sort_values("verdict", key=lambda each: each.map(verdicts.index), kind="stable")
-    made_with, answers = study.made_with, about.answers(study)
+    made_with, cards = study.made_with, about.cards(study)
     return environment.get_template("page.html.jinja").render(
         title=f"Coarticulation of a simulated robot: suite {study.suite}",
-        description=" ".join(text for _, text in answers),
+        description=" ".join(text for _, text in cards),
         styles=(HERE / "page.css").read_text("utf-8") + text_of("play.css"),
         player=player(study),
         script=(HERE / "page.js").read_text("utf-8"),
-        answers=answers,
+        cards=cards,
+        differences=differences(study),
         sections=sections(study),
         claims=claims.to_dict("records"),
         verdicts=verdicts,

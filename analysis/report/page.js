@@ -37,13 +37,13 @@
     });
   });
 
-  document.querySelectorAll(".tools").forEach((tools) => {
+  document.querySelectorAll("[data-table]").forEach((tools) => {
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("input");
     const filter = tools.querySelector("select");
-    const count = tools.querySelector("output");
+    const said = tools.querySelector("output");
     const show = () => {
-      const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+      const words = (search ? search.value : "").toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
       [...table.tBodies[0].rows].forEach((row) => {
         const text = row.textContent.toLowerCase();
@@ -51,19 +51,36 @@
         row.hidden = !(wanted && words.every((word) => text.includes(word)));
         shown += !row.hidden;
       });
-      count.textContent = `${shown} of ${table.tBodies[0].rows.length} rows`;
+      said.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
     };
-    search.addEventListener("input", show);
-    if (filter) filter.addEventListener("change", show);
+    tools.addEventListener("input", show);
+    /* Rows in sight, for a spreadsheet: tabs between cells, a plain minus, thousands not apart. */
+    tools.querySelector("button").addEventListener("click", async () => {
+      const rows = [...table.rows].filter((row) => !row.hidden);
+      const plain = (cell) => cell.innerText.replace(/\u202f/g, "").replace(/−/g, "-").replace(/\s+/g, " ").trim();
+      await navigator.clipboard.writeText(rows.map((row) => [...row.cells].map(plain).join("\t")).join("\n"));
+      said.textContent = `${rows.length - 1} rows are in the clipboard`;
+    });
     tools.hidden = false;
     show();
   });
 
-  /* A link to a claim unfolds it. */
+  document.querySelectorAll("[data-differences]").forEach((tools) => {
+    const texts = JSON.parse(tools.dataset.differences);
+    const [first, second] = tools.querySelectorAll("select");
+    const show = () => { tools.querySelector("output").textContent = texts[first.value][second.value] || "0"; };
+    tools.addEventListener("change", show);
+    tools.hidden = false;
+    show();
+  });
+
+  /* A link to a row unfolds its table, and a link to a claim its evidence. */
   const reveal = () => {
     const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
-    const details = target && target.querySelector("details");
-    if (details) details.open = true;
+    const folded = target && (target.querySelector("details") || target.closest("details"));
+    if (!folded) return;
+    folded.open = true;
+    target.scrollIntoView();
   };
   window.addEventListener("hashchange", reveal);
   reveal();

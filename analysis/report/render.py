@@ -15,7 +15,15 @@ import pandas as pd
 
 from coartic.analysis.methods import name_of
 from coartic.analysis.table import COLUMNS, Column
-from coartic.analysis.words import NARROW_SPACE, NONE, RECONSTRUCTED, in_brackets, latex, number
+from coartic.analysis.words import (
+    NARROW_SPACE,
+    NONE,
+    RECONSTRUCTED,
+    in_brackets,
+    latex,
+    number,
+    slugs,
+)
 from coartic.text import one_line
 
 _COMPANIONS = ("_low", "_high", "_sd")
@@ -30,6 +38,8 @@ TONES = {
 """Class of a verdict on the page, by its words."""
 PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
+LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"></a>'
+"""Link to a row by its id."""
 FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
 """Shrinks a table that is wider than the text."""
 
@@ -105,19 +115,20 @@ def word(value: Any, column: Column) -> str:
 
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
-    """A table for the page. Its first column holds while the others scroll; rows are named.
+    """A table for the page. Its first column holds while the others scroll; rows have links.
 
     The caption says what is the same in all rows.
     """
+    ids_of = {row: f"row-{name}-{slug}" for row, slug in slugs(map(str, frame.index)).items()}
     cells: list[list[str]] = []
-    heads = []
+    heads: list[str] = []
     for column, header in columns_of(frame).items():
         texts = list(map(html.escape, texts_of(frame, column)))
         head = f'<span data-column="{html.escape(column)}">{html.escape(header)}</span>'
         if cells and len(texts) > 2 and len(set(texts)) == 1 and not is_number(frame[column]):
             caption += f" ({header}: {html.unescape(texts[0])})"
             continue
-        if column_of(column).method:
+        if column_of(column).method and name == "methods":  # ids stand in one table
             ids = [html.escape(one_line(str(label))) for label in frame[column]]
             pairs = zip(texts, ids, strict=True)
             texts = [text + f"<small>{id_}</small>" * (text != id_) for text, id_ in pairs]
@@ -129,19 +140,21 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
                 f'<span class="{f"text {tone}".strip()}">{text}</span>' for tone, text in pairs
             ]
         if not cells:
-            rows = (html.escape(str(row)) for row in frame.index)
-            pairs = zip(rows, texts, strict=True)
-            texts = [f'<span title="row {row}">{text}</span>' for row, text in pairs]
+            labels = [html.escape(row) for row in ids_of]
+            texts = [
+                f'<span title="row {label}">{text}</span>{LINK.format(id_)}'
+                for label, id_, text in zip(labels, ids_of.values(), texts, strict=True)
+            ]
         cells.append(texts)
-        heads.append(head)
-    # Two columns may have one header.
-    table = (
-        pd.DataFrame(dict(enumerate(cells)))
-        .set_axis(heads, axis="columns")
-        .to_html(index=False, escape=False, border=0, table_id=f"table-{name}", justify="unset")
+        heads.append(f'<th scope="col">{head}</th>')
+    lines = "\n".join(
+        f'<tr id="{id_}">{"".join(f"<td>{text}</td>" for text in row)}</tr>'
+        for id_, row in zip(ids_of.values(), zip(*cells, strict=True), strict=True)
     )
-    head = f"<caption><span>{html.escape(caption)}</span></caption>\n  <thead>"
-    return table.replace("<thead>", head, 1).replace("<th>", '<th scope="col">')
+    return (
+        f'<table id="table-{name}">\n<caption><span>{html.escape(caption)}</span></caption>\n'
+        f"<thead><tr>{''.join(heads)}</tr></thead>\n<tbody>\n{lines}\n</tbody>\n</table>"
+    )
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:

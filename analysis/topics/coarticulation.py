@@ -15,8 +15,10 @@ from matplotlib.patheffects import withStroke
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import (
+    GUESSES,
     LEARNERS,
     in_order,
+    is_learner,
     is_search,
     is_variant,
     main_methods,
@@ -32,7 +34,7 @@ from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.guesses import context_beyond_p, guesses_beside, selects
 from coartic.analysis.topics.scores import failed_runs
-from coartic.analysis.words import marked, number, p_value
+from coartic.analysis.words import capital, marked, number, p_value
 from coartic.drawing import MARKERS
 from coartic.robot import HANDS, Array
 from coartic.text import counted
@@ -188,31 +190,36 @@ def next_goal(study: Study) -> str:
     needed = selects(study, shared.method)
     guesses = guesses_beside(study, shared) if needed else None
     beyond = math.nan if guesses is None else shared.p_beyond(guesses)
-    runs = counted(shared.n, "run")
-    spreads = "" if math.isnan(shared.spreads) else f"{number(shared.spreads, 1)} SD or "
-    p = ", ".join(filter(None, (runs, p_value(shared.p))))
-    who = f"{name_of(shared.method)} hits goal {shared.goal} in postures"
-    apart = f"{spreads}{number(shared.apart, 2)} (length units, rad) apart ({p})"
-    beside = ""
-    if guesses is not None:
-        beside = f"; guesses lie {number(guesses.apart, 2)} apart ({p_value(beyond)})"
+    who = "The learner" if is_learner(shared.method) else capital(name_of(shared.method))
+    runs, p = counted(shared.n, "run"), p_value(shared.p)
+    apart = f"{number(shared.spreads, 1)} SD"
+    if math.isnan(shared.spreads):
+        apart = f"{number(shared.apart, 2)} length units and rad"
     if drawn and not smallest_p(*map(len, shared.postures)) < LEVEL:
-        text = (
-            f"Too few runs to tell whether the next goal changes postures at goal {shared.goal} "
-            f"({runs})."
-        )
+        text = "Too few runs to tell whether the next goal changes the posture."
     elif not (shared.p < LEVEL if drawn else shared.apart > 0):
-        text = f"No significant difference: before different goals, the {who} {apart}."
+        text = f"No significant difference: postures before different next goals lie {apart} apart."
     elif not needed or beyond < LEVEL:
-        text = f"Yes. Depending on the next goal, the {who} that clearly differ: {apart}{beside}."
-    elif guesses is not None:
-        text = f"Not shown: the {who} {apart}{beside}."
+        text = f"Yes. {who} hits the same goal in clearly different postures ({apart} apart)."
+    elif guesses is None:
+        text = f"Undecided: postures lie {apart} apart, and no guesses with as many trials ran."
+    elif math.isnan(beyond):
+        text = f"Undecided: postures lie {apart} apart, and too few guesses ran to compare."
     else:
         text = (
-            f"Undecided: the {who} {apart}, and no guesses with as many trials ran. Add the method "
-            "`guesses`."
+            f"Not shown: postures lie {apart} apart, not significantly more than those of guesses."
         )
-    return text + failed_runs(cells, " and are not counted")
+    text += (
+        f"\nDepending on the next goal, postures of {name_of(shared.method)} at goal {shared.goal} "
+        f"lie {number(shared.apart, 2)} apart (length units and rad; "
+        f"{', '.join(filter(None, (runs, p)))})"
+    )
+    if guesses is not None:
+        text += f", those of guesses {number(guesses.apart, 2)}"
+        text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
+    elif needed:
+        text += f". Add method {GUESSES} to compare them with guesses"
+    return f"{text}.{failed_runs(cells, ' and are not counted')}"
 
 
 def joints_or_hand(study: Study) -> str:

@@ -6,7 +6,7 @@ Targets are rewards evenly spaced between those of the initial solution and of t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,20 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import TOGETHER, in_order, is_learner, main_methods, name_of
-from coartic.analysis.settings import name_in, shown_methods
+from coartic.analysis.methods import (
+    TOGETHER,
+    in_order,
+    is_built_in,
+    is_learner,
+    main_methods,
+    name_of,
+)
+from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
-from coartic.analysis.words import interval, number
+from coartic.analysis.words import capital, interval, number
 from coartic.errors import CoarticError
 from coartic.inputs import brief_value
 from coartic.robot import Array
@@ -170,6 +177,18 @@ def list_runtimes(study: Study) -> Rows:
         yield method, row | runs_of(*cells)
 
 
+def curves(study: Study, labels: Collection[str]) -> list[str]:
+    """Methods with a curve: all settings where these are compared, else those that learn, guesses,
+    the best planner and methods from files."""
+    if compares_settings(study):
+        return list(labels)
+    kept = [label for label in main_methods(labels) if label != "corrective-alone/every"]
+    learn = [label for label in kept if scores.groups(study)[label] == scores.BY_TRIAL]
+    plan = [label for label in kept if label not in learn]
+    best = list_runtimes(study).reached[plan].idxmax() if plan else None
+    return [label for label in kept if label in (*learn, best) or not is_built_in(label)]
+
+
 @figure(
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
@@ -181,7 +200,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     """Share of targets reached, against trials and kinematics."""
     tabled = list_runtimes(study).index
     data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
-    shown = data.method.isin(shown_methods(study, tabled)) & (data.budget < math.inf)
+    shown = data.method.isin(curves(study, tabled)) & (data.budget < math.inf)
     data = data[shown & data.spend.isin(PANELS)]
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
@@ -237,17 +256,15 @@ def what_it_costs(study: Study) -> str:
     rival = [table.reached[others].idxmax()] if others else []
     rows = table.loc[[learners[0], *rival]].to_dict("records")
     names = ["the learner", *(name_of(row["method"]) for row in rows[1:])]
-    halves = [row["trials_to_half"] for row in rows]
-    ends = [f"{number(100 * row['reached'], 0)} %" for row in rows]
-    reached = " and ".join(f"{name} reaches {end}" for name, end in zip(names, ends, strict=True))
-    best = scores.optimum_in_words(study)
-    text = f"Of the reward targets between initial solution and {best}, {reached}."
-    if len(rows) == 2 and np.isfinite(halves).all():
-        ours, theirs = (interval(row, "trials_to_half", digits=0) for row in rows)
+    named = list(zip(names, rows, strict=True))
+    ends = "; ".join(f"{name} reaches {number(100 * row['reached'], 0)} %" for name, row in named)
+    best, text = scores.optimum_in_words(study), f"{capital(ends)} of the reward targets.\n"
+    if len(rows) == 2 and all(math.isfinite(row["trials_to_half"]) for row in rows):
+        ours, theirs = (number(row["trials_to_half"], 0) for row in rows)
+        needs = "; ".join(f"{name} {interval(row, 'trials_to_half', 0)}" for name, row in named)
         text = (
-            f"To get halfway from the initial solution to the {best}, the learner needs {ours} "
-            f"trials; {names[1]} needs {theirs}. In the end they reach {ends[0]} and {ends[1]} of "
-            "the reward targets."
+            f"To get halfway to the {best.removesuffix(' reward')}, the learner needs {ours} "
+            f"trials; {names[1]} needs {theirs}.\nWith intervals: {needs} trials. {text}"
         )
     cells = (
         cell

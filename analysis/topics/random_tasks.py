@@ -108,7 +108,10 @@ def on_random_tasks(study: Study) -> str:
         f"{'the learner' if label == 'learner' else name_of(label)} {number(100 * gap, 1)} %"
         for label, gap in zip(gaps.method, gaps.gap, strict=True)
     ]
+    first, *others = ends
+    beside = [end for end in others if end.startswith("the learner")] or others[:1]
     return (
+        f"Nearest to the best known reward: {'; '.join([first, *beside])}.\n"
         f"Gaps to the best known reward on {len(best)} random tasks (means over families with two "
         f"arms): {', '.join(ends)}. On {sum(each.proven for each in best)} tasks this reward is "
         "the proven optimum."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -13,16 +14,33 @@ from coartic.analysis import frames, methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.settings import compares_settings, name_in
-from coartic.analysis.statistics.estimates import LEVEL, Estimate
+from coartic.analysis.statistics.estimates import (
+    FEWER_RESAMPLES,
+    LEVEL,
+    Estimate,
+    bootstrap_estimate,
+)
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics import scores
-from coartic.analysis.words import capital, interval, listed, marked, number, p_value
+from coartic.analysis.words import (
+    capital,
+    in_brackets,
+    interval,
+    listed,
+    marked,
+    number,
+    p_value,
+    spelled,
+)
+from coartic.robot import Array
 from coartic.text import counted
 
 TRIES = *methods.ALL_GUESSES, "corrective-alone/every"
 """Methods that take the best of their trials and learn nothing between them."""
+MOST_PAIRS = 24
+"""Methods of which the page compares any two."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
 
@@ -86,7 +104,7 @@ def list_against_learner(study: Study) -> Rows:
             yield f"{cell.task} {label}", row | runs_of(cell, learner)
 
 
-@table("method, knows, gap[], better, worse, on *, runs")
+@table("method, gap[], knows, better, worse, on *, runs")
 def list_ranking(study: Study) -> Rows:
     """Gap over all tasks and on each, grouped by the use of the reward."""
     over, tested = main_gaps(study).set_index("method"), list_against_learner(study)
@@ -150,6 +168,51 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     if not differences or not all(map(len, differences)):
         return Estimate(math.nan)
     return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))
+
+
+def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
+    """Mean gap of one method less that of another, both of :func:`main_gaps`.
+
+    Its interval is for other runs of both on the same tasks, as those of the ranking; what a method
+    that draws nothing does is exact.
+    """
+    frame, exact = scores.scores(study), 0.0
+    gaps = frame.assign(gap=frames.gaps(frame)).groupby(["method", "task"]).gap
+    tasks = scores.common_tasks(study)
+    signs, drawn = [], []
+    for sign, method in ((1, first), (-1, second)):
+        for task in tasks:
+            values = gaps.get_group((method, task)).to_numpy()
+            if study.plan.methods[scores.compared(study)[method][task].method].stochastic:
+                signs.append(sign)
+                drawn.append(values)
+            else:
+                exact += sign * values.mean()
+
+    def difference(*samples: Array, axis: int) -> Array:
+        parts = zip(signs, samples, strict=True)
+        return np.asarray(
+            (exact + sum(sign * each.mean(axis) for sign, each in parts)) / len(tasks)
+        )
+
+    if not drawn:
+        return Estimate(exact / len(tasks))
+    return bootstrap_estimate(tuple(drawn), difference, FEWER_RESAMPLES)
+
+
+def differences(study: Study) -> dict[str, dict[str, str]]:
+    """Differences of the mean gaps of any two of the nearest methods in words, by their names."""
+    names = {method: name_in(study, method) for method in main_gaps(study).method[:MOST_PAIRS]}
+    texts: dict[str, dict[str, str]] = {name: {} for name in names.values()}
+    for first, second in itertools.combinations(names, 2):
+        found = difference_of_gaps(study, first, second)
+        ends = 100 * np.array([found.value, found.low, found.high])
+        for one, other, (value, low, high) in (
+            (first, second, ends), (second, first, -ends[[0, 2, 1]])
+        ):  # fmt: skip
+            text = f"{number(value, 1)} percentage points {in_brackets(low, high, 1)}"
+            texts[names[one]][names[other]] = text.strip()
+    return texts
 
 
 @figure(
@@ -220,27 +283,36 @@ def nearest(study: Study) -> str:
         built_in = methods.is_built_in(method)
         return "" if built_in else "; what it is told is as its author declares"
 
-    who, *following = (name_in(study, method) for method in rows.method)
-    beside = ""
+    def named(method: str) -> str:
+        by_name = by_settings or not methods.is_learner(method)
+        return name_in(study, method) if by_name else "the learner"
+
+    who, *following = map(named, rows.method)
+    gaps = [f"{number(100 * value, 1)} %" for value in rows.gap]
+    to = scores.reference(study, scores.common_tasks(study))
+    things = "settings" if by_settings else "that learn"
+    of = f" of the {spelled(len(learn))} {things}" if len(learn) > 1 else ""
+    places = [n for n, method in enumerate(learn.method) if named(method) == "the learner"]
+    text = f"{who} ends {gaps[0]} from the {to}"  # one alone is not nearest
+    if following:
+        text = f"{who} comes nearest{f' to the {to}' if 'folder' in to else of} ({gaps[0]})"
+    if any(places) and "folder" not in to:
+        standing = "last" if places[0] == len(learn) - 1 else f"number {places[0] + 1}"
+        text = f"{who} comes nearest ({gaps[0]}); the learner is {standing}{of} ({gaps[places[0]]})"
+    text = f"{capital(text)}.\nGap of {who} to the {to}: {gap(rows.iloc[0])}"
     if following:
         test = paired_difference(study, *rows.method[:2])
         surely = "significantly" if test.p < LEVEL else "not significantly"
-        beside = f", {surely} nearer than {following[0]} ({p_value(test.p)})"
+        beside = f", {surely} less than that of {following[0]} ({p_value(test.p)})"
         if not test.least_p <= LEVEL:
             beside = f" (too few runs to tell it from {following[0]})"
-    things = "settings" if by_settings else "algorithms"
-    among = f"Of the {len(learn)} {things} that learn from rewards alone, {who}"
-    first, away = among if len(learn) > 1 else capital(who), gap(rows.iloc[0])
-    reference = scores.reference(study, scores.common_tasks(study))
-    place = f"comes nearest to the {reference}: {away} away{beside}"
-    place = place if following else f"ends {away} from the {reference}"  # one alone is not nearest
-    text = f"{first} {place}{declared(rows.method[0])}."
-    rank = next((n for n, method in enumerate(learn.method) if methods.is_learner(method)), 0)
-    if rank and not by_settings:
-        standing = "last" if rank == len(learn) - 1 else f"number {rank + 1}"
-        guesses = by_trial.gap[by_trial.method == methods.GUESSES]
-        text += f" The paper's learner is {standing}, at {gap(learn.iloc[rank])}"
-        text += "".join(f"; guesses at {number(100 * gap, 1)} %" for gap in guesses) + "."
+        text += beside
+    text += f"{declared(rows.method[0])}."
+    for place in filter(None, places):
+        text += f" Gap of the learner: {gap(learn.iloc[place])}."
+    for guessed in by_trial.gap[by_trial.method == methods.GUESSES]:
+        ahead = ", behind the learner" if places and learn.gap[places[0]] < guessed else ""
+        text += f" Guesses end {number(100 * guessed, 1)} % away{ahead}."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
         text += f" The best planner that knows the reward as a formula ends {gap(best)} away"

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 from coartic.analysis.settings import compares_settings, name_in, varied
 from coartic.analysis.statistics.estimates import LEVEL, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.words import interval, marked, number
+from coartic.analysis.words import capital, interval, marked, number
+from coartic.text import counted
 
 MOST_TASKS = 4
 """Tasks on which a sentence names the best setting."""
@@ -46,18 +48,24 @@ def list_settings(study: Study) -> Rows:
 
 def best_settings(study: Study) -> str:
     """The best setting of each task, and whether it is surely better than the next."""
-    rows, texts = list_settings(study), []
+    rows, texts, won, sure = list_settings(study), [], Counter[str](), Counter[str]()
     for task, of_task in rows.groupby("task", sort=False):
         first, *others = of_task.to_dict("records")
         best = name_in(study, first["method"])
+        won[best] += 1
         text = f"{task}: {best}, {interval(first, 'reward')} ticks"
         if others:
             second = others[0]
             surely = "significant" if second["p_holm"] < LEVEL else "no significant difference"
+            sure[best] += surely == "significant"
             if not of_task.p_holm.count() * second["least_p"] < LEVEL:
                 surely = "the runs are too few, or too alike, to tell"
             next_best = name_in(study, second["method"])
             text += f"; next {next_best}, {number(second['reward'], 1)} ({surely})"
         texts.append(f"{text}.")
-    more = len(texts) - MOST_TASKS
-    return " ".join(texts[:MOST_TASKS]) + (f" And {more} more in the table." if more > 0 else "")
+    if not texts:
+        return ""
+    best, more = won.most_common(1)[0][0], len(texts) - MOST_TASKS
+    card = f"{capital(best)} is best on {won[best]} of {counted(len(texts), 'task')}"
+    several = f" And {more} more in the table." if more > 0 else ""
+    return f"{card}, significantly on {sure[best]}.\n{' '.join(texts[:MOST_TASKS])}{several}"

@@ -15,7 +15,7 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import marked
+from coartic.analysis.words import marked, number
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
@@ -37,6 +37,19 @@ def list_tasks(study: Study) -> Rows:
                 **runs_of(),
             }
             yield name, row
+
+
+def how_long(study: Study) -> str:
+    """Ticks of the corrective process alone and of the best known solutions."""
+    rows = list_tasks(study).dropna(subset=["initial", "optimum"])
+    if not len(rows):
+        return ""
+    alone, best = (
+        " to ".join(dict.fromkeys(number(end, 0) for end in (-values.max(), -values.min())))
+        for values in (rows.initial, rows.optimum.astype(float))
+    )
+    proven = f"proven optimal on {number((rows.optimum == rows.bound).sum())} of {len(rows)}"
+    return f"The corrective process alone takes {alone} ticks, the best known {best} ({proven})."
 
 
 @figure(
