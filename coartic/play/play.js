@@ -5,6 +5,7 @@
 const SEEDS = 5; // of which runs two robots are seen
 const TRIALS = 10000; // of a run
 const PACE = 90; // ticks a second
+const PRACTICE = 1.05; // by which the trials shown grow in two pictures, at first
 const HOLD_S = 0.9; // at a hit
 const MOST_GOALS = 6;
 const FAR = 12; // length units: no goal lies farther
@@ -69,6 +70,7 @@ class Play {
   constructor(root, data, saved) {
     Object.assign(this, { root, data, held: null, order: 0, busy: false, results: new Map(), playing: false });
     this.find = (name) => root.querySelector(`[data-is="${name}"]`);
+    this.set = (property, values) => Object.entries(values).forEach(([name, value]) => { this.find(name)[property] = value; });
     this.stage = new Picture(this.find("stage"));
     this.inset = new Picture(this.find("inset"));
     this.curve = new Picture(this.find("curve"));
@@ -79,7 +81,7 @@ class Play {
     this.worker.onmessage = ({ data: message }) => this.hear(message);
     this.fresh = new Set(); // what answers the present question
     root.classList.add("live");
-    // Until somebody does something it plays as soon as it has learned and is seen, unless less motion is asked for.
+    // Until somebody does something it shows how it learned, and plays, when it is seen; unless less motion is asked for.
     ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
     this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
@@ -205,7 +207,7 @@ class Play {
   }
 
   get shown() {
-    return this.state.trials || Infinity;
+    return this.state.trials || Math.floor(this.paced);
   }
 
   /* The solution of a task, as movements; null while there is none. */
@@ -291,11 +293,7 @@ class Play {
         const stop = this.stops.find((each) => each > at + 0.5 && each <= next);
         at = stop === undefined ? next : stop;
         if (stop !== undefined) held = HOLD_S;
-        if (at >= this.last) {
-          if (!this.ending) [this.ending, held] = [true, 1.5];
-          else [this.ending, at] = [false, 0];
-          at = Math.min(at, this.last);
-        }
+        else if (at > this.last) at = 0;
         this.state.tick = Math.round(at);
         this.refresh();
       }
@@ -413,14 +411,15 @@ class Play {
     if (!this.state.open) return;
     const { inset, colours, problems: [problem] } = this;
     const points = both.flatMap(({ runs, mean }) => [...runs, mean].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
-    inset.begin(around([...points, ...both.map(({ mean }) => [mean[0] - 0.5, mean[1] - 0.1])], 0.4));
+    const [x, y] = problem.goals[this.shared];
+    inset.begin(around([...points, [x + 0.3, y + 0.2], ...both.map(({ mean }) => [mean[0] - 0.5, mean[1] - 0.1])], 0.3));
     const thin = this.told ? " Thin: before the goal moved." : n > 1 || m > 1 ? " Thin: single runs; thick: their mean." : "";
     this.find("enlarged").textContent = `At goal ${this.shared + 1}, enlarged.${thin}`;
     both.forEach(({ runs, mean }, k) => {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
       inset.robot(problem, mean, { colour: colours[ROLES[k]], alpha: 0.9 });
     });
-    inset.goal(problem.goals[this.shared], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
+    inset.goal([x, y], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
   }
 
   /* Ticks needed against trials, on a logarithmic scale. */
@@ -526,7 +525,6 @@ class Play {
     const learns = LEARNS.includes(state.who);
     const run = this.results.get("0 run 0");
     const at = learns && run ? Math.min(this.shown, run.made) : 0;
-    const write = (name, words) => { this.find(name).textContent = words; };
     const [finding, meaning = ""] = this.finding;
     const scores = this.scores.map(([role, name, reward]) => {
       const line = document.createElement("span");
@@ -537,12 +535,10 @@ class Play {
       return line;
     });
     this.find("score").replaceChildren(...scores);
-    write("lead", this.lead);
-    write("finding", finding);
-    write("meaning", meaning);
-    write("progress", learns ? counted(at, "trial") : "");
-    write("count", `${this.tick + 1} of ${this.last + 1} ticks`);
-    write("play", this.playing ? "Pause" : "Play");
+    this.set("textContent", {
+      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") : "", play: this.playing ? "Pause" : "Play",
+      count: `${this.tick + 1} of ${this.last + 1} ticks`,
+    });
     if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
     this.find("practice").hidden = !learns;
     const trials = this.find("trials");
@@ -553,14 +549,17 @@ class Play {
     tick.value = this.tick;
     tick.setAttribute("aria-valuetext", `tick ${this.tick + 1} of ${this.last + 1}`);
     this.find("stage").setAttribute("aria-label", `${this.lead} ${finding}`);
-    const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked.size;
+    const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked.size || this.paced < TRIALS;
     this.root.toggleAttribute("data-settled", !open);
     const spoken = [...scores.map((line) => `${line.textContent};`), finding].join(" ");
     if (!this.playing && !open && !this.held && spoken !== this.spoken) {
-      write("status", spoken);
+      this.find("status").textContent = spoken;
       this.spoken = spoken;
     }
-    if (!open && this.waits && this.inSight && !this.calm.matches) this.play();
+    if (this.paced < TRIALS && (this.inSight || !this.waits)) {
+      this.paced = this.waits ? PRACTICE * this.paced : Infinity;
+      requestAnimationFrame(() => this.answer());
+    } else if (!open && this.waits && this.inSight && !this.calm.matches) this.play();
   }
 
   /* ---- Handles ---- */
@@ -737,9 +736,8 @@ class Play {
       change("who", event.target.value);
     });
     on("stored", "change", (event) => { if (event.target.value) change("who", event.target.value); });
-    on("reward", "change", (event) => change("reward", event.target.value));
-    on("explores", "change", (event) => change("explores", event.target.value));
-    on("ahead", "change", (event) => change("ahead", Number(event.target.value)));
+    ["reward", "explores"].forEach((name) => on(name, "change", (event) => change(name, event.target.value)));
+    ["ahead", "edited"].forEach((name) => on(name, "change", (event) => change(name, Number(event.target.value))));
     on("two", "change", (event) => {
       const [first, ...rest] = this.state.goals;
       const mirrored = (list, [x, y]) => [...list, this.spot(list, [x, 2 * first[1] - y])];
@@ -765,7 +763,6 @@ class Play {
     });
     on("add", "click", () => count(1));
     on("fewer", "click", () => count(-1));
-    on("posture", "change", (event) => change("edited", Number(event.target.value)));
     on("hand", "change", (event) => change("own", this.own.with(this.state.edited - 1, [Number(event.target.value)])));
     on("trials", "input", (event) => {
       const trials = Math.max(1, Math.round(Math.exp((Number(event.target.value) / 1000) * Math.log(TRIALS))));
@@ -830,6 +827,7 @@ class Play {
     this.view = null;
     this.playing = false;
     this.waits = state.tick < 0 && state.who !== "you";
+    this.paced = this.waits && !state.trials && !this.calm.matches && LEARNS.includes(state.who) ? 1 : Infinity;
     this.ask();
   }
 
@@ -842,35 +840,26 @@ class Play {
       select.dataset.has = JSON.stringify(options);
       select.replaceChildren(...options.map(([value, text]) => new Option(text, value)));
     };
-    const hands = preset.task.hands.length;
-    const changed = !same([state.goals, state.others], [preset.task.goals, preset.others || null]);
-    fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
-    this.find("reset").disabled = !changed && !state.own;
-    this.find("preset").value = state.preset;
-    const runs = preset.runs || [];
-    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
-    this.find("stored").value = this.stored(state.who) ? state.who : "";
-    this.find("runs").hidden = !runs.length;
-    this.root.querySelectorAll('[data-is="who"] input').forEach((input) => { input.checked = input.value === state.who; });
-    this.root.querySelectorAll('[data-is="reward"] input').forEach((input) => { input.checked = input.value === state.reward; });
-    fill("ahead", state.goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
     state.ahead = Math.max(0, Math.min(Math.round(state.ahead), state.goals.length - 1));
-    this.find("ahead").value = state.ahead;
-    this.find("explores").value = state.explores;
-    this.find("two").checked = Boolean(state.others);
-    this.find("two").disabled = state.goals.length < 2;
-    this.find("told").textContent = `Move goal ${this.moved + 1} now`;
-    this.find("told").disabled = !this.moved;
-    this.find("add").disabled = state.goals.length >= MOST_GOALS;
-    this.find("fewer").disabled = state.goals.length < 2;
-    this.find("for-learner").hidden = state.who !== "learner";
-    this.find("for-two").hidden = state.who !== "learner" || hands < 2;
-    this.find("for-plan").hidden = state.who !== "plan";
-    this.find("for-you").hidden = state.who !== "you";
-    fill("posture", state.goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
-    this.find("posture").value = state.edited;
-    this.find("by-hand").hidden = hands < 2;
+    const { who, goals, others, explores, ahead, edited } = state;
+    const runs = preset.runs || [];
+    const one = preset.task.hands.length < 2;
+    const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
+    fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => ticks).join(" and ")} ticks`])]);
+    fill("ahead", goals.map((_, k) => [k, k ? `${k} goal${k > 1 ? "s" : ""} ahead` : "no goal ahead"]));
+    fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
+    this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores });
+    ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
+    this.find("two").checked = Boolean(others);
+    this.find("told").textContent = `Move goal ${this.moved + 1} now`;
+    const few = goals.length < 2;
+    this.set("disabled", { reset: !changed && !state.own, two: few, fewer: few, told: few, add: goals.length >= MOST_GOALS });
+    this.set("hidden", {
+      runs: !runs.length, "for-learner": who !== "learner", "for-two": who !== "learner" || one, "for-plan": who !== "plan",
+      "for-you": who !== "you", "by-hand": one,
+    });
   }
 
   /* ---- To keep: link and picture ---- */
