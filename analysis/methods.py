@@ -69,7 +69,7 @@ _PARAMETERS = {
     "half_width=": "± ",
     "stop=": "stop ",
 }
-_VARIANT = re.compile(r"=|\bEC\d-")
+_SETTING = re.compile(r"=|\bEC\d-")
 
 
 def most_exploring(task: Task) -> str:
@@ -79,7 +79,7 @@ def most_exploring(task: Task) -> str:
 
 def is_learner(label: str) -> bool:
     """Whether it is the paper's learner under its own conditions, alone or several together."""
-    return label.startswith((LEARNER, TOGETHER)) and not is_variant(label)
+    return label.startswith((LEARNER, TOGETHER)) and not is_setting(label)
 
 
 def is_built_in(label: str) -> bool:
@@ -87,12 +87,12 @@ def is_built_in(label: str) -> bool:
     return label.partition(" ")[0] in KNOWN_METHODS or label.startswith(TOGETHER)
 
 
-def is_variant(label: str) -> bool:
-    """Whether it is a built-in method with other parameters, or an ablation of the learner.
+def is_setting(label: str) -> bool:
+    """Whether it is a setting of a built-in method, or an ablation of the learner.
 
     A method of somebody else stands by itself with whatever parameters it was run.
     """
-    return is_built_in(label) and bool(_VARIANT.search(label))
+    return is_built_in(label) and bool(_SETTING.search(label))
 
 
 def is_search(label: str) -> bool:
@@ -109,21 +109,21 @@ def algorithm_of(label: str) -> str:
 
 
 def name_of(label: str) -> str:
-    """The name of a method with its variant, the same wherever it is shown.
+    """The name of a method with its setting, the same wherever it is shown.
 
     ``learner EC4``, ``hill climbing``, ``CMA-ES (other arm still)``. The learner's conditions
     together, ``dual-process (EC1, EC4)``, are ``learner (EC1, EC4)``; a method that is not built
     in is its label.
     """
     label = one_line(label)
-    method, _, variant = label.partition(" ")
+    method, _, setting = label.partition(" ")
     name = KNOWN_METHODS[method].name if method in KNOWN_METHODS else method
     if label.startswith(TOGETHER):
-        name, _, variant = label.replace(LEARNER.rstrip("/"), "learner", 1).partition(") ")
+        name, _, setting = label.replace(LEARNER.rstrip("/"), "learner", 1).partition(") ")
         name = name.rstrip(")") + ")"
     for key, words in _PARAMETERS.items():
-        variant = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, variant)
-    return f"{name} ({variant.replace('_', ' ')})" if variant else name
+        setting = re.sub(rf"(^|(?<=, )){re.escape(key)}", words, setting)
+    return f"{name} ({setting.replace('_', ' ')})" if setting else name
 
 
 def look_alike(label: str) -> str:
@@ -143,7 +143,7 @@ def main_methods(labels: Iterable[str]) -> list[str]:
     single conditions.
     """
     labels = list(dict.fromkeys(labels))
-    over_all = [name for name in labels if name.startswith(TOGETHER) and not is_variant(name)]
+    over_all = [name for name in labels if name.startswith(TOGETHER) and not is_setting(name)]
     together = [max(over_all)] if over_all else []
     single = [
         label

@@ -1,7 +1,7 @@
 """Folders whose question is which setting of a method is best: those of a suite with a grid.
 
 In such a folder every setting is shown beside the others, as methods are in other folders, and the
-default says its value. Elsewhere a setting that is not the default is a variant.
+default says its value. Elsewhere methods are compared as they are by default.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def names_of_settings(study: Study) -> dict[str, str]:
     names = {}
     for cell in study.plan.cells if compares_settings(study) else ():
         keys = varied(study)[cell.method.name]
-        if keys and not cell.variant:
+        if keys and not cell.setting:
             values = ", ".join(f"{key}={cell.complete[key]}" for key in keys)
             names[cell.label] = f"{name_of(f'{cell.label} {values}')[:-1]}, default)"
     return names

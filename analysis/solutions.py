@@ -20,7 +20,7 @@ class Solutions:
 
     task: Task
     label: str
-    """The method with its variant."""
+    """The method with its setting."""
     runs: tuple[Execution, ...]
     run_ids: tuple[str, ...] = ()
 

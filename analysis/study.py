@@ -32,7 +32,7 @@ from coartic.tasks.task import address_of
 from coartic.text import counted, unknown
 
 CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its name with its variant."""
+"""Name of a task, and label of a method: its id with its setting."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class CellRuns:
 
     task: str
     method: str
-    variant: str
+    setting: str
     runs: pd.DataFrame
 
     @property
     def label(self) -> str:
-        """The method with its variant."""
-        return label_of(self.method, self.variant)
+        """The method with its setting."""
+        return label_of(self.method, self.setting)
 
     @cached_property
     def good(self) -> pd.DataFrame:
@@ -69,7 +69,7 @@ def typical_run(cell: CellRuns) -> int:
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
-"""Runs of a cell whose solutions are executed again for the signatures."""
+"""Runs of a method on a task whose solutions are executed again for the signatures."""
 MOST_INSTANCES = 8
 """Instances that a report shows singly; more are shown together, by family."""
 
@@ -147,8 +147,8 @@ class Study:
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
     def __repr__(self) -> str:
-        runs, cells = counted(len(self.runs), "run"), counted(len(self.cells), "cell")
-        return f"Study of {self.folder}: {runs} of suite {self.suite}, {cells}"
+        runs = counted(len(self.runs), "run")
+        return f"Study of {self.folder}: {runs} of suite {self.suite}"
 
     @property
     def suite(self) -> str:
@@ -178,13 +178,13 @@ class Study:
 
     @cached_property
     def cells(self) -> dict[CellKey, CellRuns]:
-        """Runs by task and label (method with its variant), in the order of the plan."""
-        names = ["task", "method", "variant"]
+        """Runs by task and label (method with its setting), in the order of the plan."""
+        names = ["task", "method", "setting"]
         groups = self.runs.groupby(names, sort=False).indices if len(self.runs) else {}
         return {
             (key[0], cell.label): CellRuns(*key, self.runs.iloc[groups.get(key, [])])
             for cell in self.plan.cells
-            for key in [(cell.task.name, cell.method.name, cell.variant)]
+            for key in [(cell.task.name, cell.method.name, cell.setting)]
         }
 
     @cached_property
@@ -199,15 +199,16 @@ class Study:
             yield from store.rewards()
 
     @cached
-    def executed(self, task: str, label: str, *, replay: bool = False) -> Solutions:
+    def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
         """Solutions of the solved runs of a method on a task, executed again.
 
         The first 500 of them: signatures say no more with thousands.
 
         Parameters
         ----------
-        task, label : str
-            Names as in :attr:`runs`; the label is the method with its variant.
+        task, method : str
+            Names as in :attr:`runs`; a setting stands after its method: ``"guesses
+            half_width=0.5"``.
         replay : bool
             The noiseless trial after learning in place of the solution, of the runs that have one.
             For a learner whose solution is its best trial, it says what is learned without
@@ -219,7 +220,7 @@ class Study:
             The stored movements cannot be executed or do not do what is stored of them.
         """
         stored = self._movements("replay" if replay else "solution")
-        ids = map(str, self.cells[task, label].good.run_id)
+        ids = map(str, self.cells[task, method].good.run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
         executed = []
         with explain_errors(self.folder):
@@ -229,15 +230,15 @@ class Study:
                 if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 executed.append(run)
-        return Solutions(self.tasks[task], label, tuple(executed), tuple(solutions))
+        return Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
 
-    def postures(self, task: str, label: str, *, replay: bool = False) -> Array:
+    def postures(self, task: str, method: str, *, replay: bool = False) -> Array:
         """Postures in which the solved runs of a method hit the goals of a task.
 
         Parameters
         ----------
-        task, label : str
-            Names as in :attr:`runs`.
+        task, method : str
+            As in :meth:`executed`.
         replay : bool
             Of the noiseless trial after learning in place of the solution.
 
@@ -246,7 +247,7 @@ class Study:
         ndarray, shape (runs, G, dof)
             Configurations, length unit (base) and rad (joints); at most 500 runs.
         """
-        return self.executed(task, label, replay=replay).postures
+        return self.executed(task, method, replay=replay).postures
 
     def sign(self, name: str, *, replay: bool = False) -> pd.Series:
         """A sign of coarticulation of every run.
@@ -291,8 +292,8 @@ class Study:
 def one_by_one(study: Study) -> set[str]:
     """Names of the tasks that a report has one by one.
 
-    All, but no instances of families, if these are many. A variant has the name of its task before
-    the first dot.
+    All, but no instances of families, if these are many. A changed task has the name of its task
+    before the first dot.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
     return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())

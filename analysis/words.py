@@ -120,7 +120,7 @@ def interval(
 def marked(task: Task) -> str:
     """Title of a task, with † where it is reconstructed (:data:`RECONSTRUCTED`).
 
-    Its title; a variant that shares the title of its task has what is particular besides.
+    Its title; one that shares the title of its task has what is particular besides.
     """
     base, _, particular = task.name.partition(".")
     shared = particular and task.label.lower().replace(" ", "-") == base

@@ -74,7 +74,7 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
     each other, and for runs that no source has and that are not performed here."""
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
-        (plans[name].settings[position].asked, number)
+        (plans[name].specifications[position].asked, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
@@ -116,13 +116,15 @@ def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
 
 
 def cells_of(plan: Plan) -> Iterator[tuple[str, Cell]]:
-    """The cells of a plan, each after the hash of its setting without the code."""
-    return zip((setting.asked for setting in plan.settings), plan.cells, strict=True)
+    """The cells of a plan, each after the hash of its specification without the code."""
+    return zip(
+        (specification.asked for specification in plan.specifications), plan.cells, strict=True
+    )
 
 
 def named(cells: Sequence[Cell]) -> str:
     """Name the first of some cells, and count the others."""
-    others = f" and of {counted(len(cells) - 1, 'other cell')}" if len(cells) > 1 else ""
+    others = f" and of {counted(len(cells) - 1, 'other')}" if len(cells) > 1 else ""
     return f"{cells[0].label} on {cells[0].task.name}{others}"
 
 
@@ -139,9 +141,9 @@ def check_together(plans: Mapping[str, Plan]) -> None:
         agree(where, "the suite", repr(plan.suite))
         agree(where, "the seed", plan.seed)
         agree(where, "the trial budget", plan.trial_budget)
-        for cell, setting in zip(plan.cells, plan.settings, strict=True):
+        for cell, specification in zip(plan.cells, plan.specifications, strict=True):
             name, method = cell.task.name, cell.method
-            agree(where, f"task {name!r}", f"definition {hash_of(setting.definition)[:8]}")
+            agree(where, f"task {name!r}", f"definition {hash_of(specification.definition)[:8]}")
             hint = ": leave it out of one of them, or give it another name"
             agree(where, f"method {method.name!r}", f"code {method.code}", hint)
             cell_named = f"{cell.label} on {name}"
@@ -155,17 +157,16 @@ def copy_runs(name: str, source: Store, target: Store, origin: dict[str, str]) -
     says where those are from that the target has. Raises CoarticError where a run does not do what
     is stored of it, or the target has another result of it."""
     methods, there = source.plan().methods, target.runs().set_index("run_id").result.to_dict()
-    for _, cell in source.runs().groupby(["task", "label"], sort=False):
+    for _, cell in source.runs().groupby(["task", "method", "setting"], sort=False):
         results = dict(zip(cell.run_id, cell.result, strict=True))
         for run_id in results.keys() & there.keys():
             if results[run_id] == there[run_id]:
                 continue
             run = source.run(run_id)
             if changes := compare_runs(target.run(run_id), run):  # beyond trials not kept
-                raise CoarticError(
-                    f"run {run.number} of {run.setting.method} on {run.setting.task.name} "
-                    f"differs in {origin[run_id]} and {name} ({run_id}): {changes[0]}"
-                )
+                which = f"run {run.number} of {cell.method.iloc[0]} on {cell.task.iloc[0]}"
+                where = f"{origin[run_id]} and {name} ({run_id})"
+                raise CoarticError(f"{which} differs in {where}: {changes[0]}")
         runs = [source.run(run_id) for run_id in results if run_id not in there]
         if runs and name != SHIPPED:  # whose file is checked by its hash
             check_scores(name, methods[cell.method.iloc[0]], runs, results)
@@ -181,7 +182,7 @@ def check_scores(
     Raises CoarticError where one does not come to what is stored of it, or to the hash of its
     result, which ``results`` has by id.
     """
-    setting = runs[0].setting
+    specification = runs[0].specification
     stated = [
         Outcome(
             run.status,  # type: ignore[arg-type]  # the table takes no other
@@ -195,7 +196,7 @@ def check_scores(
         for run in runs
     ]
     again = score(
-        Job(setting, method, runs[0].suite_seed, tuple(run.number for run in runs)), stated
+        Job(specification, method, runs[0].suite_seed, tuple(run.number for run in runs)), stated
     )
     for run, scored in zip(runs, again, strict=True):
         before, after = run.to_row(), scored.to_row()

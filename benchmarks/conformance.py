@@ -26,7 +26,7 @@ from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.worker import Job
 from coartic.method import METERED
 from coartic.runs.card import MethodCard
-from coartic.runs.plan import Setting
+from coartic.runs.plan import Specification
 from coartic.runs.run import Run
 from coartic.tasks.task import check_task
 from coartic.text import counted
@@ -61,8 +61,8 @@ def check_method(card: MethodCard, tasks: Sequence[Task] | None = None) -> list[
 
     def job(task: Task, seed: int = 1, trial_budget: int | None = None) -> Job:
         complete = card.complete(parameters)
-        setting = Setting(task, card.name, card.code, card.told, complete, trial_budget)
-        return Job(setting, card, seed, (0,), CHECK_LIMIT_S)
+        specification = Specification(task, card.name, card.code, card.told, complete, trial_budget)
+        return Job(specification, card, seed, (0,), CHECK_LIMIT_S)
 
     laws = laws_of_declaration(card)
     tasks = list(filter(applies, tasks or map(load_task, builtin_tasks())))

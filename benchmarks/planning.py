@@ -127,7 +127,7 @@ def plan_suite(
         first = planned.setdefault(hash_of([name, method.name, complete]), wanted)
         if first.runs != count:
             raise CoarticError(
-                f"{name} x {cell.label}: the suite asks for {first.runs} runs of this cell, and "
+                f"{name} x {cell.label}: the suite asks for {first.runs} runs of it, and "
                 f"then for {count}; give one number"
             )
     return Plan(

@@ -146,7 +146,7 @@ class Worker:
             return
         # While it compiles kernels: what it hands over is executed here.
         with contextlib.suppress(Exception):  # the process says the same
-            warm_up(self.jobs[0].setting.task, "trials")
+            warm_up(self.jobs[0].specification.task, "trials")
 
     @property
     def sentinels(self) -> list[int]:
@@ -218,8 +218,8 @@ def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
         os.dup2(descriptor, stream)
     bound_resources(workers)
     for job in jobs:  # kernels are compiled, or loaded, on no run's clock
-        learns = job.setting.method.startswith(METHOD_PREFIX)
-        warm_up(job.setting.task, "learner" if learns else "motion", "trials")
+        learns = job.specification.method.startswith(METHOD_PREFIX)
+        warm_up(job.specification.task, "learner" if learns else "motion", "trials")
     place = folder / "place"
     place.mkdir()
     tempfile.tempdir = os.environ["TMPDIR"] = str(place)

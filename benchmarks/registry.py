@@ -22,7 +22,7 @@ from coartic.benchmarks.code_identity import code_of
 from coartic.benchmarks.reader import Reader, cards_of_module
 from coartic.errors import CoarticError
 from coartic.inputs import check_file
-from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX, VARIANTS
+from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
 from coartic.method import Method
 from coartic.runs.card import BUILT_IN, READERS, MethodCard, card_of, methods_in
 from coartic.runs.plan import SEARCH
@@ -97,7 +97,7 @@ def add_cards(registered: dict[str, MethodCard], cards: Iterable[MethodCard]) ->
     """Add methods by id. Raises CoarticError for an id that is reserved or taken, and for
     one that differs from a name here in large and small letters alone."""
     for card in cards:
-        names = (*registered, *CONDITIONS, *VARIANTS, *NAMES)
+        names = (*registered, *CONDITIONS, *ABLATIONS, *NAMES)
         why = ""
         if card.name.startswith(RESERVED):
             ours = " or ".join(map(repr, RESERVED))

@@ -52,7 +52,7 @@ def trajectory_of(folder: Path, run: Run) -> Trajectory:
     none that can be shown."""
     if "solution" not in run.scores:
         raise CoarticError(f"run {run.id} has no solution to show: {run.status}, {run.reason}")
-    task, movements = run.setting.task, run.scores["solution"].movements
+    task, movements = run.specification.task, run.scores["solution"].movements
     try:
         (execution,) = execute_all(task, [movements])
         if isinstance(execution, Exception):
@@ -73,18 +73,18 @@ def perform_again(run: Run, registered: Registry) -> Run:
 
     Raises CoarticError where its method is not here, or no longer takes its parameters.
     """
-    if run.setting.method not in registered:
-        raise CoarticError(unknown("method", run.setting.method, registered))
-    method = registered[run.setting.method]
+    if run.specification.method not in registered:
+        raise CoarticError(unknown("method", run.specification.method, registered))
+    method = registered[run.specification.method]
     try:
-        method.complete(run.setting.parameters)
+        method.complete(run.specification.parameters)
     except CoarticError as error:
         version = plain(str(run.environment.get("coartic")), 20)
         raise CoarticError(
             f"run {run.id} cannot be performed here: {error}. Version {version} of coartic made it."
         ) from None
-    setting = replace(run.setting, code=method.code, told=method.told)
-    job = Job(setting, method, run.suite_seed, (run.number,), run.time_limit_s)
+    specification = replace(run.specification, code=method.code, told=method.told)
+    job = Job(specification, method, run.suite_seed, (run.number,), run.time_limit_s)
     return next(perform_in_order([job]))
 
 

@@ -22,7 +22,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
 from coartic.files import folder_named
-from coartic.runs.plan import Plan, Setting, trials_in
+from coartic.runs.plan import Plan, Specification, trials_in
 from coartic.runs.run import Run
 from coartic.runs.store import Store, writing
 from coartic.text import counted
@@ -68,7 +68,7 @@ class Progress:
 
     def finish(self, run: Run) -> None:
         """Count a run that is performed now."""
-        method, seconds = run.setting.method, run.times.wall_s
+        method, seconds = run.specification.method, run.times.wall_s
         self.done += 1
         self.count(run.status)
         self.waiting[method] -= 1
@@ -106,8 +106,8 @@ class Progress:
         return f"{runs} in {time_taken}, {failed}: {self.folder}{without}"
 
 
-Watcher = Callable[[Progress, Setting | None], None]
-"""Called before the first run, and after each with its setting."""
+Watcher = Callable[[Progress, Specification | None], None]
+"""Called before the first run, and after each with its specification."""
 
 
 def run_suite(
@@ -115,7 +115,7 @@ def run_suite(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    watch: Watcher = lambda progress, setting: None,
+    watch: Watcher = lambda progress, specification: None,
     **options: Any,
 ) -> Progress:
     """Run what a folder lacks of a suite: :func:`plan_suite`, then :func:`perform`.
@@ -154,7 +154,7 @@ def perform(
     folder: str | Path,
     *,
     executor: Executor | None = None,
-    watch: Watcher = lambda progress, setting: None,
+    watch: Watcher = lambda progress, specification: None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
 
@@ -189,7 +189,7 @@ def perform(
         progress = Progress(folder, plan.size, stale=store.stale())
         missing = missing_jobs(plan, store, progress)
         for job in missing:
-            progress.waiting[job.setting.method] += len(job.numbers)
+            progress.waiting[job.specification.method] += len(job.numbers)
         progress.workers = executor.workers
         watch(progress, None)
         jobs = divided(missing, executor.workers)
@@ -205,7 +205,7 @@ def perform(
                     store.write(runs)
                     for run in runs:
                         progress.finish(run)
-                        watch(progress, run.setting)
+                        watch(progress, run.specification)
             jobs = alone
         progress.wall_s = time.perf_counter() - clock
         progress.others = len(store.ids()) - plan.size
@@ -225,10 +225,10 @@ def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
             progress.present += 1
             progress.count(status)
     jobs = []
-    for p, (cell, setting) in enumerate(zip(plan.cells, plan.settings, strict=True)):
+    for p, (cell, specification) in enumerate(zip(plan.cells, plan.specifications, strict=True)):
         numbers = tuple(number for number in range(cell.runs) if (p, number) not in there)
         if numbers:
-            jobs.append(Job(setting, cell.method, plan.seed, numbers, plan.time_limit_s))
+            jobs.append(Job(specification, cell.method, plan.seed, numbers, plan.time_limit_s))
     return jobs
 
 
@@ -249,7 +249,7 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     share = max(math.ceil(sum(len(job.numbers) for job in jobs) / workers), LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
-        is_ours, parameters = job.method.is_ours, job.setting.parameters
+        is_ours, parameters = job.method.is_ours, job.specification.parameters
         most = job.method.configure(parameters).most_together() if is_ours else 1
         parts += divide(job, min(most, share))
     even = len(parts) - len(parts) % workers
@@ -258,6 +258,6 @@ def divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), LEAST_BATCH))
 
     def trials(job: Job) -> float:
-        return trials_in(job.setting.parameters) * len(job.numbers) or math.inf
+        return trials_in(job.specification.parameters) * len(job.numbers) or math.inf
 
     return sorted(ordered, key=trials, reverse=True)

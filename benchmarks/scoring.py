@@ -16,7 +16,7 @@ from coartic.text import LONGEST_REASON, plain
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     """The runs of a job, also of one that failed. All their parts are executed side by side; a run
     has the scores of its parts where it is ok."""
-    task = job.setting.task
+    task = job.specification.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []
     for number, outcome in zip(job.numbers, outcomes, strict=True):
@@ -26,7 +26,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
         executed = {part: e for part, e in parts.items() if is_ok and isinstance(e, Execution)}
         solution = executed.get("solution")
         run = Run(
-            setting=job.setting,
+            specification=job.specification,
             suite_seed=job.suite_seed,
             number=number,
             status=status,

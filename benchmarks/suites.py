@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from coartic import CONDITIONS, VARIANTS, CoarticError, Task, builtin_tasks, load_task, parse_task
+from coartic import ABLATIONS, CONDITIONS, CoarticError, Task, builtin_tasks, load_task, parse_task
 from coartic.benchmarks.registry import Registry
 from coartic.inputs import (
     MOST_CELLS,
@@ -74,7 +74,7 @@ class Block(FileData):
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
     """Only the tasks with so many goals; all where it is not given."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
-    """Runs per cell, where it is not the suite's number."""
+    """Runs of each method on each task, where it is not the suite's number."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = Field(
         default_factory=dict
@@ -111,12 +111,12 @@ class Suite(FileData):
     title: Line
     description: Line
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)]
-    """Runs per cell of a stochastic method; the others are run once."""
+    """Runs of each stochastic method on each task; the others are run once."""
     trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
     """Trials per run, for methods that have this parameter."""
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
     """CPU time of a run; the runs of a batch have it together."""
-    cells: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
+    blocks: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
 
 
 def suites() -> dict[str, Suite]:
@@ -143,7 +143,9 @@ def load_suite(name: str) -> Suite:
 def read_suite(path: Path) -> Suite:
     """A suite from its file. Raises CoarticError with a line for each problem."""
     content = read_toml(path)
-    if "goals" in content and "cells" not in content:
+    if "cells" in content:
+        raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")
+    if "goals" in content and "blocks" not in content:
         raise CoarticError(f"{path} is a task, not a suite: run a suite with --tasks {path}")
     try:
         return Suite.model_validate({"name": path.stem, **content})
@@ -194,13 +196,13 @@ def select_cells(
     user_tasks = read_tasks(own)
     wanted = [each for name in tasks if name not in own for each in named_by(str(name))]
     wanted += user_tasks
-    in_suite = {name for block in suite.cells for name in block.task_names(user_tasks)}
+    in_suite = {name for block in suite.blocks for name in block.task_names(user_tasks)}
     for name in wanted:
         if name not in in_suite and address_of(name):
             user_tasks.setdefault(name, task_named(name))
     every = (
         cell
-        for block in suite.cells
+        for block in suite.blocks
         for name in block.task_names(user_tasks)
         # Goals are not moved in the user's tasks unless they are named.
         if block.move is None or WILDCARD not in block.tasks or name not in user_tasks
@@ -209,7 +211,7 @@ def select_cells(
     cells = list(itertools.islice(every, MOST_CELLS + 1))
     if len(cells) > MOST_CELLS:
         raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} cells "
+            f"suite {suite.name!r} asks for more than {MOST_CELLS:_} combinations "
             "(tasks x moves x methods x grid)"
         )
     # What named methods and the user's tasks add.
@@ -248,10 +250,10 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     A condition of the learner goes by its own name as well; ``optimum/*`` names all that begin
     so. Raises CoarticError where there is none.
     """
-    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | VARIANTS else name
+    name = f"{METHOD_PREFIX}{name}" if name in CONDITIONS | ABLATIONS else name
     named = [method for method in registered if fnmatchcase(method, name)]
     if not named:
-        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *VARIANTS]))
+        raise CoarticError(unknown("method", name, [*registered, *CONDITIONS, *ABLATIONS]))
     return named
 
 
@@ -275,8 +277,8 @@ def cells_on(task: Task, suite: Suite, block: Block, registered: Registry) -> It
     if block.goals is not None and len(task.goals) not in block.goals:
         return
     methods = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-    for variant, method in itertools.product(variants(task, suite, block), methods):
-        reason = registered[method].why_not(variant, block.parameters)
+    for changed, method in itertools.product(changed_tasks(task, suite, block), methods):
+        reason = registered[method].why_not(changed, block.parameters)
         if reason is not None and WILDCARD not in "".join((*block.methods, *block.tasks)):
             raise CoarticError(f"suite {suite.name!r}: {reason}")
         if reason is not None:
@@ -284,10 +286,10 @@ def cells_on(task: Task, suite: Suite, block: Block, registered: Registry) -> It
         for values in itertools.product(*block.grid.values()):
             parameters = block.parameters | dict(zip(block.grid, values, strict=True))
             registered[method].complete(parameters)
-            yield Cell(variant, registered[method], parameters, runs=block.runs or suite.runs)
+            yield Cell(changed, registered[method], parameters, runs=block.runs or suite.runs)
 
 
-def variants(task: Task, suite: Suite, block: Block) -> list[Task]:
+def changed_tasks(task: Task, suite: Suite, block: Block) -> list[Task]:
     """The task as a block has it: without its lock, or once for each place of the goal that it
     moves."""
     source = f"suite {suite.name!r}"

@@ -30,7 +30,7 @@ from coartic.method import (
 from coartic.motion.outside import trials_outside
 from coartic.motion.solution import Movement
 from coartic.runs.card import MethodCard
-from coartic.runs.plan import SEARCH, Setting, run_seed
+from coartic.runs.plan import SEARCH, Specification, run_seed
 from coartic.runs.run import PARTS, Times
 from coartic.text import error_line
 
@@ -39,7 +39,7 @@ from coartic.text import error_line
 class Job:
     """A batch of runs of one cell, which are performed side by side."""
 
-    setting: Setting
+    specification: Specification
     method: MethodCard
     suite_seed: int
     numbers: tuple[int, ...]
@@ -135,25 +135,25 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
 
 def perform_job(job: Job) -> list[Outcome]:
     """Perform a job. Whatever the method does is an outcome, not an error."""
-    setting = job.setting
+    specification = job.specification
     sessions = [
         Session(
-            setting.task,
-            run_seed(job.suite_seed, setting.task.name, number),
-            map(Information, setting.told),  # as declared, whatever became of the class since
-            trial_budget=setting.trial_budget,
+            specification.task,
+            run_seed(job.suite_seed, specification.task.name, number),
+            map(Information, specification.told),  # as declared, whatever became of the class since
+            trial_budget=specification.trial_budget,
             trusted=job.method.is_ours,
             of_run=True,
         )
         for number in job.numbers
     ]
-    warm = setting.method in _seen
-    _seen.add(setting.method)
+    warm = specification.method in _seen
+    _seen.add(specification.method)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
     try:
-        method = job.method.configure(setting.parameters)
+        method = job.method.configure(specification.parameters)
         results: Sequence[Any]
-        if (reason_not := method.why_not(outline_of(setting.task))) is not None:
+        if (reason_not := method.why_not(outline_of(specification.task))) is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:
             results = [method.solve(sessions[0])]
@@ -169,7 +169,7 @@ def perform_job(job: Job) -> list[Outcome]:
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
-    return [outcome_of(setting.method, result, session, times) for result, session in pairs]
+    return [outcome_of(specification.method, result, session, times) for result, session in pairs]
 
 
 _seen: set[str] = set()

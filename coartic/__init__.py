@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
-    from coartic.learner.conditions import CONDITIONS, VARIANTS, ExplorationCondition
+    from coartic.learner.conditions import ABLATIONS, CONDITIONS, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
     from coartic.learner.run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 __version__ = "1.1.0"
 
 __all__ = [
+    "ABLATIONS",
     "CONDITIONS",
     "PAPER",
-    "VARIANTS",
     "Arm",
     "BudgetError",
     "CoarticError",
@@ -74,7 +74,7 @@ __all__ = [
 
 _HOMES = {
     "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
-    "learner.conditions": ("CONDITIONS", "VARIANTS", "ExplorationCondition"),
+    "learner.conditions": ("CONDITIONS", "ABLATIONS", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
     "learner.run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),

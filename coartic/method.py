@@ -580,7 +580,7 @@ class Method(ABC):
     """Base of every method. A subclass declares itself in its class attributes."""
 
     name: ClassVar[str]
-    """Id, such as ``"dual-process"``; a variant adds ``/variant``."""
+    """Id, such as ``"dual-process"``; another form of it adds ``/form``."""
     title: ClassVar[str]
     citation: ClassVar[str]
     told: ClassVar[frozenset[Information]]

@@ -31,7 +31,7 @@ SUITE = """
 title = "x"
 description = "x"
 runs = 1
-[[cells]]
+[[blocks]]
 tasks = ["ascending"]
 methods = ["dual-process/EC1"]
 """

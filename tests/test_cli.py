@@ -78,13 +78,15 @@ def test_how_far_a_suite_is_fits_on_a_terminal(monkeypatch, capsys, is_terminal)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
     progress = Progress(Path("results"), 63, done=18, waiting=Counter(x=37, y=20), workers=2)
     progress.timed["x"], progress.took["x"] = 6, 600.0  # 100 s a run, by two workers
-    setting = planned([Cell(load_task("two-armed-2"), KNOWN["nullspace-qp/next-goal"])]).settings[0]
+    specification = planned(
+        [Cell(load_task("two-armed-2"), KNOWN["nullspace-qp/next-goal"])]
+    ).specifications[0]
     with Display() as display:
-        display.update(progress, setting)  # too early to tell
+        display.update(progress, specification)  # too early to tell
         progress.done = 19
-        display.update(progress, setting)
+        display.update(progress, specification)
         progress.done, progress.waiting = 63, Counter()
-        display.update(progress, setting)
+        display.update(progress, specification)
     shown = capsys.readouterr().err.replace("\r", "\n").split("\n")
     name = "Two-armed 2, null-space control, next goal"
     lines = ["63/63    0 failed"]

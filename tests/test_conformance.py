@@ -11,7 +11,7 @@ from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import Job, perform_job
-from coartic.runs.plan import Setting
+from coartic.runs.plan import Specification
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import shipped_optima, tiny_task
@@ -107,7 +107,7 @@ def test_methods_that_keep_every_law(methods, name):
 
 def test_what_a_session_shows_cannot_be_written(methods):
     card = methods["test/forger"]
-    asked = Setting(load_task("ascending"), card.name, card.code, card.told, {}, None)
+    asked = Specification(load_task("ascending"), card.name, card.code, card.told, {}, None)
     (outcome,) = perform_job(Job(asked, card, 0, (0,)))
     assert outcome.meter.trials == len(outcome.rewards) == 1
     assert outcome.rewards[0] < 0
@@ -118,7 +118,7 @@ def test_what_a_session_shows_cannot_be_written(methods):
 def test_trials_outside_the_session_are_noticed(methods, means):
     """Those of an objective too, which has a session, but not the one of the run."""
     card, task = methods["test/outsider"], load_task("ascending")
-    asked = Setting(task, card.name, card.code, card.told, {"means": means}, None)
+    asked = Specification(task, card.name, card.code, card.told, {"means": means}, None)
     for _ in range(2):
         (outcome,) = perform_job(Job(asked, card, 0, (0,)))
         assert outcome.status == "crashed"

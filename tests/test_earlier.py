@@ -16,9 +16,10 @@ from coartic.benchmarks.beside import put_beside
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_again
-from coartic.runs.plan import Setting
-from coartic.runs.store import RUNS_FILE, open_store
-from tests.support.suites import paper_cells, run_and_write
+from coartic.benchmarks.run import perform
+from coartic.runs.plan import Specification
+from coartic.runs.store import _VIEWS_1, RUNS_FILE, open_store
+from tests.support.suites import InProcess, paper_cells, run_and_write
 
 READ = (
     "'$.ties', 'left', '$.state', 'previous-hand', '$.equal_distance', 'random', "
@@ -36,11 +37,12 @@ OF_1_1 = (
 
 
 def edited(folder, out, *statements):
-    """A copy of a results folder in which tables are updated so."""
+    """A copy of a results folder as version 1.1 wrote it, in which tables are updated so."""
     shutil.copytree(folder, out)
     with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as db:
         for statement in statements:
             db.execute(f"UPDATE {statement}")
+        db.executescript(f"{_VIEWS_1}PRAGMA user_version = 1")
     return out
 
 
@@ -76,7 +78,7 @@ def now(tmp_path_factory):
 
 def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     then = edited(now, tmp_path / "then", *OF_1_1)
-    assert load(then).plan.settings == load(now).plan.settings
+    assert load(then).plan.specifications == load(now).plan.specifications
     assert load(then).plan.cells[0].complete == load(now).plan.cells[0].complete
     assert check_runs(then).wrong == []
     run_id = load(now).runs.run_id[0]
@@ -87,6 +89,9 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     put_beside(plan, [then], tmp_path / "out")
     with open_store(tmp_path / "out") as store:
         assert {*store.ids()} == {*load(now).runs.run_id}
+    assert perform(load(now).plan, then, executor=InProcess()).done == 0
+    with closing(sqlite3.connect(then / RUNS_FILE)) as db:  # as this version writes it
+        assert db.execute("SELECT run_id, setting FROM runs LIMIT 1").fetchone() == (run_id, "")
 
 
 def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
@@ -113,11 +118,11 @@ def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):
 )
 def test_ids_begin_as_in_1_1(method, parameters, begins):
     """Those of suites quick, with 60 trials, and comparison; an id ends with the hash of code."""
-    setting = Setting(load_task("ascending"), method, "", (), parameters, None)
-    assert setting.run_id(0, 0) == begins
-    row = setting.to_row()
-    again = Setting.from_row(row | {"definition": json.dumps(row["definition"])}, "")
-    assert again == setting  # told nothing
+    specification = Specification(load_task("ascending"), method, "", (), parameters, None)
+    assert specification.run_id(0, 0) == begins
+    row = specification.to_row()
+    again = Specification.from_row(row | {"definition": json.dumps(row["definition"])}, "")
+    assert again == specification  # told nothing
 
 
 @pytest.mark.parametrize(
@@ -127,7 +132,9 @@ def test_ids_begin_as_in_1_1(method, parameters, begins):
 def test_another_reading_is_refused_in_a_sentence(now, tmp_path, column, name, value):
     then = edited(now, tmp_path / "then", *OF_1_1)
     ask(then, column, name, value)
-    refused = pytest.raises(CoarticError, match="on ascending was another setting when it was run")
+    refused = pytest.raises(
+        CoarticError, match="on ascending was another specification when it was run"
+    )
     with open_store(then) as store:
         with refused:
             store.run(store.ids()[0])

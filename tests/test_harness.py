@@ -26,9 +26,9 @@ from coartic.benchmarks.run import perform, plan_suite
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Cell, load_suite, select_cells, suites
 from coartic.benchmarks.worker import Job, Outcome, fail, perform_job
-from coartic.learner.conditions import CONDITIONS, VARIANTS
+from coartic.learner.conditions import ABLATIONS, CONDITIONS
 from coartic.method import Information, Meter, Session
-from coartic.runs.plan import Setting, run_seed
+from coartic.runs.plan import Specification, run_seed
 from coartic.runs.run import Times, movements_from, too_long
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import tiny_task
@@ -56,7 +56,7 @@ def results(tmp_path_factory):
 def test_every_method_runs_in_some_suite():
     studies = Path(__file__).parents[1].glob("studies/*/suite.toml")
     every = [*suites().values(), *(load_suite(str(path)) for path in studies)]
-    blocks = [block for suite in every for block in suite.cells]
+    blocks = [block for suite in every for block in suite.blocks]
     patterns = {pattern for block in blocks for pattern in block.methods}
     run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
     assert run == set(KNOWN)
@@ -71,7 +71,7 @@ def test_suite_ablations_frees_the_base():
     same = {"goals", "start", "hands", "radius", "initial_hands"}
     assert free.model_dump(include=same) == rail.model_dump(include=same)
     blocks = {
-        "cells": [{"tasks": ["ascending"], "methods": ["dual-process/EC1"], "free_base": True}]
+        "blocks": [{"tasks": ["ascending"], "methods": ["dual-process/EC1"], "free_base": True}]
     }
     suite = load_suite("paper").model_validate(load_suite("paper").model_dump() | blocks)
     with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
@@ -85,7 +85,7 @@ def test_long_runs_begin_first(tmp_path):
         workers = 2
 
         def perform(self, jobs):
-            begun.extend((job.setting.method, len(job.numbers)) for job in jobs)
+            begun.extend((job.specification.method, len(job.numbers)) for job in jobs)
             return super().perform(jobs)
 
     cells = suite_of(
@@ -169,7 +169,7 @@ def test_grid_and_fixed_parameters(tmp_path):
         title = "Noise"
         description = "Noise against trials"
         runs = 1
-        [[cells]]
+        [[blocks]]
         tasks = ["ascending"]
         methods = ["dual-process/EC1"]
         parameters = { trials = 40 }
@@ -177,7 +177,7 @@ def test_grid_and_fixed_parameters(tmp_path):
         """
     )
     cells = select_cells(load_suite(str(path)), KNOWN)
-    assert [cell.variant for cell in cells] == [
+    assert [cell.setting for cell in cells] == [
         "trials=40, noise_sd=0.02, epsilon=0.0",
         "trials=40, noise_sd=0.02, epsilon=0.5",
         "trials=40, noise_sd=0.1, epsilon=0.0",
@@ -201,7 +201,7 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
         'tasks = ["*"]\nmethods = ["dual-process/EC1"]',
     )
     cells = planned(asked, runs=3, trials=30).cells
-    labels = [(cell.task.name, cell.variant) for cell in cells]
+    labels = [(cell.task.name, cell.setting) for cell in cells]
     assert labels[:3] == [
         ("ascending", ""),
         ("ascending", "noise_sd=0.5"),
@@ -210,7 +210,7 @@ def test_cells_are_told_apart_by_their_parameters(tmp_path):
     assert len(labels) == len(set(labels)) == 6
     study = run_and_write(tmp_path / "out", cells, runs=3, trials=30)
     assert study.runs.run_id.is_unique
-    assert set(study.runs.groupby(["task", "variant"]).size()) == {3}
+    assert set(study.runs.groupby(["task", "setting"]).size()) == {3}
     compared = {(row["cell"].task, row["cell"].label) for row in beside_paper(study)}
     assert ("ascending", "dual-process/EC1") in compared
 
@@ -272,7 +272,7 @@ def test_the_runs_of_a_batch_are_scored():
     """Solutions are the corrective process, 319 ticks; the second run lacks a tenth."""
     task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
     movements = list(corrective_trial(task, "RRR").movements)
-    setting = Setting(task, card.name, card.code, card.told, {}, None)
+    specification = Specification(task, card.name, card.code, card.told, {}, None)
     times = Times(wall_s=2.0, cpu_s=1.0, warm=True, together=4)
     corrections = [3, *range(20, 10, -1)]  # of trial 0, then by tenths
     told = {"parts": {"solution": movements}, "times": times}
@@ -283,7 +283,7 @@ def test_the_runs_of_a_batch_are_scored():
         Outcome("ok", times=times),
         Outcome("ok", parts={"solution": movements, "replay": movements[:1]}, bound=-300),
     ]  # fmt: skip
-    job = Job(setting, card, 5, (0, 1, 2, 3), 60.0)
+    job = Job(specification, card, 5, (0, 1, 2, 3), 60.0)
     runs = [*score(job, outcomes), *score(job, fail(job, "timeout", "too slow", wall_s=8.0))[:1]]
     columns = ["run", "status", "reward", "hands", "best_trial",
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
@@ -306,9 +306,11 @@ def test_the_runs_of_a_batch_are_scored():
 
 def test_the_runs_of_a_batch_share_its_time():
     task, card = load_task("ascending"), KNOWN["dual-process/EC1"]
-    setting = Setting(task, card.name, card.code, card.told, card.complete({"trials": 50}), None)
+    specification = Specification(
+        task, card.name, card.code, card.told, card.complete({"trials": 50}), None
+    )
     begun = time.perf_counter(), time.process_time()
-    outcomes = perform_job(Job(setting, card, 0, tuple(range(8))))
+    outcomes = perform_job(Job(specification, card, 0, tuple(range(8))))
     wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
     assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
     assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
@@ -321,8 +323,8 @@ def test_a_solution_that_misses_a_goal_is_infeasible():
         goals=[[2.5, 0.1]], initial_hands="R",
     )  # fmt: skip
     card = KNOWN["corrective-alone/given"]
-    setting = Setting(stuck, card.name, card.code, card.told, {}, None)
-    job = Job(setting, card, 0, (0,), 60.0)
+    specification = Specification(stuck, card.name, card.code, card.told, {}, None)
+    job = Job(specification, card, 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.status, run.scores) == ("infeasible", {})
 
@@ -374,13 +376,13 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
         select_cells(paper, KNOWN, tasks=[made[1], str(path)])
 
 
-def test_variants_of_the_learner_are_methods_of_their_own():
+def test_ablations_of_the_learner_are_methods_of_their_own():
     """Known by their short names, and told what they use."""
     cells = paper_cells(methods=["EC1-subtask"], tasks=["ascending"])
     assert [cell.label for cell in cells] == ["dual-process/EC1-subtask"]
     for name, entry in KNOWN.items():
         if name.startswith("dual-process/"):
-            condition = (CONDITIONS | VARIANTS)[name.partition("/")[2]]
+            condition = (CONDITIONS | ABLATIONS)[name.partition("/")[2]]
             for key, value in entry.complete({"trials": 1}).items():
                 assert key == "trials" or getattr(condition, key) == value
             assert ("reward by subtask" in entry.told) == name.endswith("-subtask")
@@ -429,7 +431,7 @@ def test_some_runs_of_every_cell_are_performed_again(results, monkeypatch):
     monkeypatch.setattr(reproduce, "Local", InProcess)
     again = dict(reproduce.perform_some_again(results.folder, len(results.cells), KNOWN))
     assert not any(again.values())
-    cells = results.runs[results.runs.run_id.isin(again)].groupby(["task", "label"])
+    cells = results.runs[results.runs.run_id.isin(again)].groupby(["task", "method", "setting"])
     assert len(cells) == len(again) == len(results.cells)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from coartic import (
+    ABLATIONS,
     CONDITIONS,
-    VARIANTS,
     CoarticError,
     ExplorationCondition,
     MotionModel,
@@ -113,13 +113,13 @@ CREDIT = [
 @pytest.mark.parametrize(
     ("condition", "seed"),
     [
-        *((condition, 11) for condition in VARIANTS.values()),
-        *((replace(VARIANTS["EC4-subtask"], noise_sd=0.03, **each), 162) for each in CREDIT),
+        *((condition, 11) for condition in ABLATIONS.values()),
+        *((replace(ABLATIONS["EC4-subtask"], noise_sd=0.03, **each), 162) for each in CREDIT),
         # One hand is always the closest: it draws no number to break a tie with itself.
         (ExplorationCondition("EC1-one", ("right",), True, False, "closest", epsilon=0.5), 11),
     ],
 )
-def test_variants_equal_the_slow_learner_trial_by_trial(condition, seed):
+def test_ablations_equal_the_slow_learner_trial_by_trial(condition, seed):
     task = load_task("ascending" if condition.id.startswith("EC1") else "two-armed-1")
     slow = assert_equals_reference(task, condition, trials=5, seed=seed)
     assert slow.corrections > len(task.goals) or not condition.corrects
@@ -163,7 +163,7 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
     hits = learn("two-armed-2", "EC4", seed=1, trials=50).execute().configurations
     start = planned(["right", "left", "right", "right"], hits + away)
     task = load_task("two-armed-2")
-    rules = (CONDITIONS | VARIANTS)[condition]
+    rules = (CONDITIONS | ABLATIONS)[condition]
     slow = assert_equals_reference(task, rules, trials=5, seed=3, start=start)
     assert slow.corrections_by_trial[0] == (4 if away else 1)
     run = learn(task, condition, seed=3, trials=1, start=start)
@@ -294,7 +294,7 @@ def test_run_without_any_completed_trial():
 
 
 def test_a_replay_that_misses_a_goal_is_no_solution():
-    condition = replace(VARIANTS["EC4-uncorrected"], learned="replay")
+    condition = replace(ABLATIONS["EC4-uncorrected"], learned="replay")
     run = learn(load_task("two-armed-1"), condition, seed=0, trials=40)
     assert run.completed.any()
     assert (run.learned, run.replay, run.reward, run.hands) == ((), (), None, None)

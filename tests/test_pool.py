@@ -154,7 +154,8 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def runs(folder):
     both = [load(folder / name).runs for name in ("hangs", "others")]
-    return pd.concat([runs.astype(object) for runs in both]).set_index("label")
+    runs = pd.concat([runs.astype(object) for runs in both])
+    return runs.set_index((runs.method + " " + runs.setting).str.strip())
 
 
 @pytest.mark.parametrize("name", HANDLED)
@@ -260,7 +261,7 @@ def test_other_methods_and_the_parent_notice_nothing(folder, runs):
 def test_workers_that_cannot_begin_get_a_sentence():
     plan = planned([Cell(load_task("ascending"), KNOWN["dual-process/EC1"])])
     task = load_task("ascending").model_copy(update={"goals": ()})
-    job = Job(replace(plan.settings[0], task=task), plan.cells[0].method, 0, (0,))
+    job = Job(replace(plan.specifications[0], task=task), plan.cells[0].method, 0, (0,))
     with pytest.raises(CoarticError, match="processes cannot begin"):
         list(Local(1).perform([job] * 10))
 

@@ -121,7 +121,7 @@ def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
 
 
 def test_conditions_are_shown_as_they_are_written():
-    for condition in (coartic.CONDITIONS | coartic.VARIANTS).values():
+    for condition in (coartic.CONDITIONS | coartic.ABLATIONS).values():
         assert eval(repr(condition), {**vars(coartic)}) == condition
 
 

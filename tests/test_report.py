@@ -193,7 +193,7 @@ def test_answers_name_failed_runs_behind_them(traced):
     assert not any("failed" in answer for _, answer in answers(traced))
     planner, learner = "trajectory-optimisation/path-length", "dual-process/EC4"
     runs = traced.runs.reset_index(drop=True)
-    late = runs.index[(runs.method == learner) & (runs.variant == "")][-1:]
+    late = runs.index[(runs.method == learner) & (runs.setting == "")][-1:]
     late = late.append(runs.index[runs.method == planner])
     runs.loc[late, "status"], runs.loc[late, "reward"] = "timeout", pd.NA
     runs.loc[late, "reason"] = "CPU time limit of 600 s exceeded"
@@ -239,15 +239,15 @@ title = "Noise"
 description = "Noise"
 runs = 4
 trials = 600
-[[cells]]
+[[blocks]]
 tasks = ["ascending", "descending"]
 methods = ["dual-process/EC1"]
 grid = { noise_sd = [0.02, 0.05, 0.1] }
 """)
     cells = select_cells(load_suite(str(suite)), KNOWN)
     study = run_and_write(tmp_path / "noise", cells=cells, runs=4, trials=600)
-    labels = {"dual-process/EC1" + variant for variant in ("", " noise_sd=0.02", " noise_sd=0.1")}
-    means = study.runs.groupby(["task", "variant"]).reward.mean().astype(float)
+    labels = {"dual-process/EC1" + setting for setting in ("", " noise_sd=0.02", " noise_sd=0.1")}
+    means = study.runs.groupby(["task", "setting"]).reward.mean().astype(float)
     rows = TABLES["settings"](study)
     for task, of_task in rows.groupby("task"):
         assert of_task.reward.iloc[0] == max(means[task.lower()])

@@ -61,10 +61,10 @@ def test_on_one_task_intervals_are_of_the_gaps_themselves():
 
 
 def test_a_rank_counts_algorithms():
-    variant = {
+    setting = {
         (task, f"{method}-uncorrected"): rewards for (task, method), rewards in LEARNER.items()
     }
-    seen = study(LEARNER | CMA | variant)
+    seen = study(LEARNER | CMA | setting)
     rows = leaders(seen, BY_TRIAL)
     assert rows.algorithm.tolist() == ["CMA-ES", "learner"]
     # Eight pairs, all in favour of the first: of 2^8 signs two are as extreme.
@@ -285,11 +285,11 @@ def test_on_one_task_a_method_stands_beside_the_learners_reward():
 
 
 def test_a_method_from_a_file_stands_with_its_parameters():
-    """In ranking, tests and headline; a setting of a built-in method is a variant."""
+    """In ranking, tests and headline; a setting of a built-in method is not compared."""
     rewards = TEN | strangers(("mine", 2), ("random-search/climbing", 5), runs=10)
     seen = study(rewards)
     learns = seen.runs.method.str.contains("/EC")
-    runs = seen.runs.assign(variant=np.where(learns, "", "width=0.2"))
+    runs = seen.runs.assign(setting=np.where(learns, "", "width=0.2"))
     again = study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
     ranked = TABLES["ranking"](again)
     assert ranked.index.tolist()[:2] == ["mine width=0.2", "dual-process (EC1, EC4)"]

@@ -357,7 +357,7 @@ def journal_of_several(path):
             "this version.*reads.*update coartic",
         ),
         (
-            sql(f"PRAGMA user_version = {FORMAT - 1}"),
+            sql(f"PRAGMA user_version = {FORMAT - 2}"),
             "this version.*reads.*another --out",
         ),
         (foreign, "is not a file of coartic"),

@@ -45,16 +45,16 @@ def along_paths(task):
         yield Movement(goal, "right", "path", waypoints=np.array([aside, beyond]))
 
 
-def run_of(setting, number, parts, **more):
+def run_of(specification, number, parts, **more):
     """A run that made these movements, as it is stored."""
-    task = setting.task
+    task = specification.task
     done = {part: execute(task, movements) for part, movements in parts.items()}
     if solution := done.get("solution"):
         travel = other_arm_travel(task, hands_of(solution.hands), solution.configurations)
         more |= {"solution_corrections": solution.corrections, "other_arm_travel": travel}
     scores = {part: Score(e.reward, e.hands, e.movements) for part, e in done.items()}
-    return Run(setting, 0, number, **{"status": "ok"} | more, reason="", environment={}, date="",
-               scores=scores)  # fmt: skip
+    return Run(specification, 0, number, **{"status": "ok"} | more, reason="", environment={},
+               date="", scores=scores)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +80,8 @@ def true_folder(tmp_path_factory):
     with writing(folder) as store:
         plan = Plan("suite", 0, 7, 300, None, None, cells)
         store.replace_plan(plan, {}, [], "")
-        for setting, (_, _, runs) in zip(plan.settings, asked, strict=True):
-            store.write(run_of(setting, number, made, **more) for number, made, more in runs)
+        for specification, (_, _, runs) in zip(plan.specifications, asked, strict=True):
+            store.write(run_of(specification, number, made, **more) for number, made, more in runs)
     return folder
 
 
@@ -172,17 +172,23 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
 @pytest.mark.parametrize(
     ("words", "statement"),
     [
-        ("Cell 1: it has another task", "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'"),
-        ("Cell 4: its parameters are not", "UPDATE cells SET variant = '' WHERE position = 4"),
         (
-            "Cell 5: it has other param",
+            "Row 1 of table cells: it has another task",
+            "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'",
+        ),
+        (
+            "Row 4 of table cells: its parameters are not",
+            "UPDATE cells SET variant = '' WHERE position = 4",
+        ),
+        (
+            "Row 5 of table cells: it has other param",
             "UPDATE cells SET setting = 4 WHERE setting = 6",
         ),
         (
-            "Two cells show",
+            "Two rows of table cells show",
             "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
         ),
-        ("Cell 0: its method has other code", "UPDATE methods SET code = 'newer'"),
+        ("Row 0 of table cells: its method has other code", "UPDATE methods SET code = 'newer'"),
         ("Tables or views are not", "ALTER TABLE learning ADD COLUMN base_x REAL"),
         ("Tables or views are not", "DROP VIEW paths"),
     ],

@@ -262,10 +262,11 @@ CLAIMS_OF_COARTICULATION = [
         "that others follow are hit with a hand that is slower for that goal alone.",
         place="Method, Two-Armed Task 1; Discussion, Figure 6",
         quote="Coarticulation was seen in terms of which arm was used",
-        test="one-tailed Fisher's exact tests: in one of the cells more than 25% of the runs, and "
-        "more than of guesses, hit a goal that others follow with a hand that is slower for "
-        "that goal alone and is not the initial solution's (smallest p times their number). For "
-        "the opposite: in each cell fewer than 25% of the runs do (exact binomial tests)",
+        test="one-tailed Fisher's exact tests: under one of the conditions more than 25% of the "
+        "runs, and more than of guesses, hit a goal that others follow with a hand that is "
+        "slower for that goal alone and is not the initial solution's (smallest p times their "
+        "number). For the opposite: under each condition fewer than 25% of the runs do (exact "
+        "binomial tests)",
         judge=slower_hands_are_chosen,
         group="beside",
         fitted=True,

@@ -324,9 +324,9 @@ def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
             "and less later.",
             place="Discussion, Multiple Controller Schemes",
             quote="The general controller is useful for generating behavior early in learning",
-            test="one-tailed paired bootstrap tests in each cell: more corrective movements in the "
-            "first tenth of the trials than in the last. Trial 0 does not count, as it has no "
-            "others by construction",
+            test="one-tailed paired bootstrap tests in each experiment: more corrective "
+            "movements in the first tenth of the trials than in the last. Trial 0 does not count, "
+            "as it has no others by construction",
             judge=partial(corrected_less_later, cells=cells),
             fitted=fitted,
             sets="0 of 242 (Two-armed 1, refuted in 242); 0 of 240 (Two-armed 2, refuted in 231)"

@@ -68,7 +68,7 @@ def runs_behind(runs: pd.DataFrame, ids: Sequence[str], tasks: Mapping[str, Task
     """The runs with these ids: run, task, seed, hands and reward, worst of a task first, and the
     method where there are several."""
     chosen = runs[runs.run_id.isin(ids)].sort_values(["task", "reward"], kind="stable")
-    labels = map(label_of, chosen.method, chosen.variant)
+    labels = map(label_of, chosen.method, chosen.setting)
     rewards = chosen.reward.astype("Float64").to_numpy(float, na_value=math.nan)
     shown = {
         "run": chosen.run_id.str[:SHORT_ID],

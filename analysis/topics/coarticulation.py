@@ -20,7 +20,7 @@ from coartic.analysis.methods import (
     in_order,
     is_learner,
     is_search,
-    is_variant,
+    is_setting,
     main_methods,
     name_of,
 )
@@ -225,7 +225,7 @@ def next_goal(study: Study) -> str:
 def joints_or_hand(study: Study) -> str:
     """Number of methods in which the next goal moves the joints more than the hand."""
     rows = list_contexts(study)
-    rows = rows[~rows.method.map(is_variant).astype(bool) & (rows.distance > 0.01)]
+    rows = rows[~rows.method.map(is_setting).astype(bool) & (rows.distance > 0.01)]
     if not len(rows):
         return ""
     larger = int((rows.equivalent > rows.other).sum())

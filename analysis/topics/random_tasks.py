@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import is_variant, most_exploring, name_of
+from coartic.analysis.methods import is_setting, most_exploring, name_of
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -29,7 +29,7 @@ def list_family_gaps(study: Study) -> Rows:
     drawn = [study.tasks[name] for name in best_of_instances(study)]
     two_armed = {str(task.family) for task in drawn if len(task.hands) > 1}
     rows: list[tuple[str, Row]] = []
-    for label in (name for name in every.label.unique() if not is_variant(name)):
+    for label in (name for name in every.label.unique() if not is_setting(name)):
         of_label = every[every.label == label]
         row: Row = {"method": label, "instances": len(of_label), "gap": math.nan}
         for column in ("gap", "to_bound"):

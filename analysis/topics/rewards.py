@@ -35,7 +35,7 @@ _MARKS = {
 
 def published_of(cell: CellRuns) -> PublishedCell | None:
     """Printed rewards of a cell; None but for the paper's own learner."""
-    if not cell.method.startswith(LEARNER) or cell.variant:
+    if not cell.method.startswith(LEARNER) or cell.setting:
         return None
     return published_cell(cell.task, cell.method.removeprefix(LEARNER))
 

@@ -21,7 +21,7 @@ from coartic.analysis.methods import (
     LEARNERS,
     TOGETHER,
     is_search,
-    is_variant,
+    is_setting,
     name_of,
 )
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
@@ -107,7 +107,7 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
     """Cells by task of every method that is compared, the learner's conditions together too.
 
     Without searches for the optimum, cells that lock the base, which solve another problem, and
-    variants, unless settings are compared.
+    settings, unless these are compared.
     """
     every = {
         method: {
@@ -155,9 +155,9 @@ def scores(study: Study) -> pd.DataFrame:
 
 
 def is_compared(study: Study, label: str) -> bool:
-    """Whether a method is compared with others: no search for the optimum, and a variant only where
+    """Whether a method is compared with others: no search for the optimum, and a setting only where
     settings are compared."""
-    shown = compares_settings(study) or not is_variant(label)
+    shown = compares_settings(study) or not is_setting(label)
     return shown and not is_search(label)
 
 

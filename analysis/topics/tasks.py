@@ -101,8 +101,8 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
-        variants = [other.label for other in tasks].count(task.label) > 1
-        name = task.name if variants else task.label
+        several = [other.label for other in tasks].count(task.label) > 1
+        name = task.name if several else task.label
         fits = int(13 * drawing.get_figwidth() / columns)  # letters
         axes.set_title("\n".join([*textwrap.wrap(name, fits), "; ".join(remarks)]).strip())
         x, y = (corners[0] + corners[1]) / 2

@@ -37,7 +37,9 @@ def run(
             "--out", metavar="FOLDER", help="Folder for the results; results/SUITE if not given."
         ),
     ] = None,
-    runs: Annotated[int | None, given.number("--runs", "Runs of each cell.", 1, MOST_RUNS)] = None,
+    runs: Annotated[
+        int | None, given.number("--runs", "Runs of each method on each task.", 1, MOST_RUNS)
+    ] = None,
     trials: Annotated[
         int | None, given.number("--trials", "Trials of each run.", 1, MOST_TRIALS)
     ] = None,
@@ -187,13 +189,14 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         suite = load_suite(name)
         yield "Suite", f"{name}: {suite.title}"
         yield "", suite.description
-        runs = sorted({block.runs or suite.runs for block in suite.cells})
+        runs = sorted({block.runs or suite.runs for block in suite.blocks})
         counts = " or ".join(map(str, runs))
-        yield "Runs", f"{counts} of each cell, {suite.trials or 'no'} trials a run"
-        asked = [t for block in suite.cells for t in block.tasks]
+        yield "Runs", f"{counts} of each method on each task, {suite.trials or 'no'} trials a run"
+        asked = [t for block in suite.blocks for t in block.tasks]
+        methods = [m for block in suite.blocks for m in block.methods]
         tasks = [t for name in asked for t in (builtin_tasks() if name == "*" else [name])]
         yield "Tasks", ", ".join(dict.fromkeys(tasks))
-        yield "Methods", ", ".join(dict.fromkeys(m for block in suite.cells for m in block.methods))
+        yield "Methods", ", ".join(dict.fromkeys(methods))
         yield "Run it", f"coartic run {name}"
     elif name in builtin_tasks() or address_of(name) or is_file:
         task = load_task(name)
@@ -237,7 +240,7 @@ def reproduce(
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
     _, run = find_run(run_id, folder)
-    asked, registered = run.setting, registry(method_file or [])
+    asked, registered = run.specification, registry(method_file or [])
     if asked.method not in registered:
         raise CoarticError(f"unknown method {asked.method!r}: pass --method-file FILE")
     result = f"reward {run.reward}, hands {run.hands}"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from coartic.benchmarks.run import Progress
-    from coartic.runs.plan import Setting
+    from coartic.runs.plan import Specification
 
 READABLE = 24  # characters that a column of text needs
 
@@ -66,12 +66,12 @@ class Display:
     def __exit__(self, *_: object) -> None:
         print(end=self._end, file=sys.stderr, flush=True)
 
-    def update(self, progress: Progress, setting: Setting | None) -> None:
+    def update(self, progress: Progress, specification: Specification | None) -> None:
         """Show the progress, and the task and method of the last run."""
         from coartic.analysis.methods import name_of
 
         self.done, total = progress.done, progress.total
-        if setting is None:
+        if specification is None:
             if progress.stale:
                 count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
@@ -85,8 +85,8 @@ class Display:
         text = f"{there:{len(str(total))}}/{total}  {progress.failed:3} failed  {left:18}"
         if self._is_live:
             last = "starting processes"
-            if setting is not None:
-                last = f"{setting.task.label}, {name_of(setting.method)}"
+            if specification is not None:
+                last = f"{specification.task.label}, {name_of(specification.method)}"
             width = shutil.get_terminal_size().columns - 1
             print("\r", end="", file=sys.stderr)
             words = one_line(f"{text}  {last}")

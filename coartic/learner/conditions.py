@@ -1,4 +1,4 @@
-"""The paper's exploration conditions, and variants of the learner, as data.
+"""The paper's exploration conditions, and ablations of the learner, as data.
 
 A condition says which hands the robot has, which joints are perturbed (AModChosen:
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""A condition or variant as a method has this before its id."""
+"""A condition or ablation as a method has this before its id."""
 MOST_NOISE = 100.0
 """Largest noise, length unit and rad: far beyond what any arm can use. Targets that
 lose themselves in the far would be approached step by step without an end."""
@@ -40,8 +40,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 class ExplorationCondition:
     """What the learner explores. Source: paper, section *Experiments*.
 
-    ``CONDITIONS`` has the paper's four, ``VARIANTS`` has ours; ``dataclasses.replace`` makes others
-    of them. Raises ValueError for what cannot be.
+    ``CONDITIONS`` has the paper's four, ``ABLATIONS`` what takes something away;
+    ``dataclasses.replace`` makes others of them. Raises ValueError for what cannot be.
     """
 
     id: str
@@ -122,7 +122,7 @@ CONDITIONS = {
         ExplorationCondition("EC4", HANDS, True, True, "random"),
     )
 }
-VARIANTS = {
+ABLATIONS = {
     f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **changes)  # type: ignore[arg-type]
     for base in ("EC1", "EC4")
     for name, changes in {
@@ -134,7 +134,7 @@ VARIANTS = {
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """A condition or variant by its id.
+    """A condition or ablation by its id.
 
     Raises CoarticError for an unknown one, and TypeError for what is neither id nor condition.
     """
@@ -146,7 +146,7 @@ def load_condition(condition: str | ExplorationCondition) -> ExplorationConditio
             "name of one, such as 'EC4'"
         )
     try:
-        return (CONDITIONS | VARIANTS)[condition.removeprefix(METHOD_PREFIX)]
+        return (CONDITIONS | ABLATIONS)[condition.removeprefix(METHOD_PREFIX)]
     except KeyError:
-        ids = CONDITIONS | VARIANTS
+        ids = CONDITIONS | ABLATIONS
         raise CoarticError(unknown("exploration condition", condition, ids)) from None

@@ -4,7 +4,7 @@ The paper's section *The Learning Process* and Figure 3. Per trial and goal: cho
 hand, perturb the stored target configuration, move, and let the corrective process
 finish where the goal was missed. A trial better than any before it that passed
 through the same state and hand replaces what is stored there; better by its whole reward,
-or, in a variant, by the return of that goal.
+or, in an ablation, by the return of that goal.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
 trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy generator of its own

@@ -63,7 +63,7 @@ def learn(
     task : Task, str or pathlib.Path
         The task, its name or its file.
     condition : str or ExplorationCondition
-        The condition, or the name of one in ``CONDITIONS`` or ``VARIANTS``, such as ``"EC4"``.
+        The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
     seed : int
         Seed of the random numbers.
     trials : int
@@ -137,7 +137,7 @@ def learn_many(
     task : Task, str or pathlib.Path
         The task, its name or its file.
     condition : str or ExplorationCondition
-        The condition, or the name of one in ``CONDITIONS`` or ``VARIANTS``, such as ``"EC4"``.
+        The condition, or the name of one in ``CONDITIONS`` or ``ABLATIONS``, such as ``"EC4"``.
     seeds : iterable of int
         A seed for each run.
     trials : int

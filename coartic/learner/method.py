@@ -1,4 +1,4 @@
-"""The dual-process learner as a method, one per exploration condition and variant.
+"""The dual-process learner as a method, one per exploration condition and ablation.
 
 Variants that are told more than the paper's learner are methods of their own, with the
 parameter that makes the difference; the others do not have it, so that what a method
@@ -15,10 +15,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from coartic.learner.conditions import (
+    ABLATIONS,
     CONDITIONS,
     METHOD_PREFIX,
     MOST_NOISE,
-    VARIANTS,
     Counted,
     ExplorationCondition,
 )
@@ -50,7 +50,7 @@ class DualProcessParameters(Parameters):
 
 
 class SubtaskParameters(DualProcessParameters):
-    """Parameters of the variants that learn from the reward of each subtask."""
+    """Parameters of the ablations that learn from the reward of each subtask."""
 
     discount: Annotated[float, Field(ge=0, le=1)] = 0.0
     """γ of a goal's return; 0 is the reward of its own subtask alone."""
@@ -134,7 +134,7 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "learning with the MAXQ value function decomposition. Journal of Artificial "
             "Intelligence Research."
         )
-    number, _, variant = condition.id[2:].partition("-")
+    number, _, ablation = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
         (DualProcess,),
@@ -143,7 +143,7 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "__module__": __name__,
             "name": f"{METHOD_PREFIX}{condition.id}",
             "title": f"Dual-process learner, exploration condition {number}"
-            + (f", {variant}" if variant else ""),
+            + (f", {ablation}" if ablation else ""),
             "told": frozenset(told),
             "citation": citation,
             "Parameters": parameters,
@@ -153,5 +153,5 @@ def method_for(condition: ExplorationCondition) -> type[DualProcess]:
 
 
 METHODS: tuple[type[DualProcess], ...] = tuple(
-    map(method_for, chain(CONDITIONS.values(), VARIANTS.values()))
+    map(method_for, chain(CONDITIONS.values(), ABLATIONS.values()))
 )

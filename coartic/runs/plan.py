@@ -35,7 +35,7 @@ class Cell:
     runs: Annotated[int, Field(ge=0, le=MOST_RUNS)] = 1
 
     @property
-    def variant(self) -> str:
+    def setting(self) -> str:
         """Parameters that differ from the method's defaults, such as ``noise_sd=0.1``."""
         defaults = self.method.defaults
         return ", ".join(
@@ -46,8 +46,8 @@ class Cell:
 
     @property
     def label(self) -> str:
-        """The method with its variant."""
-        return label_of(self.method.name, self.variant)
+        """The method with its setting."""
+        return label_of(self.method.name, self.setting)
 
 
 _MODEL_THEN = {
@@ -84,7 +84,7 @@ def parameters_from(method: str, text: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Setting:
+class Specification:
     """Everything that the results of a run depend on, apart from its seed."""
 
     task: Task
@@ -133,10 +133,10 @@ class Setting:
         }
 
     @classmethod
-    def from_row(cls, row: Mapping[str, Any], source: str) -> Setting:
-        """A setting from its row. Raises TaskError, which names the ``source``, and ValueError as
-        :meth:`check`."""
-        setting = cls(
+    def from_row(cls, row: Mapping[str, Any], source: str) -> Specification:
+        """A specification from its row. Raises TaskError, which names the ``source``, and
+        ValueError as :meth:`check`."""
+        specification = cls(
             task=parse_task(json.loads(row["definition"]), source),
             method=row["method"],
             code=row["code"],
@@ -144,19 +144,19 @@ class Setting:
             parameters=parameters_from(row["method"], row["parameters"]),
             trial_budget=row["trial_budget"],
         )
-        setting.check(row["asked"])
-        return setting
+        specification.check(row["asked"])
+        return specification
 
     def check(self, asked: str) -> None:
         """Raises ValueError where it was stored with another hash."""
         if asked != self.asked:
             raise ValueError(
-                f"{self.method} on {self.task.name} was another setting when it was run: the "
+                f"{self.method} on {self.task.name} was another specification when it was run: the "
                 "version of coartic that ran it reads it"
             )
 
     def run_id(self, suite_seed: int, number: int) -> str:
-        """The id of a run: a hash of setting, seed and number, then that of the code."""
+        """The id of a run: a hash of specification, seed and number, then that of the code."""
         text = f"{self.asked} {suite_seed} {number}"
         return f"{hashlib.sha256(text.encode()).hexdigest()[:16]}-{self.code}"
 
@@ -193,10 +193,10 @@ class Plan:
         return sum(cell.runs for cell in self.cells)
 
     @cached_property
-    def settings(self) -> tuple[Setting, ...]:
-        """The setting of each cell."""
+    def specifications(self) -> tuple[Specification, ...]:
+        """The specification of each cell."""
         return tuple(
-            Setting(
+            Specification(
                 task=cell.task,
                 method=cell.method.name,
                 code=cell.method.code,
@@ -208,20 +208,25 @@ class Plan:
         )
 
     def to_rows(self) -> dict[str, list[dict[str, Any]]]:
-        """Its rows by table; that of a cell has the setting itself in place of its number."""
+        """Its rows by table; that of a cell has the specification itself in place of its number."""
         cells = [
             {
                 "position": position,
-                "setting": setting,
-                "variant": cell.variant,
+                "setting": specification,
+                "variant": cell.setting,
                 "parameters": cell.parameters,
                 "runs": cell.runs,
             }
-            for position, (cell, setting) in enumerate(zip(self.cells, self.settings, strict=True))
+            for position, (cell, specification) in enumerate(
+                zip(self.cells, self.specifications, strict=True)
+            )
         ]
         names = [each.name for each in fields(MethodCard) if each.name != "where"]
         of_methods = [{name: getattr(m, name) for name in names} for m in self.methods.values()]
-        definitions = {setting.task.name: setting.definition for setting in self.settings}
+        definitions = {
+            specification.task.name: specification.definition
+            for specification in self.specifications
+        }
         return {
             "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
             "tasks": [{"name": name, "definition": d} for name, d in definitions.items()],
@@ -231,9 +236,9 @@ class Plan:
 
     @classmethod
     def from_rows(cls, rows: Mapping[str, Sequence[Mapping[str, Any]]], source: str) -> Plan:
-        """A plan from its rows by table; those of cells with the columns of their settings, whose
-        parameters are ``complete``. Raises ValueError for what no plan has, and TaskError, which
-        names the ``source``."""
+        """A plan from its rows by table; those of cells with the columns of their specifications,
+        whose parameters are ``complete``. Raises ValueError for what no plan has, and
+        TaskError, which names the ``source``."""
         tasks = {
             row["name"]: parse_task(json.loads(row["definition"]), source) for row in rows["tasks"]
         }
@@ -252,17 +257,19 @@ class Plan:
             for row in rows["cells"]
         ]
         plan: Plan = TypeAdapter(cls).validate_python(asked)
-        for row, cell, setting in zip(rows["cells"], plan.cells, plan.settings, strict=True):
-            if row["variant"] != cell.variant:
-                raise ValueError(f"variant {row['variant']!r} is not that of its parameters")
-            setting.check(row["asked"])
+        for row, cell, specification in zip(
+            rows["cells"], plan.cells, plan.specifications, strict=True
+        ):
+            if row["variant"] != cell.setting:
+                raise ValueError(f"setting {row['variant']!r} is not that of its parameters")
+            specification.check(row["asked"])
         if len({row["setting"] for row in rows["cells"]}) < len(plan.cells):
-            raise ValueError("two cells have one setting")
+            raise ValueError("two cells have one specification")
         return plan
 
     def run_id(self, position: int, number: int) -> str:
         """The id of a run of the cell at this position."""
-        return self.settings[position].run_id(self.seed, number)
+        return self.specifications[position].run_id(self.seed, number)
 
 
 _OF_SUITE = ("seed", "runs", "trials", "time_limit_s", "trial_budget")
@@ -290,6 +297,6 @@ def trials_in(parameters: Mapping[str, Any]) -> int:
     return trials if type(trials) is int and trials > 0 else 0
 
 
-def label_of(method: str, variant: str) -> str:
-    """A method with its variant, as everything names it that has no room for both."""
-    return f"{method} {variant}".strip()
+def label_of(method: str, setting: str) -> str:
+    """A method with its setting, as everything names it that has no room for both."""
+    return f"{method} {setting}".strip()

@@ -1,4 +1,4 @@
-"""A run: its key, its setting, its results and its cost."""
+"""A run: its key, its specification, its results and its cost."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from coartic.method import Meter
 from coartic.model import PAPER
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import Execution, Movement, execute_many
-from coartic.runs.plan import Setting, run_seed
+from coartic.runs.plan import Specification, run_seed
 from coartic.tasks.task import Task
 
 RESULTS = {
@@ -106,7 +106,7 @@ class Times:
 class Run:
     """One run."""
 
-    setting: Setting
+    specification: Specification
     suite_seed: int
     number: int
     """From 0, within its cell."""
@@ -138,13 +138,13 @@ class Run:
 
     @cached_property
     def id(self) -> str:
-        """A hash of setting, seed of the suite and number, then that of the code."""
-        return self.setting.run_id(self.suite_seed, self.number)
+        """A hash of specification, seed of the suite and number, then that of the code."""
+        return self.specification.run_id(self.suite_seed, self.number)
 
     @property
     def seed(self) -> int:
         """The seed of its random numbers."""
-        return run_seed(self.suite_seed, self.setting.task.name, self.number)
+        return run_seed(self.suite_seed, self.specification.task.name, self.number)
 
     @property
     def reward(self) -> int | None:
@@ -229,7 +229,7 @@ class Run:
     def from_row(
         cls,
         row: Mapping[str, Any],
-        setting: Setting,
+        specification: Specification,
         environment: dict[str, Any],
         movements: Mapping[str, tuple[Movement, ...]],
         rewards: list[int | None],
@@ -243,7 +243,7 @@ class Run:
         warm = None if row["warm"] is None else bool(row["warm"])
         run = cls(
             **{name: row[name] for name in _AS_THEY_ARE},
-            setting=setting,
+            specification=specification,
             number=row["run"],
             environment=environment,
             scores={

@@ -33,7 +33,7 @@ from coartic.errors import CoarticError
 from coartic.inputs import MOST_TRIALS, explain_inline
 from coartic.motion.solution import Movement
 from coartic.robot import Array
-from coartic.runs.plan import Plan, Setting, hash_of
+from coartic.runs.plan import Plan, Specification, hash_of
 from coartic.runs.run import PARTS, RESULTS, STATUSES, Run, movements_from
 from coartic.tasks.task import Task
 from coartic.text import one_line, plain
@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 1
-"""Raised when a table changes its meaning, or a table or a view its text."""
+FORMAT = 2
+"""Raised when a table changes its meaning, or a table or a view its text. Format 1, of versions 1.0
+and 1.1, has other columns in view ``runs`` and is read as well."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
@@ -53,7 +54,8 @@ _DTYPES: dict[str, Any] = {
         name: {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64"}[kind.split()[0]]
         for name, kind in RESULTS.items()
     },
-    **dict.fromkeys(("suite", "task", "method", "variant", "label", "hand", "kind"), "string"),
+    **dict.fromkeys(("suite", "task", "method", "setting", "hand", "kind"), "string"),
+    **dict.fromkeys(("variant", "label"), "string"),  # of format 1
     **dict.fromkeys(("told", "parameters", "commit", "code", "packages", "part"), "string"),
     **dict.fromkeys(("result_id", "order", "goal", "ticks"), "Int64"),
     "warm": "boolean",
@@ -85,7 +87,6 @@ CREATE TABLE waypoints (result_id INTEGER NOT NULL, "order" INTEGER NOT NULL,
     waypoint INTEGER NOT NULL, PRIMARY KEY (result_id, "order", waypoint)) WITHOUT ROWID;
 CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL);
 PRAGMA application_id = {_APPLICATION};
-PRAGMA user_version = {FORMAT};
 """
 _ASKED_FOR = """
     FROM cells JOIN settings ON settings.id = cells.setting
@@ -95,11 +96,12 @@ _FIRST = f"""results.id IN (SELECT id FROM (
     SELECT results.id, row_number() OVER (PARTITION BY cells.position ORDER BY run) AS place
     {_ASKED_FOR} WHERE status = 'ok') WHERE place <= ?)"""
 _VIEWS = f"""
+PRAGMA user_version = {FORMAT};
 DROP VIEW IF EXISTS runs;
 DROP VIEW IF EXISTS solutions;
 DROP VIEW IF EXISTS paths;
 CREATE VIEW runs AS SELECT run_id, (SELECT name FROM suite) AS suite, settings.task, method,
-    variant, trim(method || ' ' || variant) AS label,
+    variant AS setting,
     {", ".join(f"results.{name}" for name in _OWN if name != "run_id")},
     settings.told, settings.parameters, commit_id AS "commit", settings.code, packages
     {_ASKED_FOR} JOIN environments ON environments.id = results.environment
@@ -111,6 +113,7 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     JOIN waypoints ON waypoints.result_id = results.id
     ORDER BY cells.position, results.run, "order", waypoint;
 """
+_VIEWS_1 = _VIEWS.replace("variant AS setting", "variant, trim(method || ' ' || variant) AS label")
 
 
 _SURROUNDINGS: dict[str, Any] = {
@@ -157,7 +160,7 @@ class Store:
                 "environment": self._environment(environment),
             }
             for row in rows["cells"]:
-                row["setting"] = self._setting(row["setting"])
+                row["setting"] = self._specification(row["setting"])
             for table, content in rows.items():
                 self._db.execute(f"DELETE FROM {table}")
                 for row in content:
@@ -252,7 +255,7 @@ class Store:
                     self._write_run(run)
                 except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
                     raise CoarticError(
-                        f"run {run.id} of method {run.setting.method} cannot be stored: {error}"
+                        f"run {run.id} of {run.specification.method} cannot be stored: {error}"
                     ) from None
 
     def run(self, run_id: str) -> Run:
@@ -262,7 +265,7 @@ class Store:
             if row is None:
                 raise CoarticError(f"it has no run {run_id}")
             asked = self._one("SELECT * FROM settings WHERE id = ?", row["setting"])
-            setting = Setting.from_row(asked, str(self.folder / RUNS_FILE))
+            specification = Specification.from_row(asked, str(self.folder / RUNS_FILE))
             environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
             blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
             movements, waypoints = (
@@ -276,16 +279,17 @@ class Store:
             rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
             return Run.from_row(
                 row,
-                setting,
+                specification,
                 json.loads(environment["content"]),
-                {part: movements_from(setting.task, rows[part], points) for part in PARTS},
+                {part: movements_from(specification.task, rows[part], points) for part in PARTS},
                 [None if reward == FAILED_TRIAL else reward for reward in rewards],
             )
 
     def runs(self) -> pd.DataFrame:
         """View ``runs`` as a data frame, with nullable types."""
         with explain_errors(self.folder):
-            return check_runs(self._frame("runs"))
+            runs = self._frame("runs").rename(columns={"variant": "setting"})
+            return check_runs(runs.drop(columns="label", errors="ignore"))
 
     def solutions(self) -> pd.DataFrame:
         """View ``solutions`` as a data frame, with nullable types."""
@@ -336,13 +340,13 @@ class Store:
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         row = run.to_row()
-        row["setting"] = self._setting(run.setting)
+        row["setting"] = self._specification(run.specification)
         row["environment"] = self._environment(run.environment)
         result = self._insert("results", row)
 
         def joints(configuration: Array) -> dict[str, float]:
             return dict(
-                zip(run.setting.task.robot.joint_names, configuration.tolist(), strict=True)
+                zip(run.specification.task.robot.joint_names, configuration.tolist(), strict=True)
             )
 
         for part, score in run.scores.items():
@@ -358,9 +362,9 @@ class Store:
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
 
-    def _setting(self, setting: Setting) -> int:
-        """Id of the row of a setting, which is inserted where there is none."""
-        return self._id_of("settings", setting.to_row(), "asked", "code")
+    def _specification(self, specification: Specification) -> int:
+        """Id of the row of a specification, which is inserted where there is none."""
+        return self._id_of("settings", specification.to_row(), "asked", "code")
 
     def _environment(self, content: dict[str, Any]) -> int:
         """Id of the row of an environment, which is inserted where there is none."""
@@ -559,13 +563,15 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         if there:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
-    if version != FORMAT:
+    if version not in (1, FORMAT):
         do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(f"it has format {version}; this version of coartic reads {FORMAT}: {do}")
     with closing(sqlite3.connect(":memory:")) as ours:
-        ours.executescript(f"{_SCHEMA}{_VIEWS}")
+        ours.executescript(_SCHEMA)
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
         add_joints(ours, filter(_JOINT.fullmatch, columns))
+        if version == 1:
+            ours.executescript(_VIEWS_1)
         for kind, name, _ in sorted(there ^ schema(ours)):
             raise CoarticError(
                 f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "

@@ -40,7 +40,7 @@ def main(*, is_long: bool = False) -> None:
     """Measure and print."""
     show_ways()
     warm_up(load_task("ascending"))
-    print(f"{'cell':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
+    print(f"{'experiment':20}{'one run':>12}{f'{LANES} runs':>12}   microseconds of a core a trial")
     for cell in plan_suite("paper").cells:
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
         alone, many = (_us_a_trial(task, condition, runs) for runs in (1, LANES))
@@ -151,7 +151,7 @@ title = "Tiny runs"
 description = "Many runs of two trials each."
 runs = 50_000
 trials = 2
-[[cells]]
+[[blocks]]
 tasks = ["ascending"]
 methods = ["dual-process/EC1"]
 """

@@ -85,7 +85,9 @@ def tabulate_apart(study, runs):
     """
     guesses = TwoContexts(*(study.executed(task, GUESSES) for task in SHARED), 1, "right")
     rows = {}
-    for kind, label in runs[runs.task == SHARED[0]].groupby("kind").label.first().items():
+    first = runs[runs.task == SHARED[0]].groupby("kind").first()
+    labels = (first.method + " " + first.setting).str.strip()
+    for kind, label in labels.items():
         learned = [study.executed(task, label, replay=True) for task in SHARED]
         ours = guesses if label == GUESSES else TwoContexts(*learned, 1, "right")
         beyond = np.nan if label == GUESSES else ours.p_beyond(guesses)

@@ -48,7 +48,7 @@ def tidy(study):
     solved = study.runs[study.runs.status == "ok"]
     best = solved.groupby("task").reward.max()
     rows = []
-    for cell in solved.drop_duplicates(["task", "label"]).itertuples():
+    for cell in solved.drop_duplicates(["task", "method", "setting"]).itertuples():
         task, parameters = study.tasks[cell.task], json.loads(cell.parameters)
         learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
         origin, moved = re.fullmatch(r"(.+?)(?:\.goal(\d+)_.+)?", cell.task).groups()
@@ -62,7 +62,9 @@ def tidy(study):
             wanted = model.get("parameters", {}).items()
             if (model["method"] or learner) == cell.method and wanted <= parameters.items():
                 replay = model.get("replayed", False)
-                for run in study.executed(cell.task, cell.label, replay=replay).runs:
+                for run in study.executed(
+                    cell.task, f"{cell.method} {cell.setting}".strip(), replay=replay
+                ).runs:
                     path = trajectory(task, run.movements)
                     rows.append({"model": name, **facts, "path": path})
     return pd.DataFrame(rows)

@@ -45,7 +45,7 @@ def made_up_optima(*tasks):
 
 def row(method, reward, *, task="two-armed-1", run=0, travel=0.0, status="ok", **more):
     return {
-        "task": task, "method": method, "variant": "", "run": run, "status": status,
+        "task": task, "method": method, "setting": "", "run": run, "status": status,
         "run_id": f"{method}-{run}", "reason": "", "reward": reward, "hands": "LRLR",
         "told": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
@@ -64,12 +64,12 @@ def declared(method):
 
 def plan_for(tasks, runs=None):
     """A plan with these tasks and the cells that the rows of runs are of."""
-    keys = ["task", "method", "variant"]
+    keys = ["task", "method", "setting"]
     rows = [] if runs is None else runs[keys].drop_duplicates().to_dict("records")
     by_name = {task.name: task for task in tasks}
     cells = []
     for each in rows:
-        parameters = dict(item.split("=") for item in each["variant"].split(", ") if item)
+        parameters = dict(item.split("=") for item in each["setting"].split(", ") if item)
         cells.append(Cell(by_name[each["task"]], declared(each["method"]), parameters, runs=3))
     return Plan(
         suite="paper", runs=3, seed=0, trials=10_000, time_limit_s=None, trial_budget=None,

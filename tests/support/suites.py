@@ -50,7 +50,7 @@ def paper_cells(**selection):
 def suite_of(tmp_path, *blocks):
     path = tmp_path / "own.toml"
     head = 'title = "x"\ndescription = "x"\nruns = 3\ntrials = 30\n'
-    path.write_text(head + "".join(f"[[cells]]\n{block}\n" for block in blocks))
+    path.write_text(head + "".join(f"[[blocks]]\n{block}\n" for block in blocks))
     return select_cells(load_suite(str(path)), KNOWN)
 
 
@@ -101,7 +101,7 @@ def same_results(a, b):
 
 
 def traced_cells():
-    """Of the paper, beside planners, a search without a corrective process, and a variant."""
+    """Of the paper, beside planners, a search without a corrective process, and an ablation."""
     cells = [
         Cell(load_task(task), KNOWN[method])
         for task, methods in (
