@@ -16,6 +16,7 @@ version = release = coartic.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_directives"]
 source_suffix = {".md": "myst-nb"}
+exclude_patterns = ["examples"]
 
 html_theme = "furo"
 html_title = f"coartic {release}"

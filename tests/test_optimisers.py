@@ -191,6 +191,29 @@ def test_the_first_program_of_the_page(capsys):
     assert float(cost) == -int(reward)
 
 
+def test_the_package_for_optunahub():
+    hub, optuna = pytest.importorskip("optunahub"), pytest.importorskip("optuna")
+    head = (EXAMPLES / "optunahub" / "README.md").read_text("utf-8").split("---\n")[1]
+    keys = "author", "title", "description", "tags", "optuna_versions", "license"
+    assert tuple(line.partition(":")[0] for line in head.splitlines()) == keys
+    problem = hub.load_local_module("optunahub", registry_root=str(EXAMPLES)).Problem()
+    start = {name: "R" if name[:4] == "hand" else 0.0 for name in problem.search_space}
+    assert [*start.values()].count(0.0) == 40
+    assert len(start) == 44
+    assert problem.best_known == 300
+    cost = coartic.objective("two-armed-2", "RLRR")
+    targets = cost.postures.copy()
+    targets[1, 2] += 0.1
+    targets[3, 9] -= 0.2
+    ticks = problem.evaluate(start | {"hand_2": "L", "left_1_2": 0.1, "right_4_4": -0.2})
+    assert ticks == cost(targets[cost.joints]) != cost(cost.x0)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    sampler = optuna.samplers.TPESampler(seed=0)
+    study = optuna.create_study(directions=problem.directions, sampler=sampler)
+    study.optimize(problem, n_trials=60)
+    assert study.best_value < min(trial.value for trial in study.trials[:15])
+
+
 @pytest.mark.parametrize("wrong", [0, -1.0, np.nan, np.inf, "1", None, True, [1.0], 101])
 def test_a_wrong_half_width_is_refused(wrong):
     with pytest.raises(ValueError, match="half_width is .*; it must be a number from 1e-09 to 100"):

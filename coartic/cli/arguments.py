@@ -35,7 +35,7 @@ MethodFiles = Annotated[
 ]
 
 
-def number(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
+def within(option: str, what: str, least: float, most: float, unit: str = "N") -> Any:
     """An option that is a number from ``least`` to ``most``, a whole one where ``least`` is an int.
     Raises CoarticError for anything else when it is read."""
 

@@ -68,7 +68,7 @@ def animate(
     initial: Annotated[
         bool, typer.Option("--initial", help="Show the initial solution beside it.")
     ] = False,
-    width: Annotated[int, given.number("--width", "Width in pixels.", 200, 3840)] = 800,
+    width: Annotated[int, given.within("--width", "Width in pixels.", 200, 3840)] = 800,
     replace: given.Replace = False,
 ) -> None:
     """Make a film of a run, alone or beside another one."""

@@ -124,7 +124,7 @@ def trace(
 
 def verify(
     folder: given.Results,
-    again: Annotated[int, given.number("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
+    again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Execute every stored solution again and compare."""

@@ -38,13 +38,13 @@ def run(
         ),
     ] = None,
     runs: Annotated[
-        int | None, given.number("--runs", "Runs of each method on each task.", 1, MOST_RUNS)
+        int | None, given.within("--runs", "Runs of each method on each task.", 1, MOST_RUNS)
     ] = None,
     trials: Annotated[
-        int | None, given.number("--trials", "Trials of each run.", 1, MOST_TRIALS)
+        int | None, given.within("--trials", "Trials of each run.", 1, MOST_TRIALS)
     ] = None,
     jobs: Annotated[
-        int | None, given.number("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
+        int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
     ] = None,
     tasks: Annotated[
         str | None,
@@ -59,14 +59,14 @@ def run(
         list[Path] | None,
         typer.Option(readable=False, metavar="FILE", help="A family of your own (TOML)."),
     ] = None,
-    seed: Annotated[int, given.number("--seed", "Seed of the suite.", 0, MOST_SEED)] = 0,
+    seed: Annotated[int, given.within("--seed", "Seed of the suite.", 0, MOST_SEED)] = 0,
     time_limit: Annotated[
         float | None,
-        given.number("--time-limit", "Most CPU time of a run.", 1e-3, MOST_SECONDS, "SECONDS"),
+        given.within("--time-limit", "Most CPU time of a run.", 1e-3, MOST_SECONDS, "SECONDS"),
     ] = None,
     trial_budget: Annotated[
         int | None,
-        given.number("--trial-budget", "Most trials that a run may make.", 1, MOST_TRIALS),
+        given.within("--trial-budget", "Most trials that a run may make.", 1, MOST_TRIALS),
     ] = None,
     scheduler: Annotated[
         str | None,
