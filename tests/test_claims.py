@@ -114,7 +114,7 @@ def test_claims_are_counted_by_verdict():
     half = verdicts.verdicts_in_words(entries)
     assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
     assert verdicts.verdicts_in_words(entries[:-1]).startswith(
-        "1 of 2 central claims are supported.\nSupported: the posture depends"
+        "Central claims: supported 1, undecided 1.\nSupported: the posture depends"
     )
 
 

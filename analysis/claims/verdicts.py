@@ -44,19 +44,20 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
         )
     short = judged.verdict.rename(lambda name: CLAIMS[name].short)
     central = short[short.index != ""]
-    held = (central == "supported").sum()
-    which = f"All {spelled(held)}" if held == len(central) else f"{held} of {len(central)}"
+    card, each = (
+        ", ".join(f"{verdict} {count}" for verdict, count in counts(verdicts).items() if count)
+        for verdicts in (central, judged.verdict)
+    )
+    card = f"Central claims: {card}"
+    if (central == "supported").all():
+        card = f"All {spelled(len(central))} central claims are supported"
     words = [
         f"{capital(verdict)}: {listed(names.index)}."
         for verdict, names in central.groupby(central, sort=False)
     ]
-    each = ", ".join(f"{verdict} {count}" for verdict, count in n.items() if count)
     lacking = judged.evidence.str.startswith("Not judged").sum()
     without = f" Of the undecided, {number(lacking)} lack runs here." if lacking else ""
-    return (
-        f"{which} central claims are supported.\n{' '.join(words)} "
-        f"Of all {len(judged)} claims: {each}.{without}"
-    )
+    return f"{card}.\n{' '.join(words)} Of all {len(judged)} claims: {each}.{without}"
 
 
 def claims_hold(study: Study) -> str:

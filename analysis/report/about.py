@@ -16,8 +16,8 @@ from coartic.text import one_line
 
 
 def shown(text: str) -> str:
-    """Text as one printable line, which does not break before a per cent sign."""
-    return one_line(text).replace(" %", f"{NO_BREAK}%")
+    """Text as one printable line, which does not break before a per cent sign or a dagger."""
+    return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
 
 
 def visible_sections(study: Study) -> list[Section]:

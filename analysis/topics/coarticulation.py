@@ -218,7 +218,7 @@ def next_goal(study: Study) -> str:
         text += f", those of guesses {number(guesses.apart, 2)}"
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
-        text += f". Add method {GUESSES} to compare them with guesses"
+        text += f". Run method {GUESSES} as well to tell"
     return f"{text}.{failed_runs(cells, ' and are not counted')}"
 
 

@@ -293,7 +293,7 @@ def nearest(study: Study) -> str:
     things = "settings" if by_settings else "that learn"
     of = f" of the {spelled(len(learn))} {things}" if len(learn) > 1 else ""
     places = [n for n, method in enumerate(learn.method) if named(method) == "the learner"]
-    text = f"{who} ends {gaps[0]} from the {to}"  # one alone is not nearest
+    text = f"{who} came within {gaps[0]} of the {to}"  # one alone is not nearest
     if following:
         text = f"{who} comes nearest{f' to the {to}' if 'folder' in to else of} ({gaps[0]})"
     if any(places) and "folder" not in to:
@@ -310,7 +310,7 @@ def nearest(study: Study) -> str:
     text += f"{declared(rows.method[0])}."
     for place in filter(None, places):
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
-    for guessed in by_trial.gap[by_trial.method == methods.GUESSES]:
+    for guessed in by_trial.gap[by_trial.method == methods.GUESSES] if len(learn) else ():
         ahead = ", behind the learner" if places and learn.gap[places[0]] < guessed else ""
         text += f" Guesses end {number(100 * guessed, 1)} % away{ahead}."
     if len(learn) and len(by_formula):
