@@ -61,6 +61,15 @@ class CellRuns:
         return self.good.reward.to_numpy(dtype=np.float64)
 
 
+UNITS = {
+    **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
+    **dict.fromkeys(["proven_bound", "movement_ticks"], "ticks"),
+    **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
+    **{"gap": "share of the best known reward", "other_arm_travel": "rad", "process_peak_mb": "MB"},
+}
+"""Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
+
+
 def typical_run(cell: CellRuns) -> int:
     """Index of the solved run whose reward is nearest to their median."""
     return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())
@@ -128,7 +137,9 @@ def tidy(runs: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     more = pd.DataFrame(rows, runs.index)
     runs = runs.join(more[[name for name in more if name not in runs]])
     runs["best_known"] = runs.get("best_known", pd.Series(dtype="Int64")).astype("Int64")
-    return runs.assign(gap=gaps(runs))
+    runs = runs.assign(gap=gaps(runs))
+    runs.attrs["units"] = UNITS
+    return runs
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -205,7 +205,6 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
             unsolved = [f"initial hands {hands}: {execution.reason}"]
     except (NotApplicableError, TaskError) as error:
         unsolved = [str(error)]
-    unsourced = " and ".join(key for key in ("goals", "start") if key not in task.provenance)
     methods = [name for name, card in registered.items() if card.why_not(task) is None]
     return [
         Law("valid", True, f"{task.name}, {counted(len(task.goals), 'goal')}"),
@@ -216,11 +215,6 @@ def check_task_file(path: Path, registered: Registry) -> list[Law]:
         ),
         law("distinct goals", near, "successive goals lie apart"),
         law("solvable", unsolved, solved),
-        law(
-            "provenance",
-            [f"no source and status for {unsourced} ([provenance])"] * bool(unsourced),
-            "goals and start have a source and a status",
-        ),
         law(
             "methods",
             ["no method applies to it"] * (not methods),

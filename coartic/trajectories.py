@@ -110,7 +110,7 @@ class Trajectory:
             A row for each control tick. ``goal`` is the number of the goal that the robot moves to,
             ``hand`` the hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in
             length units, ``left_1`` and so on in rad) and the place of both hands (``left_x``,
-            ``left_y``, ``right_x``, ``right_y``, length unit).
+            ``left_y``, ``right_x``, ``right_y``, length unit). ``attrs["units"]`` has these units.
         """
         import pandas as pd
 
@@ -122,6 +122,10 @@ class Trajectory:
         frame[list(self.task.robot.joint_names)] = self.configurations
         for hand in HANDS:
             frame[[f"{hand}_x", f"{hand}_y"]] = self.hand_path(hand)
+        frame.attrs["units"] = {
+            name: "length unit" if name.endswith(("_x", "_y")) else "rad"
+            for name in frame.columns[2:]
+        }
         return frame
 
     def plot(self) -> Figure:

@@ -158,7 +158,6 @@ def test_shipped_tasks_keep_every_law(methods, path):
     ("text", "law", "finding"),
     [
         ("name = 1", "valid", "name is 1"),
-        (GOOD, "provenance", "no source and status for goals and start"),
         (GOOD.replace('"mine"', '"ascending"'), "name", "belongs to a different, shipped task"),
         (GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), "distinct goals", "goals 1 and 2 lie within"),
         (

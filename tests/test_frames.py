@@ -116,6 +116,8 @@ def test_runs_are_tidy(tmp_path):
     study = load(tmp_path / "runs")
     runs = study.runs
     assert runs.family.isna().all()
+    assert {*runs.attrs["units"]} < {*runs}
+    assert runs.attrs["units"]["reward"] == "ticks"
     assert runs.goals.tolist() == [4] * 4
     assert runs.noise_sd.dropna().tolist() == [0.05] * 3
     best = coartic.objective("two-armed-1").best_known

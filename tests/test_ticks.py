@@ -19,6 +19,9 @@ def test_the_table_has_each_tick(mine):
     assert len(frame) == mine.ticks == -mine.reward
     assert (frame.goal == 1).sum() == mine.hits[0] + 1
     assert set(frame.hand) == {"right"}
+    units = {frame.attrs["units"][name] for name in ("base_y", "left_x")}, {*frame.attrs["units"]}
+    assert units == ({"length unit"}, {*frame.columns[2:]})
+    assert frame.attrs["units"]["left_1"] == "rad"
     joints = frame[list(TASK.robot.joint_names)].to_numpy()
     for hand in ("left", "right"):
         places = frame[[f"{hand}_x", f"{hand}_y"]].to_numpy()

@@ -153,7 +153,7 @@ class Task(FileData):
     robot: Robot = Robot()
     """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
-    """Source and status of the figures, by key."""
+    """Source and status of the figures, by key. The task's author chose those that are not here."""
 
     @cached_property
     def q0(self) -> Array:
