@@ -18,7 +18,7 @@ from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
 BLACK, BASE_GREY, WHITE = "#000000", "#7a7a7a", "#ffffff"
-HIT = "#009e73"  # of a goal, as on the play page
+HIT = "#009e73"  # of a goal
 MARKERS: dict[Hand, dict[str, Any]] = {
     # Squares are larger than circles, so that hands at one place show both.
     "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": WHITE},

@@ -24,7 +24,7 @@ const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 /* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first. `told`
    has the place from which a goal has just moved. Of `own` postures, each with its hand, one without joints is left to
-   the robot. Before tick 0 the robots stand where they hit the goal they share. */
+   the robot. Before tick 0 the robots stand where they hit the goal they share, or you place yours. */
 const AT_FIRST = {
   open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", ahead: 1, goals: null,
   others: null, told: null, trials: 0, tick: -1, own: null, edited: 1,
@@ -200,9 +200,14 @@ class Play {
     if (this.stale) this.send();
   }
 
+  /* Of what is asked. */
+  result(key) {
+    return this.asked.has(key) ? this.results.get(key) : undefined;
+  }
+
   /* What was learned after so many trials. */
   snapshot(key, trials = this.shown) {
-    const result = this.results.get(key);
+    const result = this.result(key);
     return result ? result.snapshots.findLast((each) => each.trials <= trials) || null : null;
   }
 
@@ -385,7 +390,7 @@ class Play {
       else if (LEARNS.includes(who)) {
         for (let seed = 1; seed < SEEDS; seed += 1) {
           const found = this.fresh.has(`${k} run ${seed}`) && this.snapshot(`${k} run ${seed}`);
-          if (found && (found.trials >= this.shown || this.results.get(`${k} run ${seed}`).done)) runs.push(found.reached[0]);
+          if (found && (found.trials >= this.shown || this.result(`${k} run ${seed}`).done)) runs.push(found.reached[0]);
         }
       }
       runs = runs.filter(Boolean);
@@ -428,7 +433,7 @@ class Play {
     const learns = LEARNS.includes(this.state.who) && !this.told;
     this.find("learning").hidden = !learns;
     if (!learns) return;
-    const runs = this.problems.map((_, k) => this.results.get(`${k} run 0`)).filter(Boolean);
+    const runs = this.problems.map((_, k) => this.result(`${k} run 0`)).filter(Boolean);
     const known = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward)].filter(Number.isFinite);
     const learned = runs.flatMap(({ snapshots }) => snapshots.map(({ reward }) => -reward));
     const all = [...known, ...learned].filter(Number.isFinite);
@@ -451,7 +456,7 @@ class Play {
     }
     this.problems.forEach((_, k) => {
       const level = (reward, dash) => { if (Number.isFinite(reward)) curve.path([[left, y(-reward)], [right, y(-reward)]], 1.2, dash); };
-      const { snapshots = [] } = this.results.get(`${k} run 0`) || {};
+      const { snapshots = [] } = this.result(`${k} run 0`) || {};
       context.strokeStyle = colours[ROLES[k]];
       level(this.alone[k].reward, [2, 4]);
       level(this.plan[k] && this.plan[k].reward, [8, 4]);
@@ -523,7 +528,7 @@ class Play {
   say() {
     const { state } = this;
     const learns = LEARNS.includes(state.who);
-    const run = this.results.get("0 run 0");
+    const run = this.result("0 run 0");
     const at = learns && run ? Math.min(this.shown, run.made) : 0;
     const [finding, meaning = ""] = this.finding;
     const scores = this.scores.map(([role, name, reward]) => {
@@ -585,6 +590,7 @@ class Play {
       }));
     }
     const layer = this.find("handles");
+    let place = 0;
     this.handles = this.handles || new Map();
     this.handles.forEach((handle, name) => {
       if (!wanted.has(name)) {
@@ -599,9 +605,11 @@ class Play {
         handle.type = "button";
         handle.className = "handle";
         this.drags(handle, name);
-        layer.append(handle);
         this.handles.set(name, handle);
       }
+      const next = layer.children[place];
+      if (next !== handle) layer.insertBefore(handle, next || null); // in the order of the keyboard
+      place += 1;
       const [x, y] = this.stage.toScreen(at);
       handle.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
       handle.classList.toggle("joint", this.editing);
@@ -661,7 +669,7 @@ class Play {
   /* ---- Postures by hand ---- */
 
   get editing() {
-    return this.state.who === "you" && !this.playing && !this.watching;
+    return this.state.who === "you" && this.state.tick < 0;
   }
 
   /* Of each goal the hand and the joints; at first only the hand. */
@@ -712,6 +720,7 @@ class Play {
     const on = (name, kind, act) => this.find(name).addEventListener(kind, act);
     const change = (name, value) => {
       Object.assign(this.state, { [name]: value, told: null });
+      if (this.state.who === "you") [this.state.tick, this.playing] = [-1, false];
       this.ask();
       this.keep();
     };
@@ -731,8 +740,7 @@ class Play {
     });
     on("who", "change", (event) => {
       const { state } = this;
-      this.watching = false;
-      if (event.target.value === "you") [state.mate, this.playing] = [state.who, false];
+      if (event.target.value === "you") state.mate = state.who;
       change("who", event.target.value);
     });
     on("stored", "change", (event) => { if (event.target.value) change("who", event.target.value); });
@@ -772,16 +780,15 @@ class Play {
     });
     on("trials", "change", () => this.keep());
     on("play", "click", () => {
-      this.watching = this.state.who === "you" && !this.playing;
       if (!this.playing) this.play();
       else {
         this.playing = false;
+        if (this.state.who === "you") this.state.tick = -1;
         this.refresh();
         this.keep();
       }
     });
     on("tick", "input", (event) => {
-      this.watching = true;
       this.playing = false;
       this.state.tick = Number(event.target.value);
       this.refresh();
