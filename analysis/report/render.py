@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import html
 import math
+import textwrap
 from collections.abc import Sequence
+from fnmatch import fnmatch
 from typing import Any
 
 import pandas as pd
@@ -42,6 +44,25 @@ LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"><
 """Link to a row by its id."""
 FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
 """Shrinks a table that is wider than the text."""
+PAPER = {
+    "settings": "task, method, runs, reward, behind, p_holm",
+    "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
+    "published": "task, condition, published, ours, runs, difference, verdict",
+    "claims": "statement, verdict, p_holm",
+    "ranking": "method, gap, on *",
+    "runtimes": "method, reached, trials_to_quarter, trials_to_half, kinematics_to_half",
+    "hands": "task, condition, hands, published, ours, runs, difference",
+    "learning": "task, method, runs, after_*, half_gain",
+    "signatures": "task, method, runs, first, total, as_in_isolation, preshaping",
+    "family-gaps": "method, gap, in *",
+    "tasks": "task, arms, base, initial, optimum, bound",
+    "methods": "task, method, runs, reward, gap, hands, trials",
+}
+"""Tables for a paper, and their columns, which fit the width of a text; others are CSV alone."""
+MOST_ROWS = 50
+"""Rows of a table on one page; a longer one is CSV alone."""
+LONG = 0.72
+"""Width of a column of sentences, as a share of the text's."""
 
 
 def column_of(name: str) -> Column:
@@ -158,18 +179,29 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the table of the page in LaTeX, with booktabs.
+    """Return the columns of :data:`PAPER` in LaTeX, with booktabs; all of a table that has none.
 
-    It is made smaller where it is wider than the text. ``notes`` stand below it, with what a dagger
-    means where there is one.
+    A text that is the same in all rows stands in the caption. ``notes`` stand below the table, with
+    what a dagger means where there is one.
     """
     columns = columns_of(frame)
-    cells = {column: list(map(latex, texts_of(frame, column))) for column in columns}
-    shown = pd.DataFrame(cells).set_axis(list(map(latex, columns.values())), axis="columns")
-    sides = ["r" if is_number(frame[column]) else "l" for column in columns]
+    chosen = [c for want in PAPER.get(name, "*").split(", ") for c in columns if fnmatch(c, want)]
+    cells, heads, sides = [], [], ""
+    for column in chosen:
+        texts, numbers = texts_of(frame, column), is_number(frame[column])
+        if len({*texts}) == 1 < len(texts) and not numbers:
+            caption += f" ({columns[column]}: {texts[0]})"
+            continue
+        side, longest = "r" if numbers else "l", max(map(len, texts))
+        head = textwrap.wrap(columns[column], max(longest, 9), break_long_words=False)
+        heads.append(f"\\shortstack[{side}]{{" + "\\\\{}".join(map(latex, head)) + "}")
+        sides += f"p{{{LONG}\\linewidth}}" if longest > 60 else side
+        cells.append(list(map(latex, texts)))
+    # Two columns may have one header.
+    shown = pd.DataFrame(dict(enumerate(cells))).set_axis(heads, axis="columns")
     body = shown.style.hide(axis="index").to_latex(
         hrules=True,
-        column_format=f"@{{}}{''.join(sides)}@{{}}",
+        column_format=f"@{{}}{sides}@{{}}",
         caption=latex(caption),
         label=f"tab:coartic-{name}",
         position="tp",
