@@ -268,7 +268,7 @@ grid = { noise_sd = [0.02, 0.05, 0.1] }
 def test_tables_compile_and_fit_the_text(tables_by_name, tmp_path):
     """That of article at 10 pt, 345 pt wide; none of their 8 pt are made smaller than 6."""
     notes = ["The optimum of Two-armed 1 † is not proven."]
-    tables = [name for name in render.PAPER if 0 < len(tables_by_name[name]) <= render.MOST_ROWS]
+    tables = [name for name in render.IN_LATEX if 0 < len(tables_by_name[name]) <= render.MOST_ROWS]
     assert {"ranking", "claims", "runtimes", "tasks"} <= {*tables}
     texts = [render.latex_table(tables_by_name[name], name, name, notes) for name in tables]
     (tmp_path / "all.tex").write_text(

@@ -38,7 +38,6 @@ MAGNIFIED = 1.3
 """Enlarges figures on the page, so that their 8 pt are as large as its text."""
 PHONE = 320 / 72
 """Width in inches that a phone shows: it scrolls a figure that is wider."""
-_FONTS = "'DejaVu Sans', Verdana, sans-serif"  # the latter as wide as the first
 _NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
     ".pdf": {"CreationDate": None},
@@ -108,7 +107,8 @@ def spoken(rows: pd.DataFrame, template: str) -> str:
 def picture(drawing: Figure, ending: str) -> bytes:
     """A figure as a file with this ending, one of :data:`FORMATS`.
 
-    The same figure gives the same bytes: ids are salted, no date is written.
+    The same figure gives the same bytes on machines with the same fonts: ids are salted, no date is
+    written.
     """
     stream = io.BytesIO()
     with rc_context(RC):
@@ -146,7 +146,7 @@ def for_page(plot: Plot) -> dict[str, Any]:
     svg = (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
         f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
-        f'stroke-linecap="butt" fill="currentColor" font-family="{_FONTS}">'
+        'stroke-linecap="butt" fill="currentColor">'
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
     return {

@@ -16,7 +16,7 @@ from coartic.analysis.claims.judging import Verdict
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.report import about
 from coartic.analysis.report.player import player
-from coartic.analysis.report.render import MOST_ROWS, PAPER, TONES, html_table, latex_table
+from coartic.analysis.report.render import IN_LATEX, MOST_ROWS, TONES, html_table, latex_table
 from coartic.analysis.report.trace import stamp
 from coartic.analysis.sections import SECTIONS, TABLES
 from coartic.analysis.study import Study, cached
@@ -56,7 +56,7 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
         frame = table(study)
         if len(frame):
             files[f"tables/{name}.csv"] = frame.to_csv(lineterminator="\n").encode()
-            if for_paper and name in PAPER and len(frame) <= MOST_ROWS:
+            if for_paper and name in IN_LATEX and len(frame) <= MOST_ROWS:
                 notes = about.notes_of(study, frame.columns)
                 text = latex_table(frame, name, captions[name], notes)
                 files[f"tables/{name}.tex"] = text.encode()

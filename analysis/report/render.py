@@ -44,7 +44,7 @@ LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"><
 """Link to a row by its id."""
 FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
 """Shrinks a table that is wider than the text."""
-PAPER = {
+IN_LATEX = {
     "settings": "task, method, runs, reward, behind, p_holm",
     "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
     "published": "task, condition, published, ours, runs, difference, verdict",
@@ -61,7 +61,7 @@ PAPER = {
 """Tables for a paper, and their columns, which fit the width of a text; others are CSV alone."""
 MOST_ROWS = 50
 """Rows of a table on one page; a longer one is CSV alone."""
-LONG = 0.72
+LONG = 0.8
 """Width of a column of sentences, as a share of the text's."""
 
 
@@ -179,13 +179,15 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the columns of :data:`PAPER` in LaTeX, with booktabs; all of a table that has none.
+    """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs; all of a table that has none.
 
     A text that is the same in all rows stands in the caption. ``notes`` stand below the table, with
     what a dagger means where there is one.
     """
     columns = columns_of(frame)
-    chosen = [c for want in PAPER.get(name, "*").split(", ") for c in columns if fnmatch(c, want)]
+    chosen = [
+        c for want in IN_LATEX.get(name, "*").split(", ") for c in columns if fnmatch(c, want)
+    ]
     cells, heads, sides = [], [], ""
     for column in chosen:
         texts, numbers = texts_of(frame, column), is_number(frame[column])
