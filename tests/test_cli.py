@@ -104,7 +104,7 @@ def test_check(coartic, tmp_path):
     """A task file and a method that keep the rules, and ones that do not."""
     shipped = ROOT / "coartic" / "tasks" / "paper" / "1-ascending.toml"
     assert coartic("check", shipped)[0] == 0
-    (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 90.0]"), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), encoding="utf-8")
     assert coartic("check", tmp_path / "mine.toml")[0] != 0
     code, text, _ = coartic("check", "test/peeks", "--method-file", BROKEN)
     assert code == 1
