@@ -222,7 +222,7 @@ def select_cells(
         *itertools.product(shipped.values(), [name for name in methods if name not in of_suite]),
         *itertools.product(user_tasks.values(), methods or of_suite),
     ]
-    refusals = []
+    refusals: list[str | None] = []
     for task, method in pairs:
         if (reason := registered[method].why_not(task)) is not None:
             refusals.append(reason)
@@ -238,7 +238,11 @@ def select_cells(
     idle = [name for name in user_tasks if name not in busy]
     if idle or not chosen:
         there_is = ", ".join(dict.fromkeys(cell.label for cell in of_tasks)) or "nothing there"
-        why = "; ".join(refusals) or f"suite {suite.name!r} has {there_is}"
+        refusals += (registered[m].why_not(cell.task) for cell in of_tasks for m in methods)
+        why = (
+            "; ".join(dict.fromkeys(filter(None, refusals)))
+            or f"suite {suite.name!r} has {there_is}"
+        )
         what = f"task {idle[0]!r}" if idle else "what was asked for"
         raise CoarticError(f"no method to run on {what}: {why}.")
     return chosen

@@ -143,7 +143,10 @@ def test_a_file_that_is_not_there(read, tmp_path):
     [
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
-        ({"tasks": ["ascending"], "methods": ["EC4"]}, "no method to run on what was asked for"),
+        (
+            {"tasks": ["ascending"], "methods": ["EC4"]},
+            "no method to run on what was asked for: EC4 uses the left",
+        ),
         ({"tasks": ["ascending.toml"]}, "name 'ascending' is already taken"),
         ({"tasks": ["left.toml"]}, "no method to run on task 'left': EC1 uses the right"),
         ({"tasks": ["mine.toml", "mine.toml"]}, "the same task is given twice"),

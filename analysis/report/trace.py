@@ -10,7 +10,7 @@ import pandas as pd
 
 from coartic import CoarticError, Task
 from coartic.analysis.methods import name_of
-from coartic.analysis.report.render import columns_of, texts_of
+from coartic.analysis.report.render import columns_of, is_number, texts_of
 from coartic.analysis.table import SHORT_ID
 from coartic.analysis.words import NONE, marked, number
 from coartic.runs.plan import hash_of, label_of
@@ -51,8 +51,9 @@ def stamp(runs: pd.DataFrame) -> str:
 
 
 def beginnings(frame: pd.DataFrame) -> list[tuple[str, str]]:
-    """The rows of a table by id, with the first two columns that the page shows."""
-    texts = [texts_of(frame, name) for name in [*columns_of(frame.drop(columns="run_ids"))][:2]]
+    """The rows of a table by id, with the first two columns of words that the page shows."""
+    words = [name for name in columns_of(frame) if not is_number(frame[name]) and name != "run_ids"]
+    texts = [texts_of(frame, name) for name in words[:2]]
     return [(row, ", ".join(first)) for row, *first in zip(frame.index, *texts, strict=True)]
 
 

@@ -29,8 +29,8 @@ def new(
     if path.suffix != ".py":
         raise CoarticError(f"--out {path}: the name must end in .py.")
     mine = type("Mine", (template.Mine,), {"name": name})
-    check_declaration(mine, "new")
-    add_cards(registry(), [card_of(mine, "new", "", "")])
+    check_declaration(mine, "coartic new")
+    add_cards(registry(), [card_of(mine, "coartic new", "", "")])
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     say_pairs(

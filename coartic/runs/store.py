@@ -435,8 +435,8 @@ def open_store(folder: Path) -> Iterator[Store]:
     """
     path = folder / RUNS_FILE
     if not os.path.lexists(path):
-        near = [*folder.parent.glob(RUNS_FILE), *folder.glob(f"*/{RUNS_FILE}")]
-        hint = min((f"; did you mean {each.parent}?" for each in near), default="")
+        near = [*folder.parent.glob(RUNS_FILE), *sorted(folder.glob(f"*/{RUNS_FILE}"))][:3]
+        hint = f"; did you mean {' or '.join(str(each.parent) for each in near)}?" if near else ""
         if not os.path.lexists(folder):
             raise CoarticError(f"there is no folder {folder}{hint}")
         raise CoarticError(f"{folder} is not a results folder: it has no {RUNS_FILE}{hint}")
