@@ -80,7 +80,7 @@
     const folded = target && (target.querySelector("details") || target.closest("details"));
     if (!folded) return;
     folded.open = true;
-    target.scrollIntoView();
+    target.scrollIntoView({ block: "center", inline: "start" });
   };
   window.addEventListener("hashchange", reveal);
   reveal();

@@ -144,7 +144,7 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
     cells: list[list[str]] = []
     heads: list[str] = []
     for column, header in columns_of(frame).items():
-        texts = list(map(html.escape, texts_of(frame, column)))
+        texts = [html.escape(text).replace(" †", "&nbsp;†") for text in texts_of(frame, column)]
         head = f'<span data-column="{html.escape(column)}">{html.escape(header)}</span>'
         if cells and len(texts) > 2 and len(set(texts)) == 1 and not is_number(frame[column]):
             caption += f" ({header}: {html.unescape(texts[0])})"

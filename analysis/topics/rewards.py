@@ -180,15 +180,15 @@ def rewards_reproduced(study: Study) -> str:
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
         f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
-        f"1 % and differ from {differ}; {undecided} are undecided."
+        f"1 % and differ from {differ}; {undecided} {'is' if undecided == 1 else 'are'} undecided.\n"
     )
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0
         if row["verdict"] == "undecided" and sure:
             text += (
-                f" {row['condition']} on {row['task']} is "
+                f"{row['condition']} on {row['task']} is "
                 f"{interval(row, 'difference')} ticks from the printed mean: its interval "
-                "leaves out 0, not corrected for the number of rewards."
+                "leaves out 0, not corrected for the number of rewards. "
             )
     return text
 
