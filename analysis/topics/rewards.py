@@ -180,7 +180,8 @@ def rewards_reproduced(study: Study) -> str:
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
         f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
-        f"1 % and differ from {differ}; {undecided} {'is' if undecided == 1 else 'are'} undecided.\n"
+        f"1 % and differ from {differ}; {undecided} {'is' if undecided == 1 else 'are'} "
+        "undecided.\n"
     )
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0
