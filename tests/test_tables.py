@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic.analysis.sections import TABLES
+from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.topics import costs
 from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
 from tests.support.made_up import made_up_optima, row, study_of
@@ -158,3 +158,11 @@ def test_learning(study):
     same(TABLES["learning"](study), {
         name: dict(zip(names, row, strict=True)) for name, row in cells.items()
     })  # fmt: skip
+
+
+def test_of_planners_the_best_alone_has_a_curve(study):
+    plans, worse = study.runs[study.runs.method == PLAN], "trajectory-optimisation/jerk"
+    more = plans.assign(method=worse, reward=plans.reward - 5, run_id=plans.run_id + worse)
+    both = study_of(pd.concat([study.runs, more]), optima=study.optima, rewards=study.rewards)
+    assert worse in TABLES["runtimes"](both).index
+    assert set(FIGURES["runtimes"](both).data.method) == {BOTH, CMA, PLAN}

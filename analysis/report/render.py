@@ -40,7 +40,7 @@ TONES = {
 """Class of a verdict on the page, by its words."""
 PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
-LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"></a>'
+_LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"></a>'
 """Link to a row by its id."""
 FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
 """Shrinks a table that is wider than the text."""
@@ -163,7 +163,7 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
         if not cells:
             labels = [html.escape(row) for row in ids_of]
             texts = [
-                f'<span title="row {label}">{text}</span>{LINK.format(id_)}'
+                f'<span title="row {label}">{text}</span>{_LINK.format(id_)}'
                 for label, id_, text in zip(labels, ids_of.values(), texts, strict=True)
             ]
         cells.append(texts)

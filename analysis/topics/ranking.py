@@ -39,7 +39,7 @@ from coartic.text import counted
 
 TRIES = *methods.ALL_GUESSES, "corrective-alone/every"
 """Methods that take the best of their trials and learn nothing between them."""
-MOST_PAIRS = 24
+_MOST_PAIRS = 24
 """Methods of which the page compares any two."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
@@ -202,7 +202,7 @@ def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
 
 def differences(study: Study) -> dict[str, dict[str, str]]:
     """Differences of the mean gaps of any two of the nearest methods in words, by their names."""
-    names = {method: name_in(study, method) for method in main_gaps(study).method[:MOST_PAIRS]}
+    names = {method: name_in(study, method) for method in main_gaps(study).method[:_MOST_PAIRS]}
     texts: dict[str, dict[str, str]] = {name: {} for name in names.values()}
     for first, second in itertools.combinations(names, 2):
         found = difference_of_gaps(study, first, second)
