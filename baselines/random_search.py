@@ -80,6 +80,7 @@ class DrawnHandsParameters(Parameters):
     """Parameters of guesses with every hand sequence."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run, as many for each hand sequence."""
     half_width: Annotated[float, Field(gt=0, le=100)] = 0.12
     """Half the width of the box of targets, length unit (base) and rad (joints)."""
 

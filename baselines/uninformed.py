@@ -25,6 +25,7 @@ class UninformedParameters(Parameters):
     """Parameters of all uninformed methods; the defaults are the learner's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
     """SD of the (first) perturbations, length unit (base) or rad (joints)."""
 

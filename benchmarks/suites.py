@@ -67,8 +67,11 @@ class Block(FileData):
     """Some methods on some tasks, under all combinations of some parameters."""
 
     tasks: _Names
+    """Names or files of tasks, or ranges of instances; ``["*"]`` for all tasks."""
     methods: _Names
+    """Names of methods; ``["*"]`` for all that apply to the tasks."""
     move: Move | None = None
+    """Makes several tasks of each task, which differ in one goal: table ``move``."""
     free_base: Annotated[bool, Field(strict=True)] = False
     """Whether the base moves in both directions, whatever the task locks."""
     goals: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = None
@@ -76,9 +79,11 @@ class Block(FileData):
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)] | None = None
     """Runs of each method on each task, where it is not the suite's number."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
+    """Parameters of the methods, by name."""
     grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = Field(
         default_factory=dict
     )
+    """Several values for some parameters; every combination is run."""
 
     @model_validator(mode="after")
     def says_everything_once(self) -> Block:
@@ -108,8 +113,11 @@ class Suite(FileData):
     """A suite as its file states it."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    """Name of the suite; that of the file, without ``.toml``, if it is left out."""
     title: Line
+    """For lists and reports."""
     description: Line
+    """A sentence for lists and reports."""
     runs: Annotated[int, Field(gt=0, le=MOST_RUNS, strict=True)]
     """Runs of each stochastic method on each task; the others are run once."""
     trials: Annotated[int, Field(gt=0, le=MOST_TRIALS, strict=True)] | None = None
@@ -117,6 +125,7 @@ class Suite(FileData):
     time_limit_s: Annotated[float, Field(gt=0, le=MOST_SECONDS, strict=True)] | None = 600.0
     """CPU time of a run; the runs of a batch have it together."""
     blocks: Annotated[tuple[Block, ...], Field(min_length=1, max_length=MOST_CELLS)]
+    """What to run: tables ``[[blocks]]``."""
 
 
 def suites() -> dict[str, Suite]:

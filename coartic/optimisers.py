@@ -444,6 +444,7 @@ class OptimiserParameters(Parameters):
     """Parameters of every :class:`Optimiser`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run, those of the corrective process alone among them."""
     hands: str | None = None
     """Hand sequence; by default the one with which the corrective process alone does best, or the
     task's own where there are too many to try."""

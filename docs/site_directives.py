@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
@@ -32,18 +31,6 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
     for row in rows:
         yield "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in row) + " |"
     yield ""
-
-
-def add_meanings() -> None:
-    """Let ``meanings.toml`` stand for docstrings. Raises KeyError for a field that is unknown."""
-    path = Path(__file__).with_name("meanings.toml")
-    for owner, meanings in tomllib.loads(path.read_text(encoding="utf-8")).items():
-        module, _, name = owner.rpartition(".")
-        fields = getattr(importlib.import_module(module), name).__pydantic_fields__
-        for field, meaning in meanings.items():
-            if field not in fields:
-                raise KeyError(f"{path.name}: {owner} has no field {field}")
-            ModuleAnalyzer.for_module(module).find_attr_docs()[name, field] = [meaning, ""]
 
 
 def meanings_of(owner: type) -> dict[str, str]:
@@ -124,7 +111,7 @@ def rows_of(model: Any, meanings: Mapping[str, str], but: str = "") -> Iterator[
         if name == but:
             continue
         if name not in meanings:
-            raise KeyError(f"{model.__name__}.{name}: neither docstring nor meanings.toml")
+            raise KeyError(f"{model.__name__}.{name}: has no docstring")
         shown = "required"
         if not field.is_required():
             default = field.get_default(call_default_factory=True)
@@ -239,7 +226,6 @@ def plainly(
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directive."""
-    add_meanings()
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
     app.connect("build-finished", add_page)

@@ -43,8 +43,10 @@ class DualProcessParameters(Parameters):
     """Parameters of the learner; the defaults are the paper's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
+    """Trials of a run."""
     epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """ε"""
+    """ε: probability, for each goal, of exploring the hand: a random hand or the closest one, by
+    condition. EC1 has one hand."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """SD of η, length unit (base) or rad (joints)."""
 
