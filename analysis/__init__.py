@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from coartic.analysis.frames import ecdf, gaps, means, ranking
     from coartic.analysis.pages import fill_page, write_study
     from coartic.analysis.signatures.context_tests import beyond_p
-    from coartic.analysis.signatures.signs import SIGNS
+    from coartic.analysis.signatures.measures import SIGNATURES
     from coartic.analysis.signatures.two_contexts import TwoContexts
     from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from coartic.analysis.words import interval
 
 __all__ = [
-    "SIGNS", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps", "interval",
-    "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking", "runtimes",
-    "write_study",
+    "SIGNATURES", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps",
+    "interval", "judge", "load", "mean", "mean_beyond", "means", "other_tasks", "ranking",
+    "runtimes", "write_study",
 ]  # fmt: skip
 
 _HOMES = {
@@ -31,7 +31,7 @@ _HOMES = {
     "pages": ("fill_page", "write_study"),
     "topics.costs": ("runtimes",),
     "signatures.context_tests": ("beyond_p",),
-    "signatures.signs": ("SIGNS",),
+    "signatures.measures": ("SIGNATURES",),
     "signatures.two_contexts": ("TwoContexts",),
     "statistics.estimates": ("mean",),
     "statistics.instances": ("other_tasks",),

@@ -260,13 +260,13 @@ class Study:
         """
         return self.executed(task, method, replay=replay).postures
 
-    def sign(self, name: str, *, replay: bool = False) -> pd.Series:
-        """A sign of coarticulation of every run.
+    def signature(self, name: str, *, replay: bool = False) -> pd.Series:
+        """A signature of coarticulation of every run.
 
         Parameters
         ----------
         name : str
-            One of ``coartic.analysis.SIGNS``: ``"first"``, ``"arm"``, ``"hand"``, ...
+            One of ``coartic.analysis.SIGNATURES``: ``"first"``, ``"arm"``, ``"hand"``, ...
         replay : bool
             Of the noiseless trial after learning in place of the solution.
 
@@ -276,15 +276,15 @@ class Study:
             By the index of :attr:`runs`; NaN for runs that have none, and for those after the
             first 500 of a method on a task.
         """
-        from coartic.analysis.signatures.signs import SIGNS
+        from coartic.analysis.signatures.measures import SIGNATURES
 
-        if name not in SIGNS:
-            raise CoarticError(unknown("sign", name, SIGNS))
+        if name not in SIGNATURES:
+            raise CoarticError(unknown("signature", name, SIGNATURES))
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, cell in self.cells.items():
             executed = self.executed(*key, replay=replay)
             here = cell.runs.index[cell.runs.run_id.isin(executed.run_ids)]
-            values[here] = SIGNS[name].each(executed)
+            values[here] = SIGNATURES[name].each(executed)
         return values
 
     @cached_property

@@ -2,12 +2,12 @@
 
 ``guesses`` is the best of uniform guesses around the corrective process with its best
 hands. It cannot coarticulate by learning: no guess depends on any reward. Its best trial shows
-the effect of selecting one of many noisy trials by the reward of the whole task. A sign of
+the effect of selecting one of many noisy trials by the reward of the whole task. A signature of
 coarticulation of a method that selects its solution from trials counts if it exceeds this one.
 The half width was tuned for reward at 10 000 trials on 24 development instances (twelve for one
 arm, four of each of two-armed, aligned and redundancy), two runs each. Mean gain over the
 corrective process with the best hands, per cent: 0.06 2.53, 0.08 2.67, 0.10 2.80, 0.12 2.83,
-0.15 2.80, 0.20 2.75, 0.25 2.68. Other widths show larger signs. Means over twelve development
+0.15 2.80, 0.20 2.75, 0.25 2.68. Other widths show larger signatures. Means over twelve development
 instances each, for 0.06, 0.12, 0.18, 0.25, 0.5 and 1.0: first movement slower by -2.3, -2.2, -2.1,
 -0.1, 3.1 and 2.7 ticks with one arm, 0.2, 2.0, 2.4, 3.6, 2.8 and 0 with two; next goal nearer by
 5.5, 8.0, 9.6, 14.2, 19.0 and 18.7, and by 2.2, 3.2, 3.1, 2.5, 1.0 and 0; way of the waiting hand

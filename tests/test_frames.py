@@ -11,7 +11,7 @@ from coartic.analysis import frames, load, pages
 from coartic.analysis.claims import judging
 from coartic.analysis.claims.judging import all_of, judge, mean_beyond
 from coartic.analysis.signatures import context_tests
-from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import instances
 from coartic.analysis.words import p_value
 from coartic.benchmarks import run_suite
@@ -110,7 +110,7 @@ def test_one_task_refutes_no_claim():
 
 
 def test_runs_are_tidy(tmp_path):
-    """Columns of a folder's runs against its tasks; signs and postures against executions."""
+    """Columns of a folder's runs against its tasks; signatures and postures against executions."""
     chosen = {"tasks": ["two-armed-1"], "methods": ["EC3", "corrective-alone/given"]}
     run_suite("paper", tmp_path / "runs", runs=3, trials=50, **chosen)
     study = load(tmp_path / "runs")
@@ -130,10 +130,12 @@ def test_runs_are_tidy(tmp_path):
         for q, goal, hand in zip(run, study.tasks["two-armed-1"].goals, hands, strict=True):
             name = {"L": "left", "R": "right"}[hand]
             assert np.hypot(*(robot.forward_kinematics(q, name) - goal)) <= 0.1
-    for name, sign in SIGNS.items():
-        of_learner = study.sign(name, replay=True)[runs.method == "dual-process/EC3"].dropna()
+    for name, signature in SIGNATURES.items():
+        of_learner = study.signature(name, replay=True)[runs.method == "dual-process/EC3"].dropna()
         replays = study.executed("two-armed-1", "dual-process/EC3", replay=True)
-        assert of_learner.tolist() == sign.of(replays).tolist()
-    assert study.sign("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
-    with pytest.raises(coartic.CoarticError, match="unknown sign 'frist'; did you mean 'first'"):
-        study.sign("frist")
+        assert of_learner.tolist() == signature.of(replays).tolist()
+    assert study.signature("whole", replay=True)[runs.method != "dual-process/EC3"].isna().all()
+    with pytest.raises(
+        coartic.CoarticError, match="unknown signature 'frist'; did you mean 'first'"
+    ):
+        study.signature("frist")

@@ -1,4 +1,4 @@
-"""What holds over instances of families: gaps, contrasts and signs, on planted rewards."""
+"""What holds over instances of families: gaps, contrasts and signatures, on planted rewards."""
 
 from types import SimpleNamespace
 
@@ -12,7 +12,7 @@ from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
 from coartic.analysis.study import one_by_one
-from coartic.analysis.topics.instances import best_of_instances, signs, solved
+from coartic.analysis.topics.instances import best_of_instances, signatures, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import made, row, study_of
@@ -87,8 +87,8 @@ def test_more_than_eight_instances_are_not_shown_singly():
         assert len(one_by_one(rewarded(RISING, families=ONE, count=count))) == shown
 
 
-def made_up_signs(study, hand=1.0, waiting=0.3, guessed=0.5):
-    """Signs of the learner, and of guesses: that share of them, more by a little."""
+def made_up_signatures(study, hand=1.0, waiting=0.3, guessed=0.5):
+    """Signatures of the learner, and of guesses: that share of them, more by a little."""
     by_cell = {}
     for name in study.tasks:
         for label in (EC1, EC2, EC3, EC4, GUESSES):
@@ -104,14 +104,14 @@ def made_up_signs(study, hand=1.0, waiting=0.3, guessed=0.5):
                     values["other arm"] = np.array([waiting + 0.01 * number])
                 if label == GUESSES:
                     off = 0.001 * (number - 2)
-                    values = {sign: guessed * of + off for sign, of in values.items()}
+                    values = {name: guessed * of + off for name, of in values.items()}
                 by_cell[name, label] = values
     return by_cell
 
 
-def with_signs(study, **values):
-    """A study whose runs are not executed: their signs are made up."""
-    study._computed[signs.__wrapped__, (), ()] = made_up_signs(study, **values)
+def with_signatures(study, **values):
+    """A study whose runs are not executed: their signatures are made up."""
+    study._computed[signatures.__wrapped__, (), ()] = made_up_signatures(study, **values)
     return study
 
 
@@ -119,7 +119,7 @@ def test_claims_of_generality(monkeypatch):
     alone = SimpleNamespace(reward=ALONE)
     monkeypatch.setattr(reader, "initial_solution", lambda task: alone)
     centres = {**RISING, EC4: lambda n: -540 - n, GUESSES: -580}
-    study = with_signs(rewarded(centres, families=ONE + TWO, count=12))
+    study = with_signatures(rewarded(centres, families=ONE + TWO, count=12))
     entries = judgements(study)
     assert list(entries.index) == [claim.id for claim in CLAIMS_ON_FAMILIES]
     for name in (
@@ -131,11 +131,11 @@ def test_claims_of_generality(monkeypatch):
         entry = entries.loc[f"{name}-in-general"]
         assert entry.verdict == "supported", entry.evidence
         assert entry.p_holm < 0.05
-    guessed = with_signs(rewarded(centres, families=ONE + TWO), guessed=1.0)
-    of_signs = [CLAIMS[f"{name}-in-general"] for name in ("other-arm-coarticulation",
+    guessed = with_signatures(rewarded(centres, families=ONE + TWO), guessed=1.0)
+    of_signatures = [CLAIMS[f"{name}-in-general"] for name in ("other-arm-coarticulation",
                                                           "arm-coarticulation")]  # fmt: skip
     # No more than guessing shows:
-    assert set(judge_claims(guessed, of_signs).verdict) == {"undecided"}
+    assert set(judge_claims(guessed, of_signatures).verdict) == {"undecided"}
     assert entries.verdict["corrective-ensures-in-general"] == "supported"
     jerk = entries.loc["beats-inaccurate-in-general"]
     assert jerk.verdict == "undecided"
@@ -150,10 +150,12 @@ def test_instances_for_tuning_are_not_judged():
 
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
-    study = with_signs(rewarded(RISING | {GUESSES: -580}, families=ONE + TWO, count=8), guessed=0.1)
+    study = with_signatures(
+        rewarded(RISING | {GUESSES: -580}, families=ONE + TWO, count=8), guessed=0.1
+    )
 
     def verdict(more):
-        for (task, label), values in signs(study).items():
+        for (task, label), values in signatures(study).items():
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
                 values["hand"] = np.array([0.4, 0.6]) + shift
@@ -166,7 +168,7 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
 
 def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
     falling, mixed = (
-        with_signs(rewarded({**RISING, EC4: of_instance}, families=ONE + TWO, count=8))
+        with_signatures(rewarded({**RISING, EC4: of_instance}, families=ONE + TWO, count=8))
         for of_instance in (lambda n: -570 - n, lambda n: -540 if n % 2 else -560)
     )
     claims = [
@@ -178,5 +180,5 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
 
 
 def test_development_instances_are_not_judged():
-    study = with_signs(rewarded(RISING, split="d"))
+    study = with_signatures(rewarded(RISING, split="d"))
     assert set(judgements(study).verdict) == {"undecided"}

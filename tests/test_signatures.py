@@ -12,9 +12,9 @@ from scipy import linalg
 from coartic import Movement, corrective_trial, execute, learn, load_task
 from coartic.analysis.methods import EC1, GUESSES
 from coartic.analysis.sections import TABLES
-from coartic.analysis.signatures import context_tests, signs
+from coartic.analysis.signatures import context_tests, measures
 from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
-from coartic.analysis.signatures.signs import SIGNS, as_in_isolation
+from coartic.analysis.signatures.measures import SIGNATURES, as_in_isolation
 from coartic.analysis.signatures.two_contexts import (
     TwoContexts,
     context_pairs,
@@ -204,7 +204,9 @@ def test_parts_of_two_contexts():
 
 
 def isolated_ticks(task, q, goal, hand):
-    return signs.isolated_reaches(task, q[None], np.array([goal]), np.array([HANDS.index(hand)]))[0]
+    return measures.isolated_reaches(
+        task, q[None], np.array([goal]), np.array([HANDS.index(hand)])
+    )[0]
 
 
 def test_isolated_reaches_are_the_corrective_process():
@@ -216,25 +218,25 @@ def test_isolated_reaches_are_the_corrective_process():
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
     stays = posed(unreachable, "", [unreachable.q0])
-    assert signs.ticks_slower(stays)[0, 2] == math.inf
+    assert measures.ticks_slower(stays)[0, 2] == math.inf
     task = tiny_task(goals=[[2.0, 1.0], [4.4, 0.5]], locked_base=["x", "y"],
                      start={"left": [0.5] * 4, "right": [0.5] * 4})  # fmt: skip
     right = Solutions(task, "", (corrective_trial(task, "RR"),))
-    assert signs.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
+    assert measures.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
 
 
 def test_what_a_posture_serves():
     """The corrective process itself gains nothing; half the way ahead, half the way is left."""
     task = AS_RELEASED
     initial = corrective_trial(task, "RRRR")
-    assert signs.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
+    assert measures.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
     alone = initial.configurations
     q = alone.copy()
     q[:-1] += 0.5 * np.diff(alone, axis=0)
 
     def gain_of(q):
         run = SimpleNamespace(configurations=q, hands="RRRR")
-        return signs.gain_at_next(Solutions(task, "", (run,)))[0, 0]
+        return measures.gain_at_next(Solutions(task, "", (run,)))[0, 0]
 
     left = isolated_ticks(task, q[0], 2, "right")[0]
     gain = isolated_ticks(task, alone[0], 2, "right")[0] - left
@@ -252,14 +254,14 @@ def test_signs_are_one_number_a_run():
     cell = Solutions(task, "", tuple(learned))
     corrective = [corrective_trial(task, run.hands).ticks_by_goal() for run in cell.runs]
     learned = [run.ticks_by_goal() for run in cell.runs]
-    first, whole = SIGNS["first"].of(cell), SIGNS["whole"].of(cell)
+    first, whole = SIGNATURES["first"].of(cell), SIGNATURES["whole"].of(cell)
     assert first.tolist() == [a[0] - b[0] for a, b in zip(learned, corrective, strict=True)]
     assert whole.tolist() == [sum(b) - sum(a) for a, b in zip(learned, corrective, strict=True)]
-    assert not any(sign.of(Solutions(task, "", ())).size for sign in SIGNS.values())
+    assert not any(signature.of(Solutions(task, "", ())).size for signature in SIGNATURES.values())
     one = load_task("ascending")
     alone = Solutions(one, "", (corrective_trial(one, "RRR"),))
-    assert [sign.of(alone).size for sign in SIGNS.values()] == [0, 1, 0, 1, 1]
-    assert [sign.each(alone).size for sign in SIGNS.values()] == [1] * 5
+    assert [signature.of(alone).size for signature in SIGNATURES.values()] == [0, 1, 0, 1, 1]
+    assert [signature.each(alone).size for signature in SIGNATURES.values()] == [1] * 5
 
 
 def test_choice_in_isolation():
@@ -271,7 +273,7 @@ def test_choice_in_isolation():
     assert agrees[:, 0].tolist() == [1, 0, 1]
     assert agrees[[0, 2], 1].tolist() == [1, 0]
     # Not of the last goal.
-    assert SIGNS["hand"].of(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
+    assert SIGNATURES["hand"].of(Solutions(task, "", some)).tolist() == [0.0, 1.0, 0.0]
 
 
 # The other arm
@@ -293,8 +295,8 @@ def test_preshaping_by_the_arm_alone():
         np.linalg.norm(robot.forward_kinematics(of.configurations[0], "left") - goals[1])
         for of in (run, initial)
     )
-    assert 0.2 < signs.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
-    assert np.isnan(signs.preshaping(task, run, initial)[1])
+    assert 0.2 < measures.preshaping(task, run, initial)[0] == pytest.approx(1 - now / before)
+    assert np.isnan(measures.preshaping(task, run, initial)[1])
 
 
 def test_what_its_own_hit_left_is_no_preshaping_since():
@@ -302,7 +304,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
     task = load_task("two-armed-1")
     initial = corrective_trial(task, "RRRR")
     run = corrective_trial(task, "LRLR")
-    np.testing.assert_array_equal(signs.preshaping(task, run, initial)[:3], [0, 0, 0])
+    np.testing.assert_array_equal(measures.preshaping(task, run, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0), (0.8, 0.3))]
     robot = task.robot
     goals = [robot.forward_kinematics(q, hand).tolist()
@@ -321,7 +323,7 @@ def test_what_its_own_hit_left_is_no_preshaping_since():
         np.linalg.norm(robot.forward_kinematics(q, "left") - [7.0, 3.0])
         for q in (configurations[1], held, still.configurations[1])
     )
-    assert signs.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
+    assert measures.preshaping(small, run, still)[1] == pytest.approx((without - now) / before)
     assert abs(without - now) > 0.05
 
 
@@ -379,7 +381,7 @@ def test_a_method_that_selects_has_to_exceed_guesses(made_up, answer):
         assert math.isnan(guesses.context_beyond_p(study, compared))  # it is not tested itself
 
 
-def test_the_guesses_that_show_most_of_a_sign_counts():
+def test_the_guesses_that_show_most_of_a_signature_count():
     tasks, drawn = [load_task("ascending"), load_task("descending")], "guesses/hands"
     alone = {task.name: corrective_trial(task, "RRR").ticks_by_goal() for task in tasks}
     study = study_with(*(
@@ -403,7 +405,7 @@ def test_of_a_family_one_width_counts():
         for label, slower in ((GUESSES, (9, -7)), (drawn, (3, 3)))
         for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
     ]
-    shown = instances.signs(study_with(*cells))
+    shown = instances.signatures(study_with(*cells))
     for cell in cells:
         assert shown[cell.task.name, GUESSES]["first"].tolist() == [3]
 

@@ -16,7 +16,7 @@ from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import MissingError, Reader, there, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES
 from coartic.analysis.signatures.context_tests import dependence_below
-from coartic.analysis.signatures.signs import ticks_slower
+from coartic.analysis.signatures.measures import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
@@ -38,14 +38,14 @@ def first_movement_sacrificed(read: Reader) -> Finding:
     """The first movement is slower, the whole faster."""
     comparisons = []
     for task in ONE_ARMED:
-        first = read.sign("first", task, EC1)
+        first = read.signature("first", task, EC1)
         comparisons += [
             Higher(first, by=margins.TICKS),
-            Higher(first, read.sign("first", task, GUESSES)),
-            Higher(first, read.sign("first", task, EC1_BY_SUBTASK)),
-            Higher(read.sign("whole", task, EC1)),
+            Higher(first, read.signature("first", task, GUESSES)),
+            Higher(first, read.signature("first", task, EC1_BY_SUBTASK)),
+            Higher(read.signature("whole", task, EC1)),
         ]
-    replayed = [partial(read.sign, "first", task, EC1, replay=True) for task in ONE_ARMED]
+    replayed = [partial(read.signature, "first", task, EC1, replay=True) for task in ONE_ARMED]
     return all_higher(comparisons, there(replayed))
 
 
@@ -92,10 +92,10 @@ def overall_reward(read: Reader) -> Finding:
     """Without a reward for the whole, the first movement is not sacrificed and less is earned."""
     comparisons = []
     for task in ONE_ARMED:
-        first = read.sign("first", task, EC1, replay=True)
+        first = read.signature("first", task, EC1, replay=True)
         comparisons += [
             Higher(read.replay(task, EC1), read.replay(task, EC1_BY_SUBTASK)),
-            Higher(first, read.sign("first", task, EC1_BY_SUBTASK), by=margins.TICKS),
+            Higher(first, read.signature("first", task, EC1_BY_SUBTASK), by=margins.TICKS),
         ]
     return all_higher(comparisons)
 
@@ -105,24 +105,24 @@ def arm_coarticulation(read: Reader) -> Finding:
     comparisons, replayed = [], []
     for task in TWO_ARMED:
         for label in (EC3, EC4):
-            arm = read.sign("arm", task, label)
+            arm = read.signature("arm", task, label)
             comparisons += [
                 Higher(arm, by=margins.TICKS),
-                Higher(arm, read.sign("arm", task, GUESSES)),
+                Higher(arm, read.signature("arm", task, GUESSES)),
             ]
             if label == EC4:
-                comparisons.append(Higher(arm, read.sign("arm", task, EC4_BY_SUBTASK)))
-            replayed.append(partial(read.sign, "arm", task, label, replay=True))
+                comparisons.append(Higher(arm, read.signature("arm", task, EC4_BY_SUBTASK)))
+            replayed.append(partial(read.signature, "arm", task, label, replay=True))
     return all_higher(comparisons, there(replayed))
 
 
 def other_arm_coarticulation(read: Reader) -> Finding:
     """The waiting arm brings its hand nearer to its next goal."""
-    arm = read.sign("other arm", TASK_1, EC4)
-    others = [read.sign("other arm", TASK_1, label) for label in (GUESSES, EC4_BY_SUBTASK)]
+    arm = read.signature("other arm", TASK_1, EC4)
+    others = [read.signature("other arm", TASK_1, label) for label in (GUESSES, EC4_BY_SUBTASK)]
     shown = [
-        partial(read.sign, "other arm", TASK_1, EC4, replay=True),
-        partial(read.sign, "other arm", TASK_1, EC3),
+        partial(read.signature, "other arm", TASK_1, EC4, replay=True),
+        partial(read.signature, "other arm", TASK_1, EC3),
     ]
     return all_higher([Higher(arm), *(Higher(arm, other) for other in others)], there(shown))
 

@@ -75,12 +75,12 @@ def earns_more(read: Reader, families: Iterable[str], *pairs: tuple[str, str]) -
     return in_every_family(read, families, *(comparing(*pair) for pair in pairs))
 
 
-def shows(read: Reader, sign: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
-    """A sign of the learner that explores most, alone or beside that of another method."""
+def shows(read: Reader, signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
+    """A signature of the learner that explores most, alone or beside that of another method."""
 
     def compare(task: str) -> Higher:
-        first = read.sign(sign, task, most_exploring(read.task(task)))
-        return Higher(first, read.sign(sign, task, beyond) if beyond else None, by)
+        first = read.signature(signature, task, most_exploring(read.task(task)))
+        return Higher(first, read.signature(signature, task, beyond) if beyond else None, by)
 
     return f", more than {who_is(beyond)}" if beyond else "", compare
 

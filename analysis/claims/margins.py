@@ -4,7 +4,7 @@ The claims were rewritten once after results of their first version were seen. W
 changed after results were seen, its history says so.
 """
 
-from coartic.analysis.signatures.signs import ROUNDING
+from coartic.analysis.signatures.measures import ROUNDING
 
 FEW = 0.25
 """Of runs. The paper speaks of none, of about half (9 and 11 of 20) and of all of its runs. The

@@ -11,12 +11,12 @@ import pandas as pd
 
 from coartic import Execution, Task
 from coartic.analysis.methods import ALL_GUESSES, GUESSES, LEARNER, name_of
-from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.guesses import guesses_on, most_guessed
-from coartic.analysis.topics.instances import signs
+from coartic.analysis.topics.instances import signatures
 from coartic.analysis.topics.published import (
     Summary,
     published_alone,
@@ -152,24 +152,24 @@ class Reader:
         printed = in_words(published_alone(task, "best of all sequences"))
         return Measurement(task, "best", np.array(np.nanmax(rewards)), printed=printed)
 
-    def sign(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
-        """A sign of coarticulation, of the runs that have one; of an instance, computed once.
+    def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
+        """A signature of coarticulation, of the runs that have one; of an instance, computed once.
 
         Of guesses, that of the widths and hands that show most of it on the task, or in the
         family.
         """
-        sign, words = SIGNS[name], SIGNS[name].words
+        signature, words = SIGNATURES[name], SIGNATURES[name].words
         for each in (label, *(self.guesses(task) if label == GUESSES else ())):
             self.runs(task, each)
         if replay:
-            values = sign.of(self.study.executed(task, label, replay=True))
+            values = signature.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {words}"
         elif self.task(task).family is not None:
-            values = signs(self.study)[task, label].get(name, np.empty(0))
+            values = signatures(self.study)[task, label].get(name, np.empty(0))
         elif label == GUESSES:
             values = most_guessed(self.study, task, name)
         else:
-            values = sign.of(self.study.executed(task, label))
+            values = signature.of(self.study.executed(task, label))
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)

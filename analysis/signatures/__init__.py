@@ -1,4 +1,5 @@
 """Signatures of coarticulation: how a method's solutions move, beyond their reward.
 
-:mod:`~.signs` gives one number for each run, :mod:`~.two_contexts` compares the runs of two tasks.
+:mod:`~.measures` gives one number for each run, :mod:`~.two_contexts` compares the runs of two
+tasks.
 """

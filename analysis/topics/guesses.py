@@ -1,8 +1,9 @@
 """Tests against guesses: random targets, of which the best of many is selected.
 
-A method that selects its solution from trials by their rewards shows signs that selection alone
-shows, and has to exceed those of guesses. A folder may have guesses of several widths, and with
-every hand sequence. On each task, or in each family, the one that shows most of a sign counts.
+A method that selects its solution from trials by their rewards shows signatures that selection
+alone shows, and has to exceed those of guesses. A folder may have guesses of several widths, and
+with every hand sequence. On each task, or in each family, the one that shows most of a signature
+counts.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 import numpy as np
 
 from coartic.analysis.methods import ALL_GUESSES
-from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import Study
 from coartic.analysis.topics.scores import BY_TRIAL, groups
@@ -28,11 +29,13 @@ def guesses_on(study: Study, task: str) -> list[str]:
     ]
 
 
-def most_guessed(study: Study, task: str, sign: str) -> Array:
-    """A sign of the guesses whose runs show most of it in the mean, shape ``(n,)``; empty where
-    none has a value."""
-    signs = [SIGNS[sign].of(study.executed(task, each)) for each in guesses_on(study, task)]
-    return max((values for values in signs if len(values)), key=np.mean, default=np.empty(0))
+def most_guessed(study: Study, task: str, signature: str) -> Array:
+    """A signature of the guesses whose runs show most of it in the mean, shape ``(n,)``; empty
+    where none has a value."""
+    signatures = [
+        SIGNATURES[signature].of(study.executed(task, each)) for each in guesses_on(study, task)
+    ]
+    return max((values for values in signatures if len(values)), key=np.mean, default=np.empty(0))
 
 
 def selects(study: Study, label: str) -> bool:

@@ -7,7 +7,7 @@ import pandas as pd
 
 from coartic.analysis.methods import GUESSES, LEARNERS, most_exploring
 from coartic.analysis.optima import gap_share, locks_base
-from coartic.analysis.signatures.signs import SIGNS
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.guesses import guesses_on
@@ -58,12 +58,13 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
 
 
 @cached
-def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signs (n,) on every instance, of the learner by condition and of guesses.
+def signatures(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
+    """Values of signatures (n,) on every instance, of the learner by condition and of guesses.
 
-    By the instance's name and the method's label, then by the sign's name in :data:`SIGNS`; a
-    value for each run that has one. A sign without any is left out. Label ``GUESSES`` has each sign
-    of the guesses that show most of it over the instances of the family.
+    By the instance's name and the method's label, then by the signature's name in
+    :data:`SIGNATURES`; a value for each run that has one. A signature without any is left out.
+    Label ``GUESSES`` has each signature of the guesses that show most of it over the instances
+    of the family.
     """
     by_cell: dict[tuple[str, str], dict[str, Array]] = {}
     for name in best_of_instances(study):
@@ -71,21 +72,26 @@ def signs(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
             cell = study.cells.get((name, label))
             if cell is not None and len(cell.good):
                 runs = study.executed(name, label)
-                measured = {sign: SIGNS[sign].of(runs) for sign in SIGNS}
-                by_cell[name, label] = {sign: each for sign, each in measured.items() if len(each)}
-    # Of each family and sign, the guesses with the highest mean over instances.
+                measured = {signature: SIGNATURES[signature].of(runs) for signature in SIGNATURES}
+                by_cell[name, label] = {
+                    signature: each for signature, each in measured.items() if len(each)
+                }
+    # Of each family and signature, the guesses with the highest mean over instances.
     means = pd.DataFrame(
-        [(study.tasks[name].family, sign, label, each.mean())
+        [(study.tasks[name].family, signature, label, each.mean())
          for (name, label), of_cell in by_cell.items() if label not in LEARNERS
-         for sign, each in of_cell.items()],
-        columns=["family", "sign", "label", "mean"],
-    ).groupby(["family", "sign", "label"], sort=False)["mean"].mean()  # fmt: skip
-    most = means.groupby(["family", "sign"], sort=False).idxmax().to_dict()
+         for signature, each in of_cell.items()],
+        columns=["family", "signature", "label", "mean"],
+    ).groupby(["family", "signature", "label"], sort=False)["mean"].mean()  # fmt: skip
+    most = means.groupby(["family", "signature"], sort=False).idxmax().to_dict()
     for name in [name for name, label in by_cell if label == GUESSES]:
-        chosen = {sign: most.get((study.tasks[name].family, sign), ("",))[-1] for sign in SIGNS}
+        chosen = {
+            signature: most.get((study.tasks[name].family, signature), ("",))[-1]
+            for signature in SIGNATURES
+        }
         by_cell[name, GUESSES] = {
-            sign: by_cell[name, label][sign]
-            for sign, label in chosen.items()
-            if sign in by_cell.get((name, label), {})
+            signature: by_cell[name, label][signature]
+            for signature, label in chosen.items()
+            if signature in by_cell.get((name, label), {})
         }
     return by_cell

@@ -1,7 +1,7 @@
 """How intervals and tests do where the truth is known: ``python docs/scripts/calibrate.py``.
 
-With a folder of many runs of guesses on ascending and descending, how often they pass as a sign
-of coarticulation: ``coartic run comparison --tasks ascending,descending --methods guesses
+With a folder of many runs of guesses on ascending and descending, how often they pass as a
+signature of coarticulation: ``coartic run comparison --tasks ascending,descending --methods guesses
 --runs 400 --out results/guesses``, then ``python docs/scripts/calibrate.py results/guesses``.
 
 Samples like rewards are drawn, 500 times for each number of runs. Intervals at 95 % should
@@ -116,7 +116,7 @@ STUDIES, GUESSES_RUNS = 200, 20
 
 
 def rates_of_guesses(study: Study) -> Iterator[tuple[str, float]]:
-    """In what share of simulated studies guesses pass as a sign, by rule.
+    """In what share of simulated studies guesses pass as a signature, by rule.
 
     A study takes runs of guesses without replacement, half of them as a method's. By the rules
     of the claims *context* and *first-movement-sacrificed*, each with and without guesses.

@@ -53,8 +53,8 @@ def measure_runs(study):
         group=study.runs.family.str.partition("/")[0].fillna(study.runs.task),
         counted=study.runs.counted.fillna("guesses"),
         dose=study.runs.discount,
-        nearer=study.sign("arm", replay=True).where(~guesses, study.sign("arm")),
-        first=study.sign("first", replay=True).where(~guesses, study.sign("first")),
+        nearer=study.signature("arm", replay=True).where(~guesses, study.signature("arm")),
+        first=study.signature("first", replay=True).where(~guesses, study.signature("first")),
     )
     reward = runs.replay_reward.where(~guesses, runs.reward)
     initial = runs.groupby("task").initial_reward.transform("first")  # guesses have none

@@ -3,7 +3,7 @@
     coartic run studies/horizon/suite.toml
     python studies/horizon/study.py results/horizon
 
-writes results.csv, signs.csv, gains.csv, claims.csv, repeats.csv, figure.svg and the page,
+writes results.csv, signatures.csv, gains.csv, claims.csv, repeats.csv, figure.svg and the page,
 README.md; without a folder the page alone, from the tables that are there.
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
@@ -19,7 +19,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import SIGNS, all_of, figures, judge, load, mean_beyond, means, write_study
+from coartic.analysis import (
+    SIGNATURES,
+    all_of,
+    figures,
+    judge,
+    load,
+    mean_beyond,
+    means,
+    write_study,
+)
 
 PLANNER = "receding-horizon"
 STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
@@ -29,12 +38,12 @@ GAIN = 1.0
 
 
 def measure_plans(study):
-    """Plans on random tasks, a row for each task and number of goals ahead, with their signs."""
+    """Plans on random tasks with signatures, a row for each task and number of goals ahead."""
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.family.notna()]
     return plans.assign(
         ahead=plans.goals - 1,
         h=np.minimum(plans.horizon, plans.goals - 1),
-        **{name: study.sign(name) for name in SIGNS},
+        **{name: study.signature(name) for name in SIGNATURES},
     )
 
 
@@ -44,7 +53,7 @@ def average(plans):
     ``gain``: of the last goal in view. ``ahead``: goals ahead at the first movement.
     """
     keys = ["task", "family", "goals", "ahead", "h"]
-    plans = plans.groupby(keys, sort=False)[["gap", "cpu_s", *SIGNS]].mean().reset_index()
+    plans = plans.groupby(keys, sort=False)[["gap", "cpu_s", *SIGNATURES]].mean().reset_index()
     gaps = plans.pivot_table("gap", "task", "h")
     before = [gaps.loc[task, min(h - 1, 4)] if h else np.nan
               for task, h in zip(plans.task, plans.h, strict=True)]  # fmt: skip
@@ -72,21 +81,21 @@ def tabulate(study, plans):
     return table.drop(columns=["cpu_s_low", "cpu_s_high"])
 
 
-def tabulate_signs(plans):
-    """Signs of coarticulation by goals ahead where more follow, and what all goals add."""
+def tabulate_signatures(plans):
+    """Signatures of coarticulation by goals ahead where more follow, and what all goals add."""
     plans, rows = plans[plans.step != "5+"], []
-    for name, sign in SIGNS.items():
-        plans = plans.assign(sign=name, words=sign.words, here=plans[name])
+    for name, signature in SIGNATURES.items():
+        plans = plans.assign(signature=name, words=signature.words, here=plans[name])
         full = plans[plans.step == "all"].set_index("task").here
         plans["to_come"] = plans.task.map(full) - plans.here
         more = plans[(plans.ahead > plans.h) | ((plans.step == "all") & (plans.ahead > 0))]
         rows.append(more.dropna(subset=["here", "to_come"]))
     every = pd.concat(rows)
     every["to_come"] = every.to_come.where(every.step != "all")
-    table = means(every, ["sign", "words", "step"], ["here", "to_come"])
+    table = means(every, ["signature", "words", "step"], ["here", "to_come"])
     table.columns = table.columns.str.replace("here", "mean")
     table = table.rename(columns={"step": "h", "rows": "tasks"})
-    return table.set_index((table.sign + " h=" + table.h).rename("row"))
+    return table.set_index((table.signature + " h=" + table.h).rename("row"))
 
 
 def judge_claims(study, plans):
@@ -155,7 +164,7 @@ def measure(study):
     steps = plans[plans.step != "all"]
     return {
         "results": tabulate(study, plans),
-        "signs": tabulate_signs(plans),
+        "signatures": tabulate_signatures(plans),
         "gains": steps.set_index("task")[["family", "goals", "h", "gap", "gain"]],
         "claims": judge_claims(study, plans),
         "repeats": pd.concat(repeats, names=["nodes"]).reset_index("nodes"),

@@ -43,7 +43,7 @@ def measure_runs(study):
     and the postures at all goals, ``q``."""
     moved = study.runs.task.str.extract(r"goal(?P<moving>\d)_0_(?P<by>.+)")
     runs = study.runs.assign(moving=moved.moving.astype(int), by=moved.by.astype(float))
-    runs = runs.assign(first=study.sign("first"), total=0 - study.sign("whole"))
+    runs = runs.assign(first=study.signature("first"), total=0 - study.signature("whole"))
     cells = dict(list(runs[runs.status == "ok"].groupby(["task", "method"])))
     return pd.concat([cells[key].assign(q=[*study.postures(*key)]) for key in study.cells])
 

@@ -1,9 +1,9 @@
-"""Signs of coarticulation: one number for each run of a method on a task.
+"""Signatures of coarticulation: one number for each run of a method on a task.
 
 Claims compare them, and families of random tasks count them. In formulas, run i hits goal g at
 configuration q(i, g) after t(i, g) ticks since the goal before; q(i, 0) is the start; c(i, g) are
-the ticks of the corrective process alone with the hands of run i; G is the number of goals. A sign
-has shape ``(n,)``, and is NaN where a run has none.
+the ticks of the corrective process alone with the hands of run i; G is the number of goals. A
+signature has shape ``(n,)``, and is NaN where a run has none.
 """
 
 from __future__ import annotations
@@ -123,17 +123,17 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 
 @dataclass(frozen=True)
-class Sign:
-    """A sign of coarticulation and its words."""
+class Signature:
+    """A signature of coarticulation and its words."""
 
     each: Callable[[Solutions], Array]
-    """The sign of each run, shape ``(n,)``; NaN where a run has none."""
+    """The signature of each run, shape ``(n,)``; NaN where a run has none."""
     words: str
 
     def of(self, runs: Solutions) -> Array:
-        """The sign of each run that has one, shape ``(k,)``."""
-        signs = self.each(runs)
-        return signs[np.isfinite(signs)]
+        """The signature of each run that has one, shape ``(k,)``."""
+        values = self.each(runs)
+        return values[np.isfinite(values)]
 
 
 def hand(runs: Solutions) -> Array:
@@ -179,30 +179,31 @@ def arm(runs: Solutions) -> Array:
     return np.asarray(gain_at_next(runs).mean(axis=1))
 
 
-SIGNS = {
-    "hand": Sign(
+SIGNATURES = {
+    "hand": Signature(
         hand,
         "share of the goals that others follow which are hit with the slower hand for them alone",
     ),
-    "arm": Sign(
+    "arm": Signature(
         arm,
         "ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
         "waiting arm where it was (mean over goals)",
     ),
-    "other arm": Sign(
+    "other arm": Signature(
         other_arm,
         "share of the initial distance to its next goal by which the waiting arm brings its hand "
         "nearer (mean over goals)",
     ),
-    "first": Sign(
+    "first": Signature(
         lambda runs: runs.against_same_hands[:, 0],
         "ticks by which the first movement is longer than the corrective process's with the same "
         "hands",
     ),
-    "whole": Sign(
+    "whole": Signature(
         lambda runs: -runs.against_same_hands.sum(axis=1),
         "ticks by which the whole is shorter than the corrective process's",
     ),
 }
-"""Every sign by its name in claims, in the order of the tables: ``first`` is t(i, 1) - c(i, 1),
-``whole`` Σ_g c(i, g) - t(i, g); both are NaN where the corrective process fails with the hands."""
+"""Every signature by its name in claims, in the order of the tables: ``first`` is t(i, 1) -
+c(i, 1), ``whole`` Σ_g c(i, g) - t(i, g); both are NaN where the corrective process fails with the
+hands."""
