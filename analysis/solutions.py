@@ -39,7 +39,7 @@ class Solutions:
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
     @cached_property
-    def postures(self) -> Array:
+    def configurations(self) -> Array:
         """Configurations that hit the goals, shape ``(n, G, dof)``, length unit and rad."""
         shape = len(self.runs), len(self.task.goals), self.task.robot.dof
         return np.array([run.configurations for run in self.runs]).reshape(shape)
@@ -47,13 +47,15 @@ class Solutions:
     @cached_property
     def starts(self) -> Array:
         """Configuration from which each subtask starts: the hit before it, or the start."""
-        starts = np.empty_like(self.postures)
-        starts[:, 0], starts[:, 1:] = self.task.q0, self.postures[:, :-1]
+        starts = np.empty_like(self.configurations)
+        starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
         return starts
 
-    def postures_at(self, goal: int, hand: Hand) -> Array:
+    def configurations_at(self, goal: int, hand: Hand) -> Array:
         """Configurations ``(k, dof)`` of the runs that hit a goal, from 1, with a hand."""
-        return np.asarray(self.postures[self.hands[:, goal - 1] == HANDS.index(hand), goal - 1])
+        return np.asarray(
+            self.configurations[self.hands[:, goal - 1] == HANDS.index(hand), goal - 1]
+        )
 
     @cached_property
     def against_same_hands(self) -> Array:

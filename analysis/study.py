@@ -243,7 +243,7 @@ class Study:
                 executed.append(run)
         return Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
 
-    def postures(self, task: str, method: str, *, replay: bool = False) -> Array:
+    def configurations(self, task: str, method: str, *, replay: bool = False) -> Array:
         """Postures in which the solved runs of a method hit the goals of a task.
 
         Parameters
@@ -258,7 +258,7 @@ class Study:
         ndarray, shape (runs, G, dof)
             Configurations, length unit (base) and rad (joints); at most 500 runs.
         """
-        return self.executed(task, method, replay=replay).postures
+        return self.executed(task, method, replay=replay).configurations
 
     def signature(self, name: str, *, replay: bool = False) -> pd.Series:
         """A signature of coarticulation of every run.

@@ -107,12 +107,15 @@ def numbered_below(task: Task) -> list[bool]:
     return [bool(near) for near in close.any(axis=1)]
 
 
-def box(task: Task, postures: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
+def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
     """Lower left and upper right corner of a box with the goals and the robot, length unit.
 
-    ``postures`` are its configurations, shape ``(n, dof)``.
+    ``configurations`` are the robot's, shape ``(n, dof)``.
     """
-    points = [task.goal_array + np.array([0, 2 * task.radius]), task.robot.base_outline(postures)]
-    points += [task.robot.joint_positions(postures, hand) for hand in task.hands]
+    points = [
+        task.goal_array + np.array([0, 2 * task.radius]),
+        task.robot.base_outline(configurations),
+    ]
+    points += [task.robot.joint_positions(configurations, hand) for hand in task.hands]
     cloud = np.concatenate([part.reshape(-1, 2) for part in points])
     return cloud.min(axis=0) - margin, cloud.max(axis=0) + margin

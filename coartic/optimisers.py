@@ -120,7 +120,7 @@ class Objective:
         """The hand sequence."""
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
-        self.postures: Array = alone.reached[best].copy()
+        self.configurations: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
         self._entries = np.flatnonzero(self.joints)
@@ -200,7 +200,7 @@ class Objective:
     def x0(self) -> Array:
         """A point to begin with, shape ``(dim,)``: the postures in which the corrective process
         alone hits the goals. Moving straight to them can cost more or less than it does."""
-        return self.postures[self.joints].copy()
+        return self.configurations[self.joints].copy()
 
     @property
     def best_x(self) -> Array:

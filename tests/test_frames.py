@@ -123,7 +123,7 @@ def test_runs_are_tidy(tmp_path):
     best = coartic.objective("two-armed-1").best_known
     assert runs.best_known.tolist() == [-best] * 4
     assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
-    postures = study.postures("two-armed-1", "dual-process/EC3")
+    postures = study.configurations("two-armed-1", "dual-process/EC3")
     assert postures.shape == (3, 4, 10)
     robot = study.tasks["two-armed-1"].robot
     for run, hands in zip(postures, runs.hands, strict=False):

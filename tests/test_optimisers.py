@@ -202,7 +202,7 @@ def test_the_package_for_optunahub():
     assert len(start) == 44
     assert problem.best_known == 300
     cost = coartic.objective("two-armed-2", "RLRR")
-    targets = cost.postures.copy()
+    targets = cost.configurations.copy()
     targets[1, 2] += 0.1
     targets[3, 9] -= 0.2
     ticks = problem.evaluate(start | {"hand_2": "L", "left_1_2": 0.1, "right_4_4": -0.2})

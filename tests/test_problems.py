@@ -16,7 +16,7 @@ FOUR = load_task("two-armed-2")
 def test_hands_may_come_with_points():
     """Of all points, or of each; a joint that has no entry keeps still."""
     problem = coartic.objective(FOUR, "LRLR")
-    targets = problem.postures + 0.05 * np.random.default_rng(0).standard_normal((4, 10))
+    targets = problem.configurations + 0.05 * np.random.default_rng(0).standard_normal((4, 10))
     targets[~problem.joints] = np.nan
     q = FOUR.q0
     for goal, target in enumerate(targets):

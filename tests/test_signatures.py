@@ -377,7 +377,7 @@ def test_a_method_that_selects_has_to_exceed_guesses(made_up, answer):
     if compared is not None:
         assert compared.apart == pytest.approx(made_up.get("of_guesses", 0.5))
         beyond = guesses.context_beyond_p(study, contexts)
-        assert (beyond < 0.05) == (made_up["apart"] == 2.0 and len(compared.postures[0]) > 1)
+        assert (beyond < 0.05) == (made_up["apart"] == 2.0 and len(compared.configurations[0]) > 1)
         assert math.isnan(guesses.context_beyond_p(study, compared))  # it is not tested itself
 
 

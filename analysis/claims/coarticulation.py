@@ -60,7 +60,7 @@ def posture_depends_on_context(read: Reader) -> Finding:
         f"in noiseless replays {number(replayed.apart, 2)} apart",
     ]
     test = Estimate(contexts.spreads, p=contexts.p, n=(contexts.n,))
-    less_p = dependence_below(*contexts.postures, margins.SPREAD, np.random.default_rng(SEED))
+    less_p = dependence_below(*contexts.configurations, margins.SPREAD, np.random.default_rng(SEED))
     tests = [test]
     against = [replace(test, value=margins.SPREAD - test.value, p=less_p)]
     guesses = [contexts_of(read, label) for label in read.guesses(ASCENDING)]

@@ -68,7 +68,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
         if all(films):
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
-                    film["reached"] = study.postures(name, label)[:, 0].round(3).tolist()
+                    film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
             runs.append({"id": label, "name": name_of(label), "films": films})
     return runs
 

@@ -66,7 +66,7 @@ def gain_at_next(runs: Solutions) -> Array:
     waiting = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
         waiting[number, task.robot.joints(other(hand))] = True
-    hit = np.where(waiting[hands[now]], there, runs.postures[now])
+    hit = np.where(waiting[hands[now]], there, runs.configurations[now])
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
     )

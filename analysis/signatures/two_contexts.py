@@ -100,52 +100,52 @@ class TwoContexts:
         return self.first.label
 
     @cached_property
-    def postures(self) -> tuple[Array, Array]:
+    def configurations(self) -> tuple[Array, Array]:
         """Configurations of the runs that hit the goal with the hand, in either context.
 
         Shape ``(runs, dof)``, length unit and rad.
         """
         goal, hand = self.goal, self.hand
-        return self.first.postures_at(goal, hand), self.second.postures_at(goal, hand)
+        return self.first.configurations_at(goal, hand), self.second.configurations_at(goal, hand)
 
     @property
     def in_both(self) -> bool:
         """Whether some runs of either context hit the goal with the hand."""
-        return all(map(len, self.postures))
+        return all(map(len, self.configurations))
 
     @property
     def n(self) -> int:
         """Runs of both."""
-        return sum(map(len, self.postures))
+        return sum(map(len, self.configurations))
 
     @property
     def apart(self) -> float:
         """Distance of the mean postures, length unit and rad."""
-        return distance_of_means(*self.postures)
+        return distance_of_means(*self.configurations)
 
     @property
     def spreads(self) -> float:
         """Distance of the mean postures in pooled SDs of the runs; NaN without a spread."""
-        return context_dependence(*self.postures)
+        return context_dependence(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
         """Parts of the difference of mean postures: leaving the hand in place, and moving it."""
         task, joints = self.first.task, movable(self.first.task, self.hand)
-        posture = np.concatenate(self.postures).mean(axis=0)
-        first, second = (configurations.mean(axis=0) for configurations in self.postures)
+        posture = np.concatenate(self.configurations).mean(axis=0)
+        first, second = (configurations.mean(axis=0) for configurations in self.configurations)
         jacobian = task.robot.jacobian(posture, self.hand)[:, joints]
         return motor_equivalence((first - second)[joints], jacobian)
 
     @cached_property
     def p(self) -> float:
         """P-value of the permutation test over runs; NaN where a context has one run."""
-        return permutation_p(*self.postures, self._rng("context dependence"))
+        return permutation_p(*self.configurations, self._rng("context dependence"))
 
     def p_beyond(self, other: TwoContexts) -> float:
         """P-value of the test that these runs lie further apart than others; NaN where a
         context has one run."""
-        return beyond_p(self.postures, other.postures, self._rng("beyond"))
+        return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
         """A generator for each test, the same in every folder."""

@@ -133,7 +133,7 @@ def draw_postures(study: Study) -> Parts | None:
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius
-    means = [runs.mean(axis=0) for runs in shared.postures]
+    means = [runs.mean(axis=0) for runs in shared.configurations]
     goals = np.array([task.goals[shared.goal] for task in shared.tasks])
     joints = [robot.joint_positions(q, shared.hand) for q in means]
     outlines = [robot.base_outline(q) for q in means]
@@ -144,7 +144,7 @@ def draw_postures(study: Study) -> Parts | None:
     at = shared.tasks[0].goals[shared.goal - 1]
     words: Any = {"textcoords": "offset points"}
     parts = []
-    for place, (task, runs) in enumerate(zip(shared.tasks, shared.postures, strict=True)):
+    for place, (task, runs) in enumerate(zip(shared.tasks, shared.configurations, strict=True)):
         color, following = (style.BLUE, style.VERMILLION)[place], goals[place].tolist()
         faint: Any = {"linewidth": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
         for q in runs:
@@ -199,7 +199,7 @@ def next_goal(study: Study) -> str:
     apart = f"{number(shared.spreads, 1)} SD"
     if math.isnan(shared.spreads):
         apart = f"{number(shared.apart, 2)} length units and rad"
-    if drawn and not smallest_p(*map(len, shared.postures)) < LEVEL:
+    if drawn and not smallest_p(*map(len, shared.configurations)) < LEVEL:
         text = "Too few runs to tell whether the next goal changes the posture."
     elif not (shared.p < LEVEL if drawn else shared.apart > 0):
         text = f"No significant difference: postures before different next goals lie {apart} apart."

@@ -123,7 +123,7 @@ def rates_of_guesses(study: Study) -> Iterator[tuple[str, float]]:
     """
     tasks = ("ascending", "descending")
     cells = [study.executed(task, GUESSES) for task in tasks]
-    shown = [cell.postures[:, 0] for cell in cells]
+    shown = [cell.configurations[:, 0] for cell in cells]
     slower = [cell.against_same_hands[:, 0].astype(np.float64) for cell in cells]
     rng, passed = np.random.default_rng(0), []
     for _ in range(STUDIES):

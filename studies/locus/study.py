@@ -45,7 +45,7 @@ def measure_runs(study):
     runs = study.runs.assign(moving=moved.moving.astype(int), by=moved.by.astype(float))
     runs = runs.assign(first=study.signature("first"), total=0 - study.signature("whole"))
     cells = dict(list(runs[runs.status == "ok"].groupby(["task", "method"])))
-    return pd.concat([cells[key].assign(q=[*study.postures(*key)]) for key in study.cells])
+    return pd.concat([cells[key].assign(q=[*study.configurations(*key)]) for key in study.cells])
 
 
 def tabulate(runs):
@@ -65,7 +65,7 @@ def tabulate(runs):
     return table.assign(total=groups.total.mean())
 
 
-def postures_at(runs, method, goal, moving):
+def configurations_at(runs, method, goal, moving):
     """Postures of a method at a goal, ``(runs, dof)`` for each height of its neighbour; tasks in
     which a goal is moved by 0 are all the same."""
     there = runs[(runs.method == method) & ((runs.moving == moving) | (runs.by == 0))]
@@ -101,7 +101,7 @@ def tabulate_slopes(runs):
     for (goal, moving), method in product(BESIDE, runs.method.unique()):
         kind = "anticipatory" if goal < moving else "carry-over"
         row = {"method": method, "goal": goal, "moving": moving, "kind": kind}
-        ours, guesses = (postures_at(runs, who, goal, moving) for who in (method, GUESSES))
+        ours, guesses = (configurations_at(runs, who, goal, moving) for who in (method, GUESSES))
         row |= {"runs": sum(map(len, ours)), **regress(ours)}
         if method in SELECTS:
             rng = np.random.default_rng([0, goal, moving])

@@ -69,7 +69,7 @@ def measure_slopes(study, method, moved):
     """
     sizes = []
     for goal, of_goal in moved.groupby("goal"):
-        postures = [study.postures(name, method, replay=method == LEARNER).mean(axis=0)
+        postures = [study.configurations(name, method, replay=method == LEARNER).mean(axis=0)
                     for name in of_goal.task]  # fmt: skip
         places = [study.tasks[name].goals[goal - 1] for name in of_goal.task]
         sizes.append(slope_sizes(np.array(postures), np.array(places)))
