@@ -215,7 +215,7 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     state, second = page.url, ticks(page, "Orange")
     page.get_by_role("radio", name="You").check()
     assert ticks(settled(page), "You") == ticks(page, "One goal at a time")
-    assert "blue robot" in text(page, "lead")
+    assert "blue robot, a posture for each goal. Orange: the planner." in text(page, "lead")
     page.get_by_role("button", name="elbow 2").focus()
     page.keyboard.press("ArrowDown")
     again = settled(opened(settled(page).url.partition("#")[2]))

@@ -471,14 +471,14 @@ class Play {
 
   /* What is to be seen, of one robot or of two. */
   get lead() {
-    const { who } = this.state;
+    const { who, mate } = this.state;
     const [{ free, goals, hands }] = this.problems;
     const two = this.main.length > 1;
     const box = ["The box stands", "The box slides on its rail", "The box slides"][free.filter(Boolean).length];
     let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
     if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
     if (this.told) seen = `goal ${this.told.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
-    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.`;
+    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
     return `${capital(this.nameOf(who))}: ${seen} ${box}, the joints turn.${this.editing ? "" : " Goals can be dragged."}`;
   }
 
