@@ -1,7 +1,8 @@
 """Writes the pages whose numbers come from stored results: ``python docs/make_findings.py``.
 
 ``docs/stored`` keeps tables and figures of reports, a folder for each suite; ``studies`` has those
-of studies. ``*.md.jinja`` beside this file are filled in from them and from nothing else.
+of studies. ``*.md.jinja`` below this folder are filled in from them, and with the keys of files
+(``key_tables.py``).
 ``make findings`` runs the suites and their reports, copies the tables with ``--from results``, and
 fills in the pages.
 """
@@ -15,6 +16,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
+import key_tables
 import pandas as pd
 from scipy import stats
 
@@ -112,7 +114,7 @@ def p_above(values: pd.Series, bound: float) -> float:
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its file name.
+    """Every page that is made from a template, by its path below ``docs``.
 
     A page that has the name of a suite waits until something of that suite is stored.
     """
@@ -124,11 +126,12 @@ def filled_pages() -> dict[str, str]:
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
+        "fields": key_tables.fields, "parameters": key_tables.parameters, **key_tables.MODELS,
     }  # fmt: skip
     waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
     return {
-        path.stem: fill_page(path, **values)
-        for path in sorted(DOCS.glob("*.md.jinja"))
+        str(path.relative_to(DOCS).with_suffix("")): fill_page(path, **values)
+        for path in sorted(DOCS.rglob("*.md.jinja"))
         if path.stem not in waiting
     }
 
