@@ -236,6 +236,7 @@ def reproduce(
 ) -> None:
     """Perform a run again and say whether the result is identical."""
     from coartic.analysis.methods import name_of
+    from coartic.analysis.words import number
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_again
 
@@ -243,7 +244,7 @@ def reproduce(
     asked, registered = run.specification, registry(method_file or [])
     if asked.method not in registered:
         raise CoarticError(f"unknown method {asked.method!r}: pass --method-file FILE")
-    result = f"reward {run.reward}, hands {run.hands}"
+    result = "" if run.reward is None else f"reward {number(run.reward)}, hands {run.hands}"
     say_pairs(
         [
             ("Run", f"{run.id}: {asked.task.label}, {name_of(asked.method)}, run {run.number}"),

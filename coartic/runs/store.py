@@ -621,7 +621,7 @@ def explain(path: Path, error: Exception) -> str:
             )
         if "locked" in str(error):
             return f"another program has {path} open; close it there, or wait for it"
-        if "readonly" in str(error):
+        if "readonly" in str(error) and path.with_name(f"{path.name}-journal").exists():
             return (
                 f"{path} was left in the middle of writing, and cannot be put right, since the "
                 "folder cannot be written. Copy the whole folder, and use the copy."
