@@ -255,9 +255,13 @@ def test_a_method_on_a_task_of_its_own_changes_no_other_mean():
     assert scores.common_tasks(MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))) == [
         "ascending", "two-armed-1"
     ]  # fmt: skip
-    known = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))
-    words = "mine, not of this project, ends 0.3 % from the best of this folder on Two-armed 2 †."
-    assert words in ranking.nearest(known)
+    optima = made_up_optima("ascending", "two-armed-1")
+    alone = ranking.nearest(MadeUp(seen, optima=optima))
+    assert "mine is the only method on Two-armed 2 †: name others, too." in alone
+    assert "ends" not in alone
+    both = study(rewards | {("two-armed-2", "theirs"): [-300]})
+    words = "mine, not of this project, ends 3.0 % from the best of this folder on Two-armed 2 †."
+    assert words in ranking.nearest(MadeUp(both, optima=optima))
 
 
 @pytest.mark.parametrize(("runs", "better", "words"), [

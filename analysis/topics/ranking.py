@@ -339,7 +339,11 @@ def from_files(study: Study) -> str:
         text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % {away}{on}"
         text += beside_learner(study, row) + "."
     more = len(rows) - MOST_FOREIGN
-    return f"{text} And {more} more in the ranking." if more > 0 else text
+    text += f" And {more} more in the ranking." if more > 0 else ""
+    for task, label in study.cells:
+        if not methods.is_built_in(label) and sum(other == task for other, _ in study.cells) == 1:
+            text += f" {label} is the only method on {marked(study.tasks[task])}: name others, too."
+    return text
 
 
 def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:

@@ -64,13 +64,15 @@ def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
 
 @cached
 def best_rewards(study: Study) -> dict[str, float]:
-    """The reward that gaps are to, by task: the optimum of :func:`initial_and_optimum`, and on a
-    task of which none is known the best of this folder with a free base."""
+    """The reward that gaps are to, by task: the optimum of :func:`initial_and_optimum`; where none
+    is known, the best of this folder with a free base, if there are two methods at least."""
     best = {name: float(pair[1]) for name, pair in initial_and_optimum(study).items()}
-    for (task, _), cell in study.cells.items():
-        if task not in study.optima and len(cell.good) and not locks_base(cell.runs):
-            best[task] = max(best.get(task, -math.inf), cell.rewards.max())
-    return {task: best[task] for task in study.tasks if best.get(task)}
+    for name in (name for name in study.tasks if name not in study.optima):
+        cells = [cell for (task, _), cell in study.cells.items() if task == name]
+        rewards = [c.rewards.max() for c in cells if len(c.good) and not locks_base(c.runs)]
+        if len(rewards) > 1 and max(rewards) < 0:
+            best[name] = max(rewards)
+    return {task: best[task] for task in study.tasks if task in best}
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
