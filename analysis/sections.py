@@ -108,9 +108,9 @@ SECTIONS = (
     Section(
         "nearest",
         "Ranking",
-        "Who comes nearest to the optimum?",
+        "Who comes nearest?",
         table=ranking.list_ranking,
-        caption="Gap to the optimum, or to the best known reward where no optimum is proven",
+        caption="Gap of the mean reward, over all tasks and on each",
         figure=ranking.draw_ranking,
         sentence=ranking.nearest,
         answer="Nearest",

@@ -97,7 +97,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
             axes.axhline(optimum.reward, **style.OPTIMUM)
             top = max(top, optimum.reward)
         reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
-        lowest = np.fmax(of_task.trials.min(), floor - 0.9 * reach)
+        lowest = np.fmin(np.maximum(of_task.trials.min(), floor - 0.9 * reach), floor)  # or NaN
         axes.set_ylim(lowest - 0.04 * reach, top + 0.06 * reach)
         style.log_axis(axes)
         axes.set_xlim(1, max(2, of_task.trial.max()))

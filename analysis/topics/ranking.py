@@ -267,7 +267,7 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def nearest(study: Study) -> str:
-    """The method nearest to the optimum and whether surely so, the learner's place, the best
+    """The method with the smallest gap and whether surely so, the learner's place, the best
     planner, methods from files, and failed runs: a sentence for each that there is."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
     learn = by_trial[~by_trial.method.isin(TRIES)].reset_index(drop=True)
