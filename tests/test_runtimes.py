@@ -70,5 +70,5 @@ def test_what_cannot_be_shown(study, tmp_path):
             runtimes(study, targets=targets)
     with pytest.raises(CoarticError, match="no task has a known optimum"):
         runtimes(MadeUp(study, optima={}))
-    with pytest.raises(CoarticError, match="not a results folder"):
+    with pytest.raises(CoarticError, match="there is no folder"):
         runtimes(tmp_path / "nowhere")
