@@ -7,7 +7,7 @@ from coartic import Optimiser
 from coartic.optimisers import OptimiserParameters
 
 
-class Setting(OptimiserParameters):
+class NevergradParameters(OptimiserParameters):
     sigma: float = 0.05  # of mutations, length unit and rad
 
 
@@ -15,7 +15,7 @@ class Nevergrad(Optimiser):
     name = "nevergrad"
     title = "NGOpt (Nevergrad)"
     citation = "P. Bennet et al. (2021). Nevergrad: black-box optimization platform. SIGEVOlution."
-    Parameters = Setting
+    Parameters = NevergradParameters
 
     def optimise(self, objective, rng):
         space = nevergrad.p.Array(init=objective.x0).set_mutation(sigma=self.parameters.sigma)

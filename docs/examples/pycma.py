@@ -6,7 +6,7 @@ from coartic import Optimiser
 from coartic.optimisers import OptimiserParameters
 
 
-class Setting(OptimiserParameters):
+class PyCMAParameters(OptimiserParameters):
     sigma: float = 0.05  # first step size, length unit and rad
 
 
@@ -14,7 +14,7 @@ class PyCMA(Optimiser):
     name = "pycma"
     title = "CMA-ES (pycma)"
     citation = "N. Hansen (2016). arXiv:1604.00772."
-    Parameters = Setting
+    Parameters = PyCMAParameters
 
     def optimise(self, objective, rng):
         options = {"seed": int(rng.integers(1, 2**31)), "verbose": -9}

@@ -4,7 +4,7 @@ from coartic import Optimiser
 from coartic.optimisers import OptimiserParameters
 
 
-class Setting(OptimiserParameters):
+class ReinforceParameters(OptimiserParameters):
     spread: float = 0.05  # SD of the policy, length unit and rad
     step: float = 1.0  # along the gradient
     batch: int = 50  # trials
@@ -14,7 +14,7 @@ class Reinforce(Optimiser):
     name = "reinforce"
     title = "REINFORCE with a Gaussian policy"
     citation = "R. J. Williams (1992). Machine Learning 8."
-    Parameters = Setting
+    Parameters = ReinforceParameters
 
     def optimise(self, objective, rng):
         p, mean = self.parameters, objective.x0
