@@ -15,7 +15,7 @@ class Mine(Optimiser):
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Minimise the cost of a trial; this ends when no trial is left; the best counts."""
         # Draw from rng alone. A point has the joints of all goals; units: length, rad.
-        x = objective.x0  # the corrective process alone
+        x = objective.x0  # the postures of the corrective process
         best = objective(x)  # ticks
         while True:
             points = x + 0.03 * rng.standard_normal((10, objective.dim))

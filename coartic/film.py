@@ -95,9 +95,9 @@ def check_film(path: Path, *, replace: bool = False) -> None:
     An ending that is not supported, MP4 without ffmpeg, what :func:`check_output` refuses.
     """
     if path.suffix.lower() not in FILMS:
-        raise CoarticError(f"--out {path}: the name must end in {', '.join(FILMS)}")
+        raise CoarticError(f"{path}: the name must end in {', '.join(FILMS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
-        raise CoarticError(f"--out {path}: MP4 needs ffmpeg; install it, or choose a .gif")
+        raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_output(path, replace=replace)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import SolutionError
+from coartic.inputs import check_limits
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import path_points
 from coartic.motion.solution import Execution, Movement, execute
@@ -97,7 +98,13 @@ class Trajectory:
         -------
         ndarray, shape (k, dof)
             Rows of ``configurations``, both ends included.
+
+        Raises
+        ------
+        ValueError
+            There is no goal of that number.
         """
+        check_limits("goal", goal, 1, len(self.hits))
         first = self.hits[goal - 2] if goal > 1 else 0
         return self.configurations[first : self.hits[goal - 1] + 1]
 

@@ -38,6 +38,8 @@ def test_a_film_and_a_picture(tmp_path):
         lasts = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
         assert sum(ms > 400 for ms in lasts) == len(mine.hits)  # it stands where a goal is hit
     mine.plot().savefig(tmp_path / "mine.png")
+    with pytest.raises(ValueError, match="goal is 0; it must be a whole number from 1 to 2"):
+        mine.subtask(0)
     with pytest.raises(CoarticError, match="there already"):
         mine.animate(tmp_path / "mine.gif")
 
