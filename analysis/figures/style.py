@@ -205,7 +205,8 @@ def gap_axis(axes: Axes, gaps: pd.DataFrame) -> None:
     nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
     left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
-    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in (1, 2, 5))]
+    steps = (1, 2, 5) if farthest < 100 else (1,)
+    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
     shown = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
     axes.set_xticks(shown, [f"{tick:g}" for tick in shown])
     axes.set_xticks([], minor=True)

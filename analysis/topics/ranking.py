@@ -43,6 +43,8 @@ _MOST_PAIRS = 24
 """Methods of which the page compares any two."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
+LONGEST = 36
+"""Letters of a name in the figure."""
 
 
 @cached
@@ -251,6 +253,7 @@ def draw_ranking(study: Study) -> Parts | None:
             beside: Any = {"textcoords": "offset points", "va": "center_baseline"}
             beside |= {"ha": "left"} if right else {"ha": "right"}
             beside |= {"weight": "bold"} if learner else {}
+            name = name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…"
             text, place = (f"{gap}  {name}", (high, 6)) if right else (f"{name}  {gap}", (low, -6))
             axes.annotate(text, (place[0], line), (place[1], 0), **beside)
         line += 1.4
