@@ -91,6 +91,8 @@ def columns_of(frame: pd.DataFrame) -> dict[str, str]:
                 header = "gap to the best of this folder (%)"
             if name.startswith("on ") and name[3:] in tasks:
                 header = f"{tasks[name[3:]]} (%)"
+            if f"{name}_sd" not in frame:
+                header = header.removesuffix(" ± SD")
             has_interval = f"{name}_low" in frame and frame[f"{name}_low"].notna().any()
             interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
             headers[name] = f"{header}{interval}"

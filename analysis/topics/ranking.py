@@ -314,8 +314,10 @@ def nearest(study: Study) -> str:
     for place in filter(None, places):
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
     for guessed in by_trial.gap[by_trial.method == methods.GUESSES] if len(learn) else ():
-        ahead = ", behind the learner" if places and learn.gap[places[0]] < guessed else ""
-        text += f" Guesses end {number(100 * guessed, 1)} % away{ahead}."
+        text += f" Guesses end {number(100 * guessed, 1)} % away"
+        for place in places:
+            text += f", {'behind' if learn.gap[place] < guessed else 'ahead of'} the learner"
+        text += "."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
         text += f" The best planner that knows the reward as a formula ends {gap(best)} away"

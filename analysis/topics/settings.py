@@ -57,9 +57,10 @@ def best_settings(study: Study) -> str:
         if others:
             second = others[0]
             surely = "significant" if second["p_holm"] < LEVEL else "no significant difference"
-            sure[best] += surely == "significant"
             if not of_task.p_holm.count() * second["least_p"] < LEVEL:
                 surely = "the runs are too few, or too alike, to tell"
+            else:
+                sure[best] += surely == "significant"
             next_best = name_in(study, second["method"])
             text += f"; next {next_best}, {number(second['reward'], 1)} ({surely})"
         texts.append(f"{text}.")
@@ -67,5 +68,6 @@ def best_settings(study: Study) -> str:
         return ""
     best, more = won.most_common(1)[0][0], len(texts) - MOST_TASKS
     card = f"{capital(best)} is best on {won[best]} of {counted(len(texts), 'task')}"
+    told = f"significantly on {sure[best]}" if best in sure else "too few runs to tell surely"
     several = f" And {more} more in the table." if more > 0 else ""
-    return f"{card}, significantly on {sure[best]}.\n{' '.join(texts[:MOST_TASKS])}{several}"
+    return f"{card}, {told}.\n{' '.join(texts[:MOST_TASKS])}{several}"
