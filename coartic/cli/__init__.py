@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperCommand
 
 import coartic
-from coartic.cli import draw, new, play, read, run
+from coartic.cli import draw, read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 
@@ -56,7 +56,7 @@ class Command(TyperCommand):
 
 
 COMMANDS = (
-    (play.play, "two-armed-1 --out play.html"),
+    (draw.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
     (run.run, "comparison --methods EC4,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
@@ -64,7 +64,7 @@ COMMANDS = (
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),
     (run.reproduce, "1a2b3c --in results/quick"),
     (read.verify, "results/quick --again 3"),
-    (new.new, "my-search"),
+    (run.new, "my-search"),
     (run.check, "my-search --method-file my_search.py"),
     (draw.draw, "two-armed/v1/i000..i003 --out tasks.svg"),
     (read.cite, "results/comparison --analysis"),

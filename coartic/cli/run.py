@@ -1,7 +1,8 @@
-"""Commands that run suites and single runs, and list them."""
+"""Commands that run suites and single runs, list them, and begin a method of one's own."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -309,3 +310,35 @@ def show_laws(name: str, laws: Sequence[Law]) -> int:
     passed = sum(law.passed for law in laws)
     say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
     return len(laws) - passed
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Its id, such as my-search.")],
+    out: given.Out = None,
+    replace: given.Replace = False,
+) -> None:
+    """Write a method of your own: ten lines that work, to be changed."""
+    from coartic.benchmarks import template
+    from coartic.benchmarks.reader import check_declaration
+    from coartic.benchmarks.registry import add_cards, registry
+    from coartic.files import write_output
+    from coartic.runs.card import card_of
+
+    path = Path(re.sub(r"\W", "_", name) + ".py") if out is None else out
+    if path.suffix != ".py":
+        raise CoarticError(f"--out {path}: the name must end in .py.")
+    mine = type("Mine", (template.Mine,), {"name": name})
+    check_declaration(mine, "coartic new")
+    add_cards(registry(), [card_of(mine, "coartic new", "", "")])
+    text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
+    write_output(path, text.encode(), replace=replace)
+    say_pairs(
+        [
+            ("Written", f"{path}: change it as you like"),
+            ("Check", f"coartic check {name} --method-file {path}"),
+            (
+                "Run",
+                f"coartic run comparison --method-file {path} --beside shipped --out results/mine",
+            ),
+        ]
+    )
