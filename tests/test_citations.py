@@ -68,9 +68,9 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
 
 
 def test_no_file_may_take_a_name_that_people_read():
-    """Of those that could be an id."""
+    """Of those that could be an id, and are none."""
     read = {text for row in KNOWN_METHODS.values() for text in (row.name, row.algorithm)}
-    assert {*filter(METHOD_NAME.fullmatch, read)} == {*NAMES}
+    assert {*filter(METHOD_NAME.fullmatch, read)} - {*KNOWN_METHODS} == {*NAMES}
 
 
 def test_every_method_has_a_row_and_every_entry_is_used():
