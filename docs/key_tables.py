@@ -100,7 +100,7 @@ def rows_of(model: Any, meanings: Mapping[str, str], but: str = "") -> Iterator[
             continue
         if name not in meanings:
             raise KeyError(f"{model.__name__}.{name}: has no docstring")
-        shown = "required"
+        shown = "as said" if "By default" in meanings[name] else "required"
         if not field.is_required():
             default = field.get_default(call_default_factory=True)
             text = "none" if default is None else f"`{toml(default, of[name])}`"

@@ -6,7 +6,7 @@ import coartic
 
 
 def search(task, trials, start):
-    """The best of a task's objectives, one for each hand sequence; the better half goes on."""
+    """The best of the objectives with each hand sequence; the better half goes on."""
     costs = [coartic.objective(task, hands) for hands in coartic.hand_sequences(task)]
     races = [(cost, start(cost)) for cost in costs]
     share = trials // len(races).bit_length()  # of a round: 16, 8, 4, 2 and 1 sequences
