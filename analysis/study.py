@@ -228,8 +228,13 @@ class Study:
         Raises
         ------
         CoarticError
-            The stored movements cannot be executed or do not do what is stored of them.
+            There are no runs of the method on the task; the stored movements cannot be executed or
+            do not do what is stored of them.
         """
+        if (task, method) not in self.cells:
+            on_task = [name for on, name in self.cells if on == task]
+            known = ("method", method, on_task) if on_task else ("task", task, self.tasks)
+            raise CoarticError(f"{self.folder}: {unknown(*known)}")
         stored = self._movements("replay" if replay else "solution")
         ids = map(str, self.cells[task, method].good.run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
