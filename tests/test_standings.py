@@ -242,11 +242,11 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     assert sentence.startswith("The learner comes nearest to the best of this folder (1.6 %).")
     for words in (sentence, plot.alt, *columns_of(ranked).values()):
         assert not re.search("optimum|known", words)
-    assert "Two-armed 1 † is known: gaps are" in about.notes_of(unknown, ranked)[0]
+    assert "Two-armed 1 † is known: gaps there are" in about.notes_of(unknown, ranked)[0]
     assert TABLES["runtimes"](unknown).empty  # no targets
     one = MadeUp(seen, optima=made_up_optima("ascending"))
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
-    assert "best known reward or best of this folder" in ranking.nearest(one)
+    assert "Gap of mine to the optimum: 1.5 %" in ranking.nearest(one)  # of ascending alone
 
 
 def test_the_ranking_figure_names_every_method_inside():

@@ -88,6 +88,6 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
         )
     if unknown and "gap" in columns:
         notes.append(
-            f"No optimum of {listed(unknown)} is known: gaps are to the best of this folder."
+            f"No optimum of {listed(unknown)} is known: gaps there are to the best of this folder."
         )
     return notes

@@ -125,14 +125,13 @@ def compared(study: Study) -> dict[str, dict[str, CellRuns]]:
 
 @cached
 def common_tasks(study: Study) -> list[str]:
-    """The tasks that a mean is over: all; where no method ran on all of them, those with a known
-    optimum; where none did on these, the first."""
+    """The tasks that a mean is over: those with a known optimum, or all where there is none; where
+    no method ran on all of them, the first on which one did."""
+    tasks = list(initial_and_optimum(study) or best_rewards(study))
     ran_on = [cells.keys() for cells in compared(study).values()]
-    every, known = list(best_rewards(study)), list(initial_and_optimum(study))
-    for tasks in (every, known or every):
-        if any(ran >= {*tasks} for ran in ran_on):
-            return tasks
-    return [task for task in known or every if any(task in ran for ran in ran_on)][:1]
+    if any(ran >= {*tasks} for ran in ran_on):
+        return tasks
+    return [task for task in tasks if any(task in ran for ran in ran_on)][:1]
 
 
 @cached
