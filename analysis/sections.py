@@ -115,7 +115,8 @@ SECTIONS = (
         sentence=ranking.nearest,
         answer="Nearest",
         note="Methods are grouped by their use of the reward: its value after each trial, its "
-        "formula, or nothing; of each algorithm the best setting counts. Intervals describe "
+        "formula, or nothing. They have their default settings; in the sentence the best method of "
+        "each algorithm counts. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed bootstrap tests, corrected for the tasks of the method (table "
@@ -195,8 +196,8 @@ SECTIONS = (
         "What did every method do on every task?",
         table=scores.list_methods,
         caption="Reward, gap to the optimum, hands with their runs, and costs of a run (medians)",
-        note="Every method works on the same robot. Its movements are scored by a function hidden "
-        "from the method. Times are seconds of solving.",
+        note="Every method works on the same robot. Its movements are scored by one function, "
+        "which no method can reach. Times are seconds of solving.",
         folded=True,
     ),
 )

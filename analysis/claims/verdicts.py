@@ -37,19 +37,20 @@ def list_claims(study: Study) -> Rows:
 def verdicts_in_words(judged: pd.DataFrame) -> str:
     """Verdicts on the claims that carry the paper's point, and how many of all have each."""
     n = counts(judged.verdict)
-    if 2 * n["undecided"] >= len(judged):  # they lack runs or trials
+    short = judged.verdict.rename(lambda name: CLAIMS[name].short)
+    central = short[short.index != ""]
+    all_hold = bool(len(central)) and (central == "supported").all()
+    if 2 * n["undecided"] >= len(judged) and not all_hold:  # they lack runs or trials
         return (
             f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
             f"undecided.\nSupported: {n['supported']}. Tasks, methods, runs or trials are missing."
         )
-    short = judged.verdict.rename(lambda name: CLAIMS[name].short)
-    central = short[short.index != ""]
     card, each = (
         ", ".join(f"{verdict} {count}" for verdict, count in counts(verdicts).items() if count)
         for verdicts in (central, judged.verdict)
     )
     card = f"Central claims: {card}"
-    if (central == "supported").all():
+    if all_hold:
         card = f"All {spelled(len(central))} central claims are supported"
     words = [
         f"{capital(verdict)}: {listed(names.index)}."

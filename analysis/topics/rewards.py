@@ -166,7 +166,7 @@ def draw_published(study: Study) -> Parts | None:
     ends = ["difference", "difference_low", "difference_high", "margin"]
     reach = np.nanmax(np.abs(data.reindex(columns=ends).to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)
-    axes.set_xlabel("ours − published (ticks)")
+    axes.set_xlabel("reward, ours − published")
     alt = "Differences of our mean rewards to the published ones, with intervals. "
     return drawing, data, f"{alt}{'; '.join(words)}.", tasks.values()
 
@@ -180,8 +180,8 @@ def rewards_reproduced(study: Study) -> str:
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
         f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
-        f"1 % and differ from {differ}; {undecided} {'is' if undecided == 1 else 'are'} "
-        "undecided.\n"
+        f"1 %; {differ} {'differs' if differ == 1 else 'differ'} by more, {undecided} "
+        f"{'is' if undecided == 1 else 'are'} undecided.\n"
     )
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0

@@ -19,6 +19,7 @@ class DifferentialEvolution(Optimiser):
             vectorized=True,
             updating="deferred",
             polish=False,
+            popsize=1,  # as many points as dimensions; 15 times as many take all trials
             maxiter=10**6,
             tol=0,  # or it stops where a narrow box has like costs
         )
