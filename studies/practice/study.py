@@ -11,7 +11,8 @@ once.
 The suite lets the planner plan three times, with numbers of postures (``nodes``) 1 % apart. Before
 these repeats were run we expected that with all goals in view it is no longer worse than with four.
 Time allowed repeats with four goals ahead and with all: the stored repeats.csv has these, the other
-tables first plans.
+tables first plans. The stored again.csv has the claims of agents that practised later, on another
+machine.
 """
 
 import sys
