@@ -233,8 +233,8 @@ class Study:
         """
         if (task, method) not in self.cells:
             on_task = [name for on, name in self.cells if on == task]
-            known = ("method", method, on_task) if on_task else ("task", task, self.tasks)
-            raise CoarticError(f"{self.folder}: {unknown(*known)}")
+            asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)
+            raise CoarticError(f"{self.folder}: {unknown(*asked)}")
         stored = self._movements("replay" if replay else "solution")
         ids = map(str, self.cells[task, method].good.run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}

@@ -54,8 +54,8 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
             if folder_named(name).resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot stand beside itself: choose another --out")
             if not folder_named(name).exists():
-                said = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
-                raise CoarticError(said)
+                message = f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
+                raise CoarticError(message)
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
         target = stack.enter_context(writing(out))
@@ -130,10 +130,10 @@ def named(cells: Sequence[Cell]) -> str:
 
 def check_together(plans: Mapping[str, Plan]) -> None:
     """Raises CoarticError where plans, by where they are from, say different things of one."""
-    said: dict[str, tuple[str, object]] = {}
+    first_said: dict[str, tuple[str, object]] = {}
 
     def agree(where: str, what: str, value: object, hint: str = "") -> None:
-        origin, there = said.setdefault(what, (where, value))
+        origin, there = first_said.setdefault(what, (where, value))
         if there != value:
             raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
 

@@ -201,9 +201,9 @@ def select_cells(
 
     methods = [method for name in methods for method in methods_named(name, registered)]
     tasks = list(map(known_by_name, tasks))
-    own = [each for each in tasks if isinstance(each, Task) or each.endswith(".toml")]
-    user_tasks = read_tasks(own)
-    wanted = [each for name in tasks if name not in own for each in named_by(str(name))]
+    own_tasks = [each for each in tasks if isinstance(each, Task) or each.endswith(".toml")]
+    user_tasks = read_tasks(own_tasks)
+    wanted = [each for name in tasks if name not in own_tasks for each in named_by(str(name))]
     wanted += user_tasks
     in_suite = {name for block in suite.blocks for name in block.task_names(user_tasks)}
     for name in wanted:
@@ -270,11 +270,11 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     return named
 
 
-def read_tasks(own: Iterable[str | Task]) -> dict[str, Task]:
+def read_tasks(tasks_and_files: Iterable[str | Task]) -> dict[str, Task]:
     """Tasks, and those of files, by name, which no other task may have."""
     places: dict[str, str] = {}
     tasks: dict[str, Task] = {}
-    for each in own:
+    for each in tasks_and_files:
         task, place = (each, repr(each)) if isinstance(each, Task) else (load_task(each), each)
         taken = "a shipped task" if task.name in builtin_tasks() else places.get(task.name)
         if taken == place:

@@ -39,9 +39,9 @@ def sentences(study: Study) -> dict[str, list[str]]:
 
 def answers(study: Study) -> list[tuple[Section, str]]:
     """Sections that answer a question in short, with their findings."""
-    found = sentences(study)
+    texts = sentences(study)
     return [
-        (each, " ".join(found[each.id])) for each in SECTIONS if each.answer and each.id in found
+        (each, " ".join(texts[each.id])) for each in SECTIONS if each.answer and each.id in texts
     ]
 
 

@@ -41,7 +41,7 @@
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("input");
     const filter = tools.querySelector("select");
-    const said = tools.querySelector("output");
+    const status = tools.querySelector("output");
     const show = () => {
       const words = (search ? search.value : "").toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
@@ -51,7 +51,7 @@
         row.hidden = !(wanted && words.every((word) => text.includes(word)));
         shown += !row.hidden;
       });
-      said.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
+      status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
     };
     tools.addEventListener("input", show);
     /* Rows in sight, for a spreadsheet: tabs between cells, a plain minus, thousands not apart. */
@@ -59,7 +59,7 @@
       const rows = [...table.rows].filter((row) => !row.hidden);
       const plain = (cell) => cell.innerText.replace(/\u202f/g, "").replace(/−/g, "-").replace(/\s+/g, " ").trim();
       await navigator.clipboard.writeText(rows.map((row) => [...row.cells].map(plain).join("\t")).join("\n"));
-      said.textContent = `${rows.length - 1} rows are in the clipboard`;
+      status.textContent = `${rows.length - 1} rows are in the clipboard`;
     });
     tools.hidden = false;
     show();

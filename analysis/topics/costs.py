@@ -94,8 +94,8 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
 def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
     """Cells of each method on those of :func:`.scores.common_tasks` whose optimum is known, in
     lists' order; of methods that ran on all of them."""
-    known, compared = scores.initial_and_optimum(study), scores.compared(study)
-    tasks = [task for task in scores.common_tasks(study) if task in known]
+    rewards, compared = scores.initial_and_optimum(study), scores.compared(study)
+    tasks = [task for task in scores.common_tasks(study) if task in rewards]
     return {
         method: [cell for task, cell in compared[method].items() if task in tasks]
         for method in in_order(compared)

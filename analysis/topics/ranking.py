@@ -207,8 +207,8 @@ def differences(study: Study) -> dict[str, dict[str, str]]:
     names = {method: name_in(study, method) for method in main_gaps(study).method[:_MOST_PAIRS]}
     texts: dict[str, dict[str, str]] = {name: {} for name in names.values()}
     for first, second in itertools.combinations(names, 2):
-        found = difference_of_gaps(study, first, second)
-        ends = 100 * np.array([found.value, found.low, found.high])
+        difference = difference_of_gaps(study, first, second)
+        ends = 100 * np.array([difference.value, difference.low, difference.high])
         for one, other, (value, low, high) in (
             (first, second, ends), (second, first, -ends[[0, 2, 1]])
         ):  # fmt: skip

@@ -78,10 +78,10 @@ def best_rewards(study: Study) -> dict[str, float]:
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """What gaps on these tasks are to: ``optimum``, ``best known reward``, or ``best of this
     folder`` where no optimum is known."""
-    known = {task in study.optima for task in tasks}
-    if known == {True, False}:
+    has_optimum = {task in study.optima for task in tasks}
+    if has_optimum == {True, False}:
         return "best known reward or best of this folder"
-    return optimum_in_words(study) if True in known else "best of this folder"
+    return optimum_in_words(study) if True in has_optimum else "best of this folder"
 
 
 @cached
@@ -190,8 +190,8 @@ def best_condition(study: Study, task: str) -> str | None:
 def cell_gap(study: Study, cell: CellRuns) -> float:
     """Gap of a cell's mean reward to the optimum, or to the best of this folder where none is
     known; NaN without a reward."""
-    known = study.optima.get(cell.task)
-    best = known.reward if known else best_rewards(study).get(cell.task)
+    optimum = study.optima.get(cell.task)
+    best = optimum.reward if optimum else best_rewards(study).get(cell.task)
     if not best or not len(cell.good) or locks_base(cell.runs):
         return math.nan
     return float(gap_share(cell.rewards.mean(), best))

@@ -146,8 +146,8 @@ class Play {
   /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
   ask() {
     const { state } = this;
-    const known = (who) => (who in NAMES || this.stored(who) ? who : "learner");
-    [state.who, state.mate] = [known(state.who), known(state.mate === "you" ? "learner" : state.mate)];
+    const mover = (who) => (who in NAMES || this.stored(who) ? who : "learner");
+    [state.who, state.mate] = [mover(state.who), mover(state.mate === "you" ? "learner" : state.mate)];
     this.problems = this.tasks.map((task) => problem_of(task));
     this.alone = this.problems.map((problem) => corrective_trial(problem, initial_hands(problem)));
     this.stale = true;
@@ -224,8 +224,8 @@ class Play {
       return this.own.map(([hand, ...q], goal) => (q.length
         ? { goal, hand, kind: "learned", target: Float64Array.from(q) } : { goal, hand, kind: "corrective", target: null }));
     }
-    const found = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
-    return who === "alone" || !found ? null : found.movements;
+    const snapshot = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
+    return who === "alone" || !snapshot ? null : snapshot.movements;
   }
 
   /* The films of the answer, made from what is known by now. */
@@ -389,8 +389,8 @@ class Play {
       else if (this.stored(who)) runs = this.stored(who).films[k].reached;
       else if (LEARNS.includes(who)) {
         for (let seed = 1; seed < SEEDS; seed += 1) {
-          const found = this.fresh.has(`${k} run ${seed}`) && this.snapshot(`${k} run ${seed}`);
-          if (found && (found.trials >= this.shown || this.result(`${k} run ${seed}`).done)) runs.push(found.reached[0]);
+          const snapshot = this.fresh.has(`${k} run ${seed}`) && this.snapshot(`${k} run ${seed}`);
+          if (snapshot && (snapshot.trials >= this.shown || this.result(`${k} run ${seed}`).done)) runs.push(snapshot.reached[0]);
         }
       }
       runs = runs.filter(Boolean);
@@ -434,9 +434,9 @@ class Play {
     this.find("learning").hidden = !learns;
     if (!learns) return;
     const runs = this.problems.map((_, k) => this.result(`${k} run 0`)).filter(Boolean);
-    const known = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward)].filter(Number.isFinite);
+    const references = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward)].filter(Number.isFinite);
     const learned = runs.flatMap(({ snapshots }) => snapshots.map(({ reward }) => -reward));
-    const all = [...known, ...learned].filter(Number.isFinite);
+    const all = [...references, ...learned].filter(Number.isFinite);
     if (!all.length) return;
     let [low, high] = [Math.min(...all), Math.max(...all)];
     [low, high] = [low - 0.12 * (high - low) - 2, high + 0.25 * (high - low) + 4];
@@ -895,15 +895,15 @@ class Play {
   async copyLink() {
     this.keep();
     const address = this.data.address(this.link);
-    let said = "The link is in the clipboard.";
+    let note = "The link is in the clipboard.";
     try {
       await navigator.clipboard.writeText(address);
     } catch {
-      said = `The link is ${address}`;
+      note = `The link is ${address}`;
     }
     const file = decodeURIComponent(new URL(address).pathname.split("/").at(-1));
-    if (address.startsWith("file:")) said += ` It opens on this machine only: to share it, send ${file} as well, to whose address the part from # on is added.`;
-    this.find("note").textContent = said;
+    if (address.startsWith("file:")) note += ` It opens on this machine only: to share it, send ${file} as well, to whose address the part from # on is added.`;
+    this.find("note").textContent = note;
   }
 
   /* The stage at twice its size, with the words beside it. */
