@@ -1,8 +1,7 @@
 """Writes the pages whose numbers come from stored results: ``python docs/make_findings.py``.
 
 ``docs/stored`` keeps tables and figures of reports, a folder for each suite; ``studies`` has those
-of studies. ``*.md.jinja`` below this folder are filled in from them, and with the keys of files
-(``key_tables.py``).
+of studies. ``*.md.jinja`` in this folder are filled in from them.
 ``make findings`` runs the suites and their reports, copies the tables with ``--from results``, and
 fills in the pages.
 """
@@ -16,7 +15,6 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
-import key_tables
 import pandas as pd
 from scipy import stats
 
@@ -126,7 +124,6 @@ def filled_pages() -> dict[str, str]:
         "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
         "goal_sets": pd.read_csv(STORED / "reconstruction" / "sets.csv"),
         "stored": lambda suite: (STORED / suite).is_dir(),
-        "fields": key_tables.fields, "parameters": key_tables.parameters, **key_tables.MODELS,
     }  # fmt: skip
     waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
     return {

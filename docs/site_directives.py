@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from docutils import nodes
-from key_tables import hints, table
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import inspect
@@ -16,6 +15,15 @@ from sphinx.util.docutils import SphinxDirective
 
 from coartic.play.page import figure, play_page, preset_of, text_of, up_or_down
 from coartic.tasks.task import shipped_tasks
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """A table of Markdown."""
+    yield "| " + " | ".join(heads) + " |"
+    yield "| " + " | ".join("---" for _ in heads) + " |"
+    for row in rows:
+        yield "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in row) + " |"
+    yield ""
 
 
 def bare(kind: Any) -> Any:
@@ -100,9 +108,8 @@ def plainly(
     """Show types without metadata, and a model without its signature, which repeats its fields."""
     if what == "class" and "__pydantic_fields__" in vars(thing):
         annotations = thing.__annotations__
-        annotations |= {
-            field: bare(kind) for field, kind in hints(thing).items() if field in annotations
-        }
+        fields = thing.__pydantic_fields__.items()
+        annotations |= {name: bare(of.annotation) for name, of in fields if name in annotations}
         return "", ""
     if "Annotated[" not in (signature or ""):
         return None

@@ -3,11 +3,18 @@
 import importlib.util
 import re
 import sys
+import tomllib
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from coartic.analysis import fill_page
+from coartic.benchmarks.registry import built_in
+from coartic.benchmarks.suites import Suite
+from coartic.tasks.families import Family
+from coartic.tasks.task import Task
 
 DOCS = Path(__file__).parent.parent / "docs"
 sys.path.append(str(DOCS))  # the program imports what is beside it
@@ -18,7 +25,7 @@ _SPEC.loader.exec_module(make_findings)
 
 def test_pages_are_their_templates_filled_from_the_stored_tables():
     pages = make_findings.filled_pages()
-    assert {"findings.md", "reference/files.md"} <= {*pages}
+    assert "findings.md" in pages
     for page, text in pages.items():
         assert text == (DOCS / page).read_text(encoding="utf-8"), page
 
@@ -29,6 +36,60 @@ def test_a_sentence_that_no_longer_holds_is_refused(tmp_path):
     assert fill_page(template, gap=0.5) == "It is nearer."
     with pytest.raises(ValueError, match="CMA-ES is nearer"):
         fill_page(template, gap=2)
+
+
+def read_example(text):
+    """The content of a TOML example, and the comment behind each key and table."""
+    notes, table = {}, ()
+    for line in text.splitlines():
+        code, _, note = line.partition("#")
+        if head := re.match(r"\[+([\w.]+)\]", code):
+            table = tuple(head[1].split("."))
+            notes[table] = note
+            notes.setdefault(table[:1], note)
+        elif key := re.match(r"(\w+) = ", code):
+            notes[*table, key[1]] = note
+    return tomllib.loads(text), notes
+
+
+def check_keys(kind, content, notes, place=(), **beside):
+    """Every key of a model is there, and said to be required if a file needs it; its value is what
+    holds without it, where the comment does not say otherwise. ``beside``: no key of the file."""
+    read = TypeAdapter(kind).validate_python
+    assert content.keys() | beside.keys() == kind.__pydantic_fields__.keys()
+    shown = read({**beside, **content})
+    for key, value in content.items():
+        inner, part = (*place, key), getattr(shown, key)
+        note = notes.get(inner, "")
+        try:
+            without = read({**beside, **{k: v for k, v in content.items() if k != key}})
+        except ValidationError:
+            assert "required" in note, inner
+        else:
+            assert "required" not in note, inner
+            assert (getattr(without, key) == part) == ("left out" not in note), inner
+        if key == "provenance":
+            inner, part, value = (*inner, "goals"), part["goals"], value["goals"]
+        if isinstance(value, list) and value:
+            part, value = part[0], value[0]
+        if hasattr(part, "__pydantic_fields__"):
+            check_keys(type(part), value, notes, inner)
+
+
+def test_the_page_of_files_has_every_key_with_what_holds_without_it():
+    page = (DOCS / "reference" / "files.md").read_text(encoding="utf-8")
+    task, family, suite, methods = re.findall("```toml\n(.*?)```", page, re.DOTALL)
+    check_keys(Task, *read_example(task))
+    check_keys(Family, *read_example(family), name="mine/v1")
+    check_keys(Suite, *read_example(suite), name="mine")
+    used = set()
+    for name, card in built_in().items():
+        of = {key: at for key, at in tomllib.loads(methods).items() if fnmatchcase(name, key)}
+        used |= {*of}
+        shown = {key: value for at in of.values() for key, value in at.items() if key != "hands"}
+        assert shown == card.load().Parameters().model_dump(exclude={"hands"}), name
+        assert "hands" not in card.load().Parameters.model_fields or "hands" in of[name]
+    assert used == {*tomllib.loads(methods)}
 
 
 def test_links_of_pages_name_files_that_are_there():
