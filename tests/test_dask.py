@@ -1,7 +1,5 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
-import contextlib
-
 import pytest
 
 from coartic import CoarticError
@@ -10,14 +8,18 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.run import perform
 from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
 
-distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
 QUIET = {"dashboard_address": None, "silence_logs": 50}
 CELLS = paper_cells(tasks=["ascending", "descending"])
 
 
 @pytest.fixture(scope="module")
-def address():
+def distributed():
+    return pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def address(distributed):
     """Of a cluster in this process, which is as far as patches reach."""
     with distributed.LocalCluster(n_workers=2, processes=False, **QUIET) as cluster:
         yield cluster.scheduler_address
@@ -35,6 +37,7 @@ def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
         perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
+@pytest.mark.usefixtures("distributed")
 def test_nobody_at_an_address(tmp_path):
     import dask
 
@@ -44,7 +47,7 @@ def test_nobody_at_an_address(tmp_path):
                 perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
-def test_a_cluster_without_workers(tmp_path, monkeypatch):
+def test_a_cluster_without_workers(distributed, tmp_path, monkeypatch):
     messages = []
     monkeypatch.setattr(cluster_module, "WORKERS_S", 0.5)
     with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
@@ -54,21 +57,20 @@ def test_a_cluster_without_workers(tmp_path, monkeypatch):
     assert len(messages) == 1
 
 
-def test_a_scheduler_that_is_lost(tmp_path, monkeypatch):
+def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
     """What was finished before is kept."""
-    import dask
-
     monkeypatch.setattr(cluster_module, "Local", InProcess)
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
-    with contextlib.ExitStack() as stack, cluster:
+    with cluster:
+        executor = Dask(cluster.scheduler_address)
+        client = executor._client()
+        monkeypatch.setattr(executor, "_client", lambda: client)
 
         def watch(progress, what):
             if progress.done == 2:
+                client._timeout = 0.1  # s; it would wait for half a minute that it comes back
                 cluster.close()
-                soon = dask.config.set({"distributed.comm.timeouts.connect": "0.5s"})
-                stack.enter_context(soon)
 
-        executor = Dask(cluster.scheduler_address)
         with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):
             perform(planned(CELLS), tmp_path / "out", executor=executor, watch=watch)
     again = run_and_write(tmp_path / "out", CELLS)

@@ -2,7 +2,6 @@
 
 import itertools
 
-import cvxpy as cp
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -37,6 +36,8 @@ def problems(count, seed, far=0.5, preferred=0.3):
 
 def stated(rows, least, preferred):
     """The cascade as its docstring states it; what level 1 falls short of, and the changes."""
+    import cvxpy as cp
+
     s, x = cp.Variable(), cp.Variable(rows.shape[1])
     limits = cp.abs(x) <= LIMIT
     effort = cp.square(s) + DAMPING**2 * cp.sum_squares(x)
