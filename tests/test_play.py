@@ -40,9 +40,8 @@ def node(script, *given):
     program = f"""
       const coartic = require({json.dumps(str(MODEL))});
       const given = JSON.parse(require("fs").readFileSync(0, "utf8"));
-      const plain = (key, value) => ArrayBuffer.isView(value) ? Array.from(value) : value;
       Promise.resolve(({script})(...given))
-        .then((answer) => process.stdout.write(JSON.stringify(answer, plain)));
+        .then((answer) => process.stdout.write(JSON.stringify(answer)));
     """
     text = json.dumps(given)  # NaN has no place in it: None
     done = subprocess.run(

@@ -2,8 +2,8 @@
 /* coartic's model for browsers and Node: the same numbers as in Python, bit by bit.
 
    Each function has the name of its counterpart in the Python package and does the same operations
-   in the same order. A comment names the module of the counterpart. A configuration is a
-   Float64Array: x and y of the base, the joints of the left arm, those of the right one. Hands are
+   in the same order. A comment names the module of the counterpart. A configuration is an
+   array, which is soon copied: x and y of the base, the joints of the left arm, those of the right one. Hands are
    0 (left) and 1 (right), goals are counted from 0. Without a counterpart are Strategy, which is a
    smaller CMA-ES than pycma's, and shortest_plan, a local search. */
 
@@ -23,10 +23,8 @@ function problem_of(task, model = PAPER) {
     left_links: [1, 1, 1, 1], right_links: [1, 1, 1, 1], left_shoulder: [-0.5, 0.1], right_shoulder: [0.5, 0.1],
     base_size: [1, 0.2], ...task.robot,
   };
-  const start = Float64Array.from([...(task.start.base || [0, 0]), ...task.start.left, ...task.start.right]);
-  const arm = (first, links, shoulder) => ({
-    first, links: Float64Array.from(links), shoulder_x: shoulder[0], shoulder_y: shoulder[1],
-  });
+  const start = [...(task.start.base || [0, 0]), ...task.start.left, ...task.start.right];
+  const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
   const locked = task.locked_base || [];
   return {
     task, robot, start, model, dof: start.length,
@@ -113,7 +111,7 @@ function distance_to_goal(problem, q, number, hand) {
 /* ---- Movement ---- */
 
 const CLEARANCE = 1e-9; // for rounding
-let between = new Float64Array(0);
+const between = [];
 
 /* coartic/motion/movement.py: move `q` itself; ticks, negative for a miss. Steps are skipped in which the hand,
    which moves by at most `speed` a step, stays out of both discs. */
@@ -124,7 +122,6 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   const { first, links } = arm;
   const tip = links.length;
   const dof = q.length;
-  if (between.length !== dof) between = new Float64Array(dof);
   let square = 0;
   for (let j = 0; j < dof; j += 1) {
     const delta = target[j] - q[j];
@@ -170,7 +167,7 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
 }
 
-/* coartic/motion/corrective.py: change `q` itself; iterations, negative where **A** does not converge. */
+/* coartic/motion/corrective.py: change `q` itself; whether **A** converges. */
 function correct(problem, q, number, hand) {
   const { model } = problem;
   const [free_x, free_y] = problem.free;
@@ -182,20 +179,19 @@ function correct(problem, q, number, hand) {
     const error_x = goal_x - xs[tip];
     const error_y = goal_y - ys[tip];
     const error = error_x * error_x + error_y * error_y;
-    if (Math.sqrt(error) <= model.correction_tolerance) return iteration;
-    if (iteration >= model.max_iterations || !(error < Infinity)) return -1 - iteration;
-    let moved = false;
-    const turn = (j, by) => {
+    if (Math.sqrt(error) <= model.correction_tolerance) return true;
+    if (iteration >= model.max_iterations || !(error < Infinity)) return false;
+    const x = q[0];
+    const y = q[1];
+    if (free_x) q[0] += model.gain * error_x;
+    if (free_y) q[1] += model.gain * error_y;
+    let moved = q[0] !== x || q[1] !== y;
+    for (let k = 0, j = arm.first; k < tip; k += 1, j += 1) {
       const before = q[j];
-      q[j] = before + by;
+      q[j] = before + model.gain * (-(ys[tip] - ys[k]) * error_x + (xs[tip] - xs[k]) * error_y);
       if (q[j] !== before) moved = true;
-    };
-    if (free_x) turn(0, model.gain * error_x);
-    if (free_y) turn(1, model.gain * error_y);
-    for (let k = 0; k < tip; k += 1) {
-      turn(arm.first + k, model.gain * (-(ys[tip] - ys[k]) * error_x + (xs[tip] - xs[k]) * error_y));
     }
-    if (!moved) return -2 - iteration; // a stationary point
+    if (!moved) return false; // a stationary point
   }
 }
 
@@ -205,7 +201,7 @@ function correct(problem, q, number, hand) {
 class Trial {
   constructor(problem) {
     this.problem = problem;
-    this.q = Float64Array.from(problem.start);
+    this.q = problem.start.slice();
     this.movements = [];
     this.reached = [];
     this.hands = [];
@@ -218,14 +214,14 @@ class Trial {
     const signed = move(this.problem, this.q, target, goal, hand, kind !== "corrective");
     const ticks = Math.abs(signed);
     this.ticks += ticks;
-    this.movements.push({ goal, hand, kind, target: Float64Array.from(target), ticks });
+    this.movements.push({ goal, hand, kind, target, ticks });
     return signed > 0;
   }
 
   /* coartic/motion/reach.py: **A** finishes what was missed; whether it hits. */
   corrects(goal, hand) {
-    const target = Float64Array.from(this.q);
-    this.going = correct(this.problem, target, goal, hand) >= 0;
+    const target = this.q.slice();
+    this.going = correct(this.problem, target, goal, hand);
     return this.going && this.moves(goal, hand, "corrective", target);
   }
 
@@ -235,10 +231,11 @@ class Trial {
 
   /* The goal is hit. */
   ends(goal, hand) {
+    const q = this.q.slice();
     if (!this.movements.length || this.movements.at(-1).goal !== goal) {
-      this.movements.push({ goal, hand, kind: "corrective", target: Float64Array.from(this.q), ticks: 0 });
+      this.movements.push({ goal, hand, kind: "corrective", target: q, ticks: 0 });
     }
-    this.reached.push(Float64Array.from(this.q));
+    this.reached.push(q);
     this.hands.push(hand);
   }
 
@@ -260,7 +257,7 @@ function make_trial(problem, hands, targets) {
   const trial = new Trial(problem);
   for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
     const given = targets[goal];
-    const target = given && Float64Array.from(given, (value, j) => (Number.isNaN(value) ? trial.q[j] : value));
+    const target = given && given.map((value, j) => (Number.isNaN(value) ? trial.q[j] : value));
     trial.reaches(goal, hands[goal], target);
   }
   return trial;
@@ -473,7 +470,6 @@ class Learner {
       fill(1 - chosen, rules.modify_other);
       return joints;
     });
-    this.target = new Float64Array(problem.dof);
   }
 
   random_hand() {
@@ -510,13 +506,14 @@ class Learner {
   set_target(q, number, previous, hand, explore) {
     const stored = this.targets[number][previous][hand];
     if (!stored) return null;
-    const { target, rng } = this;
+    const { rng } = this;
+    const target = stored.slice();
     const { noise_sd, modify_other } = this.rules;
     const explored = this.explored[hand];
     const other = this.problem.arms[1 - hand];
     for (let j = 0; j < target.length; j += 1) {
       const follows = !modify_other && j >= other.first && j < other.first + other.links.length;
-      target[j] = follows ? q[j] : stored[j];
+      if (follows) target[j] = q[j];
       if (explore && explored[j]) target[j] += noise_sd * rng.standard_normal();
     }
     return target;
@@ -649,7 +646,7 @@ class Strategy {
       const z = Float64Array.from({ length: n }, () => search.rng.standard_normal());
       const y = new Float64Array(n);
       for (let r = 0; r < n; r += 1) for (let k = 0; k <= r; k += 1) y[r] += A[r][k] * z[k];
-      const targets = hands.map(() => new Float64Array(search.problem.dof).fill(NaN));
+      const targets = hands.map(() => search.problem.start.map(() => NaN));
       entries.forEach(([goal, j], k) => { targets[goal][j] = this.mean[k] + this.sigma * y[k]; });
       const { reward } = search.try(hands, targets);
       points.push({ z, y, reward });
@@ -779,7 +776,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
   const joints = Array.from({ length: problem.dof }, (_, j) => j).filter((j) => (j < BASE_DOF
     ? problem.free[j] : problem.hands.includes(j < problem.arms[RIGHT].first ? LEFT : RIGHT)));
   const radius = problem.radius * (1 - 1e-3);
-  const corners = guess.map((corner) => Float64Array.from(corner));
+  const corners = guess.map((corner) => corner.slice());
   const strides = corners.map(() => 1);
   if (!corners.every((corner, k) => project(problem, corner, problem.goals[from + k], hands[k], joints, radius))) return null;
   for (let round = 0; round < rounds && Math.max(...strides) > 1e-3; round += 1) {

@@ -16,7 +16,7 @@ const NAMES = {
 };
 const LEARNS = ["learner", "cma-es"];
 const short = (value) => Number(value.toFixed(2)).toString();
-const grouped = (count) => count.toLocaleString("en").replace(",", "\u202f");
+const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const within = (place) => place.map((value) => Math.round(100 * Math.max(-FAR, Math.min(FAR, value))) / 100);
@@ -222,7 +222,7 @@ class Play {
     if (stored) return stored.films[k].movements;
     if (who === "you") {
       return this.own.map(([hand, ...q], goal) => (q.length
-        ? { goal, hand, kind: "learned", target: Float64Array.from(q) } : { goal, hand, kind: "corrective", target: null }));
+        ? { goal, hand, kind: "learned", target: q } : { goal, hand, kind: "corrective", target: null }));
     }
     const snapshot = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
     return who === "alone" || !snapshot ? null : snapshot.movements;
@@ -683,7 +683,7 @@ class Play {
   /* The postures that you place, or in which the robot hits the goals. */
   get postures() {
     const { start } = this.problems[0];
-    return this.own.map(([hand, ...q], goal) => ({ hand, q: Float64Array.from(q.length ? q : this.main[0].trial.reached[goal] || start) }));
+    return this.own.map(([hand, ...q], goal) => ({ hand, q: q.length ? q : [...(this.main[0].trial.reached[goal] || start)] }));
   }
 
   /* Bring a part of the robot to a place; the hand at work stays on its goal if it can. */
@@ -696,10 +696,8 @@ class Play {
     const free = problem.free.flatMap((each, axis) => (each ? [axis] : []));
     /* By the joints beyond the part that was moved, or else by all. */
     const settle = (from) => [joints(mine, from, mine.links.length), [...free, ...joints(mine, 0, mine.links.length)]].some((some) => {
-      const kept = Float64Array.from(q);
-      const holds = project(problem, q, problem.goals[goal], hand, some, 0.9 * problem.radius);
-      if (!holds) q.set(kept);
-      return holds;
+      const there = [...q];
+      return project(problem, there, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, there);
     });
     if (part === "base") {
       free.forEach((axis) => { q[axis] = to[axis]; });
@@ -709,7 +707,7 @@ class Play {
       project(problem, q, to, moved, joints(problem.arms[moved], 0, k), 0.01, k);
       if (moved === hand) settle(k);
     }
-    this.state.own = this.own.with(goal, [hand, ...Array.from(q, (value) => Math.round(1e4 * value) / 1e4)]);
+    this.state.own = this.own.with(goal, [hand, ...q.map((value) => Math.round(1e4 * value) / 1e4)]);
     this.showControls();
     this.answer();
   }

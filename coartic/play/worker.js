@@ -1,7 +1,6 @@
 /* ---- The worker: makes trials in slices, so that it hears a new order at once ---- */
 
-const SLICE_MS = 15;
-const REPORT_MS = 60;
+const SLICE_MS = 50;
 
 /* A run of the learner, of CMA-ES or of a planner, as an order names it. */
 class Job {
@@ -34,30 +33,21 @@ class Job {
 }
 
 if (typeof document === "undefined" && typeof self !== "undefined" && typeof module === "undefined") {
-  let [order, jobs, reported] = [0, [], 0];
-  const worked = new Set(); // since the last report
+  let [order, jobs] = [0, []];
   const work = (current) => {
     if (current !== order) return;
-    const open = jobs.filter((job) => !job.done);
-    const turn = Math.min(...open.map((job) => job.turn));
-    const now = open.filter((job) => job.turn === turn);
+    const turn = Math.min(...jobs.filter((job) => !job.done).map((job) => job.turn));
+    const now = jobs.filter((job) => job.turn === turn);
+    const left = () => now.filter((job) => !job.done);
     const end = performance.now() + SLICE_MS;
-    while (now.some((job) => !job.done) && performance.now() < end) {
-      now.forEach((job) => { if (!job.done) job.step(); });
-    }
-    now.forEach((job) => worked.add(job));
-    if (performance.now() > reported + REPORT_MS || now.every((job) => job.done)) {
-      reported = performance.now();
-      self.postMessage({ order, reports: [...worked].map((job) => job.report()) });
-      worked.clear();
-    }
+    for (let open = left(); open.length && performance.now() < end; open = left()) open.forEach((job) => job.step());
+    // Of later turns, further runs, a part shows nothing new.
+    if (turn < 2 || !left().length) self.postMessage({ order, reports: now.map((job) => job.report()) });
     if (jobs.some((job) => !job.done)) setTimeout(work, 0, current);
   };
   self.onmessage = ({ data }) => {
     order = data.order;
-    worked.clear();
     jobs = data.jobs.map((job) => new Job(job));
-    reported = performance.now();
     work(order);
   };
 }
