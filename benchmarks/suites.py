@@ -238,8 +238,10 @@ def select_cells(
         elif (task.name, method) not in there:
             cells.append(Cell(task, registered[method], runs=suite.runs))
     task_names = list(dict.fromkeys([*(cell.task.name for cell in cells), *user_tasks]))
-    if wrong := [unknown("task", name, task_names) for name in wanted if name not in task_names]:
-        raise CoarticError("\n".join(wrong))
+    if wrong := [name for name in wanted if name not in task_names]:
+        hint = " Instances are a range, such as long/v1/i000..i009."
+        words = (f"{unknown('task', name, task_names)}{hint * ('/' in name)}" for name in wrong)
+        raise CoarticError("\n".join(words))
     of_tasks = [cell for cell in cells if not wanted or cell.task.name in wanted]
     chosen = [cell for cell in of_tasks if not methods or cell.method.name in methods]
     # A user's own task that nothing applies to is an error, not a silent gap.

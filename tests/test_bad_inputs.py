@@ -11,10 +11,12 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.run import run_suite
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.tasks.families import read_family
+from coartic.tasks.task import TASK_FOLDER
 from coartic.text import did_you_mean
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN
 
+TASK_FILE = TASK_FOLDER / "1-ascending.toml"
 NO_METHOD = Path(__file__).parents[1] / "LICENSE"
 FAMILY = """
 title = "Mine"
@@ -248,6 +250,8 @@ def test_what_is_like_no_name_has_no_hint(name):
         (["animate", "0", "--width", "1.5"], "--width is 1.5; it must be a whole number from 200"),
         (["run"], "name a suite: ablations, "),
         (["run", "papr"], "did you mean 'paper'"),
+        (["run", "paper", "--family-file", TASK_FILE], "a task, not a family: give it by --tasks"),
+        (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["animate", "CMA-ES", "--in", ".", "--out", "x.gif"], "`coartic trace` names"),
         (["report", "nowhere"], "there is no folder nowhere"),
         (["reproduce", "0123456", "--in", "nowhere"], "nowhere"),

@@ -195,6 +195,7 @@ def next_goal(study: Study) -> str:
     guesses = guesses_beside(study, shared) if needed else None
     beyond = math.nan if guesses is None else shared.p_beyond(guesses)
     who = "The learner" if is_learner(shared.method) else capital(name_of(shared.method))
+    verb = "hit" if who.startswith("Guesses") else "hits"
     runs, p = counted(shared.n, "run"), p_value(shared.p)
     apart = f"{number(shared.spreads, 1)} SD"
     if math.isnan(shared.spreads):
@@ -204,7 +205,7 @@ def next_goal(study: Study) -> str:
     elif not (shared.p < LEVEL if drawn else shared.apart > 0):
         text = f"No significant difference: postures before different next goals lie {apart} apart."
     elif not needed or beyond < LEVEL:
-        text = f"Yes. {who} hits the same goal in clearly different postures ({apart} apart)."
+        text = f"Yes. {who} {verb} the same goal in clearly different postures ({apart} apart)."
     elif guesses is None:
         text = f"Undecided: postures lie {apart} apart, and no guesses with as many trials ran."
     elif math.isnan(beyond):

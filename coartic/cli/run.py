@@ -93,6 +93,7 @@ def run(
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.run import perform
     from coartic.benchmarks.suites import load_suite, select_cells, suites
+    from coartic.inputs import read_toml
     from coartic.tasks.families import own_families
 
     def named(text: str | None) -> list[str]:
@@ -103,6 +104,9 @@ def run(
     chosen = load_suite(suite)
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
     registered = registry(method_file or ())
+    for file in family_file or ():
+        if str(read_toml(file).get("goals")).startswith("[["):  # places, not how many
+            raise CoarticError(f"{file} is a task, not a family: give it by --tasks {file}")
     names = given.methods_meant(named(methods), registered)
     if beside and not names:  # the user's own alone
         names = [name for name, card in registered.items() if card.where.endswith(".py")]
@@ -179,6 +183,7 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
     """
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import name_of
+    from coartic.analysis.words import number
     from coartic.benchmarks.suites import load_suite, suites
     from coartic.inputs import read_toml
     from coartic.tasks.families import shipped_families
@@ -192,7 +197,8 @@ def describe(name: str, registered: Registry) -> Iterator[tuple[str, str]]:
         yield "", suite.description
         runs = sorted({block.runs or suite.runs for block in suite.blocks})
         counts = " or ".join(map(str, runs))
-        yield "Runs", f"{counts} of each method on each task, {suite.trials or 'no'} trials a run"
+        trials = number(suite.trials) if suite.trials else "no"
+        yield "Runs", f"{counts} of each method on each task, {trials} trials a run"
         asked = [t for block in suite.blocks for t in block.tasks]
         methods = [m for block in suite.blocks for m in block.methods]
         tasks = [t for name in asked for t in (builtin_tasks() if name == "*" else [name])]
