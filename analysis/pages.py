@@ -25,10 +25,10 @@ def write_study(
         The study's folder. Its ``README.md.jinja`` is filled in from all CSV files of the folder,
         each a table of the file's name, as :func:`fill_page` says.
     tables : dict
-        Tables by name; ``results.csv`` is made of ``{"results": ...}``. Without any, the page alone
-        is written, from the tables that are there.
+        Tables by name; ``results.csv`` is made of ``{"results": ...}``. Without any, the tables
+        that are there stay.
     draw : callable
-        Draws table ``results`` as ``figure.svg``.
+        Draws table ``results``, as it is read from its file, as ``figure.svg``.
 
     Examples
     --------
@@ -42,9 +42,8 @@ def write_study(
 
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv", float_format="%.6g")
-    if tables:
-        (folder / "figure.svg").write_bytes(picture(draw(tables["results"]), ".svg"))
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
+    (folder / "figure.svg").write_bytes(picture(draw(stored["results"]), ".svg"))
     page = fill_page(folder / "README.md.jinja", **stored)
     (folder / "README.md").write_text(page, encoding="utf-8")
 

@@ -3,8 +3,8 @@
     coartic run studies/dose/suite.toml
     python studies/dose/study.py results/dose
 
-writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder the page alone,
-from the tables that are there.
+writes results.csv, claims.csv, figure.svg and the page, README.md; without a folder figure and
+page, of the stored tables.
 """
 
 import sys

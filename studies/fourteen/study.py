@@ -10,7 +10,7 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
 With two arms the fourth goal ahead is judged by the rule for repeats in README.md.
 
 Writes results.csv, gains.csv, repeats.csv, fourth.csv, claims.csv, figure.svg and the page,
-README.md; without a folder the page alone, from the tables that are there.
+README.md; without a folder figure and page, of the stored tables.
 """
 
 import sys

@@ -4,7 +4,7 @@
     python studies/horizon/study.py results/horizon
 
 writes results.csv, signatures.csv, gains.csv, claims.csv, repeats.csv, figure.svg and the page,
-README.md; without a folder the page alone, from the tables that are there.
+README.md; without a folder figure and page, of the stored tables.
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims are
 judged by the mean over the repeats of a task, and again without the task that speaks most for them;
@@ -150,7 +150,7 @@ def draw(table):
     axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
     axes.set_ylim(bottom=-0.1)
     axes.set_ylabel("gap (%)")
-    axes.legend(title="goals of the task", loc="upper right")
+    axes.legend(title="goals of the task", loc="upper right", labelspacing=0.2)
     return figure
 
 

@@ -3,9 +3,9 @@
     coartic run studies/human/suite.toml
     python studies/human/study.py results/human
 
-writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder the page
-alone, from the tables that are there. human.toml has the findings, the models and how verdicts are
-made, measures.py what is measured. There are no claims beside the findings.
+writes results.csv, effects.csv, figure.svg and the page, README.md; without a folder figure and
+page, of the stored tables. human.toml has the findings, the models and how verdicts are made,
+measures.py what is measured. There are no claims beside the findings.
 """
 
 import sys

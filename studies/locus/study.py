@@ -3,8 +3,8 @@
     coartic run studies/locus/suite.toml
     python studies/locus/study.py results/locus
 
-writes results.csv, slopes.csv, figure.svg and the page, README.md; without a folder the page alone,
-from the tables that are there.
+writes results.csv, slopes.csv, figure.svg and the page, README.md; without a folder figure and
+page, of the stored tables.
 
 Postures at a goal are regressed on the height of its neighbour, as a locus equation of speech
 regresses a consonant's formant on the vowel that follows (Lindblom 1963; Sussman et al. 1991).

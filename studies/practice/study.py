@@ -5,8 +5,7 @@
     python studies/practice/study.py results/practice
 
 writes results.csv, repeats.csv, claims.csv, figure.svg and the page, README.md; without a folder
-the page alone, from the tables that are there. Each of the 25 agents practises for half a minute,
-once.
+figure and page, of the stored tables. Each of the 25 agents practises for half a minute, once.
 
 The suite lets the planner plan three times, with numbers of postures (``nodes``) 1 % apart. Before
 these repeats were run we expected that with all goals in view it is no longer worse than with four.
@@ -186,7 +185,7 @@ def draw(table):
     rows = rows.assign(place=rows.practice.map(counts.index)).sort_values(["h", "practice"])
     figures.means(left, rows, x="place", y="gap", by="h", scale=100, shift=0.06, bars=0.9)
     last = table[(table.practice == ALL) | (table.who == "planner")]
-    last = last.assign(place=last.h.map(views.index))
+    last = last.assign(place=last.h.astype(str).map(views.index))
     for who, color in (("agents", figures.PALETTE[0]), ("planner", figures.PALETTE[3])):
         rows = last[last.who == who]
         figures.means(right, rows, x="place", y="gap", scale=100, bars=0.9, color=color, label=who)
