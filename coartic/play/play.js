@@ -360,7 +360,7 @@ class Play {
         const hit = mover.hits.filter((at) => at < row).length;
         stage.robot(mover.problem, mover.rows[row], {
           colour: colours[mover.role], chosen: mover.trial.hands[Math.min(hit, mover.trial.hands.length - 1)],
-          alpha: mover.role === "ghost" ? 0.5 : 0.9, weight: mover.role === "ghost" ? 0.8 : 1,
+          alpha: mover.role === "ghost" ? 0.5 : 0.9, weight: { ghost: 0.8, first: this.main.length > 1 ? 1.4 : 1 }[mover.role], // the one below shows
         });
       });
     }
