@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import os
 import re
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -42,11 +43,13 @@ def files_of(method: Path) -> set[Path]:
     """The file of a method, and all others that its runs execute."""
     root = next(folder for folder in method.parents if not (folder / "__init__.py").exists())
     within = root if "site-packages" not in root.parts else root / method.relative_to(root).parts[0]
+    places = {(root, within)}
+    if within != PACKAGE.parent:  # which has the package in it
+        places.add((PACKAGE.parent, PACKAGE))
     files, waiting = set[Path](), [method, *_EVERY_RUN]
     while waiting:
         if (path := waiting.pop()) not in files:
             files.add(path)
-            places = {(root, within), (PACKAGE.parent, PACKAGE)}
             waiting += imported_files(path, places)
     return files
 
@@ -55,13 +58,11 @@ def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[
     """The files that a module imports, each from below a root, within a folder."""
     for level, module, names in syntax(path.read_bytes())[1]:
         for root, within in places:
-            base = path.parents[level - 1] if level else root
-            base = base.joinpath(*filter(None, module.split(".")))
+            base = os.path.join(path.parents[level - 1] if level else root, *module.split("."))
             for name in names:
-                place = base.joinpath(*filter(None, name.split(".")))
-                for file in (place.with_suffix(".py"), place / "__init__.py"):
-                    if file.is_file() and within in file.parents and file != _API:
-                        yield file
+                place = os.path.join(base, *name.split(".")).rstrip(os.sep)
+                found = filter(os.path.isfile, (f"{place}.py", f"{place}/__init__.py"))
+                yield from (f for f in map(Path, found) if within in f.parents and f != _API)
 
 
 @cache

@@ -62,7 +62,8 @@ def test_a_method_that_lacks_a_task_or_failed_on_it_is_not_ranked():
         frames.gaps(frame.drop(columns="best_known"))
 
 
-def test_verdicts_of_planted_means():
+def test_verdicts_of_planted_means(monkeypatch):
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
     rng = np.random.default_rng(2)
     above, below = 5 + rng.normal(size=30), -5 + rng.normal(size=30)
     claims = {

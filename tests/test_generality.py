@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from coartic import load_task
-from coartic.analysis.claims import reader
+from coartic.analysis.claims import judging, reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
@@ -23,6 +23,11 @@ FEW = (*ONE, "two-armed/v1", "long/v1")
 COUNT = 5
 BEST, ALONE = -500, -600
 NOISE = (-4, -2, 0, 2, 4)
+
+
+@pytest.fixture(autouse=True)
+def _fewer_resamples(monkeypatch):
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
 
 
 def hands_of(name, letter="R"):
