@@ -35,7 +35,7 @@ CellKey = tuple[str, str]
 """Name of a task, and label of a method: its id with its setting."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CellRuns:
     """Runs of one method with its parameters on one task."""
 
@@ -191,9 +191,11 @@ class Study:
     def cells(self) -> dict[CellKey, CellRuns]:
         """Runs by task and label (method with its setting), in the order of the plan."""
         names = ["task", "method", "setting"]
-        groups = self.runs.groupby(names, sort=False).indices if len(self.runs) else {}
+        runs = self.runs.copy(deep=False)
+        runs.attrs = {}  # which pandas copies with every column that is taken
+        groups = runs.groupby(names, sort=False).indices if len(runs) else {}
         return {
-            (key[0], cell.label): CellRuns(*key, self.runs.iloc[groups.get(key, [])])
+            (key[0], cell.label): CellRuns(*key, runs.iloc[groups.get(key, [])])
             for cell in self.plan.cells
             for key in [(cell.task.name, cell.method.name, cell.setting)]
         }

@@ -16,6 +16,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,8 @@ LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
 _AT_ONCE = 1_000_000  # values of the resamples that are in memory
+IN_CACHE = 1 << 18
+"""Values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
 """Values that differ by less than this share of their size do not differ: it is rounding."""
 
@@ -102,7 +105,12 @@ def centred(values: Array) -> Array:
 
 def mean(values: ArrayLike, *, resamples: int = RESAMPLES) -> Estimate:
     """Mean with its interval, as :func:`bootstrap_estimate` makes it."""
-    return bootstrap_estimate((vector(values),), np.mean, resamples)
+    return _mean_of(tuple(vector(values).tolist()), resamples)
+
+
+@lru_cache(maxsize=500)  # claims state the same means
+def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
+    return bootstrap_estimate((np.array(values),), np.mean, resamples)
 
 
 def difference_of_means(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coartic.analysis.statistics.estimates import (
+    IN_CACHE,
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
@@ -35,8 +36,6 @@ Alternative = Literal["greater", "less", "two-sided"]
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
 Equivalence = Literal["equivalent", "different", "undecided"]
-IN_CACHE = 1 << 18
-"""Values that are drawn at once: few enough for the processor's cache."""
 
 
 def bootstrap_test(
@@ -80,8 +79,9 @@ def bootstrap_test(
     for values, sign in zip(shifted, (1, -1), strict=False):
         for part in slices(resamples, max(1, IN_CACHE // len(values))):
             drawn = values[rng.integers(len(values), size=(part.stop - part.start, len(values)))]
-            sums[part] += sign * drawn.mean(axis=1)
-            variances[part] += drawn.var(axis=1, ddof=1) / len(values)
+            means = drawn.mean(axis=1, keepdims=True)
+            sums[part] += sign * means[:, 0]
+            variances[part] += drawn.var(axis=1, ddof=1, mean=means) / len(values)
     # What is rounding is none: resamples of equal values have no spread, means can be equal.
     sums[np.abs(sums) < NEGLIGIBLE * size] = 0.0
     variances[variances < (NEGLIGIBLE * size) ** 2] = 0.0

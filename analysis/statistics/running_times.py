@@ -13,7 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.analysis.statistics.estimates import FEWEST, SEED, TAILS, Estimate
+from coartic.analysis.statistics.estimates import (
+    FEWEST,
+    IN_CACHE,
+    SEED,
+    TAILS,
+    Estimate,
+    slices,
+)
 from coartic.robot import Array
 
 BUDGET_RESAMPLES = 1_999
@@ -56,19 +63,21 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     """
     values, weights, runs = pairs(times)
 
-    def budget(weights: Array) -> float:
-        place = np.searchsorted(np.cumsum(weights), share - 1e-9)
-        return float(values[place]) if place < len(values) else math.inf
+    def budgets(counts: NDArray[np.uint8]) -> Array:
+        reached = np.cumsum(weights * counts[:, runs], axis=1)
+        return np.append(values, math.inf)[(reached < share - 1e-9).sum(axis=1)]
 
     sizes = tuple(map(len, times))
+    value = float(budgets(np.ones((1, sum(sizes)), dtype=np.uint8))[0])
     if min(sizes) < FEWEST:
-        return Estimate(budget(weights))
-    budgets = [budget(weights * counts[runs]) for counts in draws(sizes)]
-    low, high = np.quantile(budgets, TAILS, method="inverted_cdf")
-    return Estimate(budget(weights), float(low), float(high))
+        return Estimate(value)
+    drawn, at_once = draws(sizes), 1 + IN_CACHE // (1 + len(values))
+    anew = [budgets(drawn[part]) for part in slices(len(drawn), at_once)]
+    low, high = np.quantile(np.concatenate(anew), TAILS, method="inverted_cdf")
+    return Estimate(value, float(low), float(high))
 
 
-@lru_cache(maxsize=1)  # the budgets of a method are mostly of the same runs
+@lru_cache(maxsize=4)  # methods mostly have as many runs as another
 def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """How often each run is drawn within its task, a row for each resample.
 

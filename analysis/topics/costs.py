@@ -35,7 +35,7 @@ from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Kinds of cost: columns of ``runs``; ``solve_s`` is wall time in s."""
-TARGETS = np.arange(1, 21) / 20
+TARGETS = tuple(n / 20 for n in range(1, 21))
 """Targets, as shares of the way from the initial solution to the optimum."""
 COSTS = (
     ("trials_to_quarter", "trials", 0.25),
@@ -62,7 +62,10 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
     return by_run
 
 
-def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) -> Array:
+@cached
+def times_of(
+    study: Study, cell: CellRuns, spend: str, shares: tuple[float, ...] = TARGETS
+) -> Array:
     """Cost at which each run of a cell reached each target, shape ``(runs, targets)``.
 
     Infinite where it did not. A planner reaches all of its targets at the end. Kinematics
@@ -72,20 +75,20 @@ def times_of(study: Study, cell: CellRuns, spend: str, shares: Array = TARGETS) 
     such as the time of a cold one, has no part; times are those of :func:`.scores.solve_times`.
     """
     initial, optimum = scores.initial_and_optimum(study)[cell.task]
-    targets = np.ceil(initial + shares * (optimum - initial) - 1e-9)
-    runs = cell.runs
+    targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
+    runs, learned, rows = cell.runs, improvements(study), []
+    totals = runs[spend]
     if spend == "solve_s":
-        runs = runs.assign(solve_s=scores.solve_times(cell.good).reindex(runs.index))
-    rows = []
+        totals = scores.solve_times(cell.good).reindex(runs.index)
     for run_id, status, made, total, reward in zip(
-        runs.run_id, runs.status, runs.trials, runs[spend], runs.reward, strict=True
+        runs.run_id, runs.status, runs.trials, totals, runs.reward, strict=True
     ):
         if status != "ok":
             rows.append(np.full(len(targets), math.inf))
         elif not pd.isna(total):
             spent, rewards = np.array([float(total)]), np.array([float(reward)])
-            if str(run_id) in improvements(study):
-                trials, rewards = improvements(study)[str(run_id)]
+            if str(run_id) in learned:
+                trials, rewards = learned[str(run_id)]
                 spent = trials if spend == "trials" else total * (trials / made)
             rows.append(np.append(spent, math.inf)[np.searchsorted(rewards, targets)])
     return np.array(rows).reshape(-1, len(targets))
@@ -145,7 +148,7 @@ def runtimes(
     rows = []
     for name, cells in cells_compared(study).items():
         for spend in SPENDS:
-            times = [times_of(study, cell, spend, shares) for cell in cells]
+            times = [times_of(study, cell, spend, tuple(shares.tolist())) for cell in cells]
             if all(map(len, times)):
                 budgets, reached = map(np.ndarray.tolist, running_times.share_by_budget(times))
                 steps = zip(budgets or [np.inf], reached or [0.0], strict=True)
@@ -172,7 +175,7 @@ def list_runtimes(study: Study) -> Rows:
         if scores.groups(study)[method] == scores.BY_TRIAL:
             of_method = scores.compared(study)[method]
             for task in (task for task in scores.initial_and_optimum(study) if task in of_method):
-                half = times_of(study, of_method[task], "trials", np.array([0.5]))
+                half = times_of(study, of_method[task], "trials", (0.5,))
                 row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
         yield method, row | runs_of(*cells)
 

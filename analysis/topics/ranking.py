@@ -172,19 +172,26 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))
 
 
+@cached
+def gaps_of_runs(study: Study) -> dict[tuple[str, str], Array]:
+    """Gap of every run of each compared method on each task, shape ``(n,)``."""
+    frame = scores.scores(study)
+    gaps = frame.assign(gap=frames.gaps(frame)).groupby(["method", "task"]).gap
+    return {key: values.to_numpy() for key, values in gaps}
+
+
 def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
     """Mean gap of one method less that of another, both of :func:`main_gaps`.
 
     Its interval is for other runs of both on the same tasks, as those of the ranking; what a method
     that draws nothing does is exact.
     """
-    frame, exact = scores.scores(study), 0.0
-    gaps = frame.assign(gap=frames.gaps(frame)).groupby(["method", "task"]).gap
+    gaps, exact = gaps_of_runs(study), 0.0
     tasks = scores.common_tasks(study)
     signs, drawn = [], []
     for sign, method in ((1, first), (-1, second)):
         for task in tasks:
-            values = gaps.get_group((method, task)).to_numpy()
+            values = gaps[method, task]
             if study.plan.methods[scores.compared(study)[method][task].method].stochastic:
                 signs.append(sign)
                 drawn.append(values)

@@ -143,7 +143,7 @@ def scores(study: Study) -> pd.DataFrame:
     """
     columns = ["method", "task", "run", "seed", "reward", "best_known"]
     parts = [
-        cell.runs.assign(
+        cell.runs[["run", "seed"]].assign(
             method=method,
             task=task,
             reward=cell.runs.reward.where(cell.runs.status == "ok").astype(float),
@@ -171,9 +171,10 @@ def groups(study: Study) -> dict[str, str]:
     """
     of_label = {}
     for label in dict.fromkeys(label for _, label in study.cells):
-        runs = pd.concat([cell.runs for key, cell in study.cells.items() if key[1] == label])
-        told = ", ".join(runs.told.unique()).split(", ")
-        learns = Information.REWARD_BY_TRIAL.value in told and (runs.trials > 1).any()
+        parts = [cell.runs for (_, name), cell in study.cells.items() if name == label]
+        told = ", ".join(each for runs in parts for each in runs.told.unique()).split(", ")
+        several = any((runs.trials > 1).any() for runs in parts)
+        learns = Information.REWARD_BY_TRIAL.value in told and several
         by_formula = Information.REWARD_FORMULA.value in told
         of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
     together = {name: EC1 for name in labels_by_task(study) if name not in of_label}
