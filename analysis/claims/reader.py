@@ -95,7 +95,7 @@ class Reader:
             )
         runs = cell.good
         if label.startswith((LEARNER, *ALL_GUESSES)):
-            trials = sorted(set(cell.runs.trials))
+            trials = sorted(cell.runs.trials.unique())
             if trials != [TRIALS]:
                 raise MissingError(
                     f"the paper's runs have {TRIALS} trials; those of {label} on {task} have "

@@ -1,6 +1,6 @@
 """The figure to play with, of `coartic play`, with the runs of a folder.
 
-It begins with the stored runs, whose movements it executes again. When a goal is moved, the learner
+It begins with the stored runs, as their movements are stored. When a goal is moved, the learner
 or another method answers anew.
 """
 
@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
-from coartic.analysis.study import CellKey, Study, one_by_one, typical_run
+from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, typical_run
 from coartic.analysis.topics.coarticulation import shared_goal
 from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
@@ -76,13 +76,13 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 def film_of(study: Study, key: CellKey) -> dict[str, Any]:
     """The run of a cell nearest the median reward, as ``model.js`` executes it; empty where a cell
     has no solution, or one that follows a path."""
-    solutions = study.executed(*key) if key in study.cells else None
-    if not solutions or not solutions.runs:
+    if key not in study.cells or not len(study.cells[key].good):
         return {}
-    if any(movement.kind == "path" for run in solutions.runs for movement in run.movements):
+    cell = replace(study.cells[key], runs=study.cells[key].good[:MOST_EXECUTED])
+    run = str(cell.runs.run_id.iloc[typical_run(cell)])
+    stored = study._movements("solution")
+    if any(movement.kind == "path" for each in cell.runs.run_id for movement in stored[each]):
         return {}
-    good = study.cells[key].good[: len(solutions.runs)]
-    k = typical_run(replace(study.cells[key], runs=good))
     movements = [
         {
             "goal": movement.goal - 1,
@@ -90,6 +90,7 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
             "kind": movement.kind,
             "target": None if movement.target is None else movement.target.tolist(),
         }
-        for movement in solutions.runs[k].movements
+        for movement in stored[run]
     ]
-    return {"run": solutions.run_ids[k], "ticks": solutions.runs[k].ticks, "movements": movements}
+    ticks = sum(movement.ticks or 0 for movement in stored[run])
+    return {"run": run, "ticks": ticks, "movements": movements}

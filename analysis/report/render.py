@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatch
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import name_of
@@ -111,8 +112,13 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
         known = frame.attrs.get("methods", {}) if column.method else {}
         return [known.get(value) or word(value, column) for value in frame[name]]
     columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
-    numbers = frame.reindex(columns=columns).apply(pd.to_numeric).astype("Float64")
-    scaled = (100.0 if column.percent else 1.0) * numbers.to_numpy(float, na_value=math.nan)
+    parts = [
+        pd.to_numeric(frame[each]).to_numpy(float, na_value=math.nan)
+        if each in frame
+        else np.full(len(frame), math.nan)
+        for each in columns
+    ]
+    scaled = (100.0 if column.percent else 1.0) * np.column_stack(parts)
     texts = []
     for value, low, high, sd in scaled.tolist():
         spread = "" if math.isnan(sd) else f" ± {number(sd, column.digits)}"

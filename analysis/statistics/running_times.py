@@ -65,7 +65,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
     def budgets(counts: NDArray[np.uint8]) -> Array:
         reached = np.cumsum(weights * counts[:, runs], axis=1)
-        return np.append(values, math.inf)[(reached < share - 1e-9).sum(axis=1)]
+        return np.asarray(np.append(values, math.inf)[(reached < share - 1e-9).sum(axis=1)])
 
     sizes = tuple(map(len, times))
     value = float(budgets(np.ones((1, sum(sizes)), dtype=np.uint8))[0])

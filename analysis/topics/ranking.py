@@ -173,8 +173,8 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
 
 
 @cached
-def gaps_of_runs(study: Study) -> dict[tuple[str, str], Array]:
-    """Gap of every run of each compared method on each task, shape ``(n,)``."""
+def gaps_of_runs(study: Study) -> dict[Any, Array]:
+    """Gaps of the runs, shape ``(n,)``, by compared method and task."""
     frame = scores.scores(study)
     gaps = frame.assign(gap=frames.gaps(frame)).groupby(["method", "task"]).gap
     return {key: values.to_numpy() for key, values in gaps}

@@ -222,7 +222,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     ``runs`` have a solution. Their whole time stands for methods that mark no solving.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
-    warm = runs.warm.fillna(False).astype(bool)
+    warm = runs.warm.to_numpy(bool, na_value=False)
     return times[warm] if warm.any() else times
 
 
