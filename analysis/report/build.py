@@ -64,6 +64,7 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
         for name, plot in plots(study).items():
             for ending in (".svg", ".pdf"):
                 files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
+                plot.figure.set_layout_engine("none")  # the next is laid out alike
     publish(folder, files)
     return list(files)
 
