@@ -58,10 +58,16 @@ def settled(page):
     return page
 
 
-def again(page):
-    """Load the page anew: its address has all that it shows."""
+STATE = """() => [...document.querySelectorAll('.play :is(select, input, .beside, .handle)')]
+    .map(each => [each.value, each.checked, each.innerText, each.ariaLabel])"""
+
+
+def comes_back(page):
+    """Loaded anew it is what it was: its address has all that it shows."""
+    link, shown = page.url, settled(page).evaluate(STATE)
     page.reload()
-    return settled(page)
+    assert settled(page).evaluate(STATE) == shown
+    assert page.url == link
 
 
 def changed_to(page, address, state):
@@ -86,30 +92,18 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
-def distance_in_spreads(trials, seeds=5):
-    """Between the postures at the goal that ascending and descending share."""
-    return context_dependence(
-        *(
-            np.array(
-                [
-                    learn(task, "EC1", seed=seed, trials=trials).execute().configurations[0]
-                    for seed in range(seeds)
-                ]
-            )
-            for task in pages.UP_OR_DOWN
-        )
-    )
-
-
 def test_coarticulation_appears_with_practice(visited, tmp_path):
     file = tmp_path / "play.html"
     file.write_text(pages.play_page(), encoding="utf-8")
     page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
     trials = trials_made(page)
     assert trials == 10_000  # on every machine
-    for role, task in (("Blue", "ascending"), ("Orange", "descending")):
-        assert ticks(page, role) == -learn(task, "EC1", seed=0, trials=trials).reward
-    spreads = distance_in_spreads(trials)
+    postures = []  # at the goal that they share
+    for role, task in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
+        runs = [learn(task, "EC1", seed=seed, trials=trials) for seed in range(5)]
+        assert ticks(page, role) == -runs[0].reward
+        postures.append(np.array([run.execute().configurations[0] for run in runs]))
+    spreads = context_dependence(*postures)
     assert spreads > 2
     assert f"postures lie {spreads:.1f} standard deviations apart" in text(page, "finding")
     assert "(5 runs each)" in text(page, "meaning")
@@ -161,9 +155,7 @@ def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_
     shifts = re.findall(r"by (\d[.\d]*\b)", text(page, "finding"))
     assert shifts[0] == "0"
     assert float(shifts[1]) > 0.1
-    # A link to it has both robots and the same numbers.
-    said = text(page, "score"), text(page, "finding")
-    assert (text(again(page), "score"), text(page, "finding")) == said
+    comes_back(page)
     page.get_by_role("radio", name="each movement").check()  # and it learns anew
     assert "One goal at a time" in text(settled(page), "score")
 
@@ -193,8 +185,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     done = execute("two-armed-1", movements)
     assert done.hands.startswith("RL")
     assert ticks(page, "You") == done.ticks
-    said = text(page, "score")
-    assert text(again(page), "score") == said
+    comes_back(page)
 
 
 def test_the_link_holds_the_whole_state(opened, address):
@@ -210,11 +201,7 @@ def test_the_link_holds_the_whole_state(opened, address):
     page.get_by_role("slider", name="Practice").fill("400")
     page.get_by_role("slider", name="Tick").fill("123")
     assert f"trials={trials_made(settled(page))}&" in page.url
-    state = """() => [...document.querySelectorAll('.play :is(select, input, .score, .handle)')]
-        .map(each => [each.value, each.checked, each.innerText, each.ariaLabel])"""
-    link, shown = page.url, page.evaluate(state)
-    assert again(page).evaluate(state) == shown
-    assert page.url == link
+    comes_back(page)
     assert trials_made(changed_to(page, address, "trials=900")) == 900
     # What no state is is left out, and goals far out lie nearer.
     changed_to(page, address, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
@@ -232,8 +219,7 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     assert "blue robot, a posture for each goal. Orange: the planner." in text(page, "lead")
     page.get_by_role("button", name="elbow 2").focus()
     page.keyboard.press("ArrowDown")
-    said = text(settled(page), "score")
-    assert text(again(page), "score") == said
+    comes_back(page)
     page.get_by_role("radio", name="planner").check()
     assert ticks(settled(page), "Orange") == second
     page.get_by_role("button", name="Reset").click()
@@ -303,9 +289,7 @@ def test_it_practises_plays_and_saves_pictures(opened):
 
 def test_a_goal_is_dragged_by_a_finger(opened):
     page = settled(opened(width=390, has_touch=True, is_mobile=True))
-    goal = page.get_by_role("button", name="Goal 3 of blue")
-    assert goal.evaluate("each => getComputedStyle(each).touchAction") == "none"  # no scrolling
-    box = goal.bounding_box()
+    box = page.get_by_role("button", name="Goal 3 of blue").bounding_box()
     x, y = box["x"] + 22, box["y"] + 22
     finger = page.context.new_cdp_session(page)
     for kind, height in (("touchStart", y), *(("touchMove", y - by) for by in range(5, 60, 5))):
@@ -314,6 +298,7 @@ def test_a_goal_is_dragged_by_a_finger(opened):
     finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     page.wait_for_url("**goals=*")
     assert float(re.search(r"goals=6,0.1;6,2;[^,]+,([^&]+)", page.url)[1]) > 5
+    assert page.evaluate("scrollY") == 0  # the page did not scroll instead
 
 
 @pytest.mark.parametrize(

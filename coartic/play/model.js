@@ -27,7 +27,7 @@ function problem_of(task, model = PAPER) {
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
   const locked = task.locked_base || [];
   return {
-    task, robot, start, model, dof: start.length,
+    task, robot, start, model,
     goals: task.goals, radius: task.radius === undefined ? 0.1 : task.radius,
     hands: (task.hands || HANDS).map((hand) => HANDS.indexOf(hand)).sort(),
     arms: [
@@ -36,6 +36,11 @@ function problem_of(task, model = PAPER) {
     ],
     free: [!locked.includes("x"), !locked.includes("y")],
   };
+}
+
+/* Of each coordinate whether it moves with some hands: base and their arms. */
+function movable({ start, free, arms }, hands) {
+  return start.map((_, j) => (j < BASE_DOF ? free[j] : hands.includes(j < arms[RIGHT].first ? LEFT : RIGHT)));
 }
 
 /* ---- Kinematics ---- */
@@ -440,7 +445,7 @@ class Generator {
 
 /* coartic/learner/conditions.py */
 const condition = (hands, modify_other, hand_exploration) => ({
-  hands, modify_chosen: true, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, credit: "overall",
+  hands, modify_other, hand_exploration, epsilon: 0.2, noise_sd: 0.05, credit: "overall",
 });
 const CONDITIONS = {
   EC1: condition([RIGHT], false, "none"),
@@ -459,17 +464,7 @@ class Learner {
     this.best = null;
     this.values = problem.goals.map(() => [LEFT, RIGHT, NO_HAND].map(() => [-Infinity, -Infinity]));
     this.targets = problem.goals.map(() => [LEFT, RIGHT, NO_HAND].map(() => [null, null]));
-    this.explored = [LEFT, RIGHT].map((chosen) => {
-      const joints = new Array(problem.dof).fill(false);
-      const fill = (hand, whether) => {
-        const arm = problem.arms[hand];
-        joints.fill(whether, arm.first, arm.first + arm.links.length);
-      };
-      problem.free.forEach((free, axis) => { joints[axis] = rules.modify_chosen && free; });
-      fill(chosen, rules.modify_chosen);
-      fill(1 - chosen, rules.modify_other);
-      return joints;
-    });
+    this.explored = [LEFT, RIGHT].map((chosen) => movable(problem, rules.modify_other ? [LEFT, RIGHT] : [chosen]));
   }
 
   random_hand() {
@@ -477,16 +472,9 @@ class Learner {
   }
 
   closest_hand(q, number) {
-    const [first, ...others] = this.rules.hands;
-    let nearest = first;
-    let nearest_distance = distance_to_goal(this.problem, q, number, first);
-    let tie = false;
-    others.forEach((hand) => {
-      const distance = distance_to_goal(this.problem, q, number, hand);
-      tie = Math.abs(distance - nearest_distance) <= EQUALLY_NEAR;
-      if (distance < nearest_distance) [nearest, nearest_distance] = [hand, distance];
-    });
-    return tie ? this.random_hand() : nearest;
+    const [left, right] = HANDS.map((_, hand) => distance_to_goal(this.problem, q, number, hand));
+    if (Math.abs(left - right) <= EQUALLY_NEAR) return this.random_hand();
+    return left < right ? LEFT : RIGHT;
   }
 
   greedy_hand(number, previous) {
@@ -506,17 +494,12 @@ class Learner {
   set_target(q, number, previous, hand, explore) {
     const stored = this.targets[number][previous][hand];
     if (!stored) return null;
-    const { rng } = this;
-    const target = stored.slice();
-    const { noise_sd, modify_other } = this.rules;
+    const { rng, rules: { noise_sd } } = this;
     const explored = this.explored[hand];
-    const other = this.problem.arms[1 - hand];
-    for (let j = 0; j < target.length; j += 1) {
-      const follows = !modify_other && j >= other.first && j < other.first + other.links.length;
-      if (follows) target[j] = q[j];
-      if (explore && explored[j]) target[j] += noise_sd * rng.standard_normal();
-    }
-    return target;
+    return stored.map((value, j) => {
+      if (!explored[j]) return q[j];
+      return explore ? value + noise_sd * rng.standard_normal() : value;
+    });
   }
 
   make_trial(explore) {
@@ -576,15 +559,7 @@ class Learner {
 
 /* coartic/optimisers.py: entries [goal, joint] that are worth exploring with a hand sequence. */
 function explored_joints(problem, hands) {
-  const entries = [];
-  hands.forEach((_, goal) => {
-    const useful = hands.slice(goal);
-    for (let j = 0; j < problem.dof; j += 1) {
-      const hand = j < problem.arms[RIGHT].first ? LEFT : RIGHT;
-      if (j < BASE_DOF ? problem.free[j] : useful.includes(hand)) entries.push([goal, j]);
-    }
-  });
-  return entries;
+  return hands.flatMap((_, goal) => movable(problem, hands.slice(goal)).flatMap((moves, j) => (moves ? [[goal, j]] : [])));
 }
 
 /* CMA-ES (Hansen 2016) with a Cholesky factor in place of the matrix's root (Krause, Arbonès & Igel 2016). */
@@ -773,8 +748,7 @@ const apart = (a, b) => Math.sqrt(a.reduce((square, value, j) => square + (value
 /* The shortest joint-space path from `q` through goals `from` to `to` (excluded) with given hands, from
    guessed postures: a taut string whose corners slide on the discs. Null where it finds none. */
 function pulled_taut(problem, q, from, hands, guess, rounds) {
-  const joints = Array.from({ length: problem.dof }, (_, j) => j).filter((j) => (j < BASE_DOF
-    ? problem.free[j] : problem.hands.includes(j < problem.arms[RIGHT].first ? LEFT : RIGHT)));
+  const joints = movable(problem, problem.hands).flatMap((moves, j) => (moves ? [j] : []));
   const radius = problem.radius * (1 - 1e-3);
   const corners = guess.map((corner) => corner.slice());
   const strides = corners.map(() => 1);

@@ -46,12 +46,14 @@ def figure(presets: Sequence[dict[str, Any]], *, still: str = "", **more: Any) -
     what is chosen at first; ``cells`` of the table ``ranking`` that show films: row, column and
     what to choose.
     """
+    content = {"presets": presets, "version": coartic.__version__, **more}
+    data = json.dumps(content, allow_nan=False, separators=(",", ":"))
     return (
         templates()
         .get_template("figure.html.jinja")
         .render(
             still=still or text_of("still.svg"),
-            data=as_json({"presets": presets, "version": coartic.__version__, **more}),
+            data=data.replace("<", "\\u003c"),
             model="\n".join(map(text_of, ("model.js", "worker.js"))),
             script="\n".join(map(text_of, ("picture.js", "play.js", "begin.js"))),
         )
@@ -75,12 +77,6 @@ def up_or_down() -> dict[str, Any]:
 def text_of(name: str) -> str:
     """A file beside this one, as a part of a page."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
-
-
-def as_json(data: Any) -> str:
-    """Data within a page."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
 
 
 @cache

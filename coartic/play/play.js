@@ -674,9 +674,9 @@ class Play {
 
   /* Of each goal the hand and the joints; at first only the hand. */
   get own() {
-    const [{ goals, hands, dof }] = this.problems;
+    const [{ goals, hands, start }] = this.problems;
     const { own } = this.state;
-    const fits = own && own.length === goals.length && own.every((row) => row.length === 1 || row.length === dof + 1);
+    const fits = own && own.length === goals.length && own.every((row) => row.length === 1 || row.length === start.length + 1);
     return fits ? own.map(([hand, ...q]) => [hands.includes(hand) ? hand : hands[0], ...q]) : goals.map((_, goal) => [this.alone[0].hands[goal] ?? hands[0]]);
   }
 
@@ -794,8 +794,6 @@ class Play {
     on("tick", "change", () => this.keep());
     on("png", "click", () => this.save());
     on("link", "click", () => this.copyLink());
-    // A finger that drags a goal does not scroll the page.
-    this.find("handles").addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   }
 
   /* A place for one more goal of a list: the one that is wished for, or a stride from the last in some direction; in
