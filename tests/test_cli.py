@@ -280,7 +280,10 @@ def test_play(coartic, tmp_path, monkeypatch):
     shown = []
     monkeypatch.setattr("webbrowser.open", lambda address: not shown.append(address))
     page = tmp_path / "page.html"
-    assert coartic("play", "descending", "--out", page)[:2] == (0, f"{page}: {kb(page)} kB.\n")
+    assert coartic("play", "descending", "--out", page)[:2] == (
+        0,
+        f"{page}: {len(page.read_bytes()) // 1000} kB.\n",
+    )
     assert shown == [page.as_uri()]
     assert "--replace" in coartic("play", "--out", page)[2]
     assert "did you mean 'ascending'" in coartic("play", "ascendin")[2]
@@ -288,10 +291,6 @@ def test_play(coartic, tmp_path, monkeypatch):
     assert "open it in a browser" in coartic("play", "--no-open")[1]
     assert len(shown) == 1
     assert len([*tmp_path.iterdir()]) == 2
-
-
-def kb(file):
-    return len(file.read_bytes()) // 1000
 
 
 @pytest.mark.process

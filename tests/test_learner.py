@@ -1,7 +1,6 @@
 """The learner against the paper's loop, the published results, and its own laws."""
 
 import doctest
-import functools
 import itertools
 import math
 from dataclasses import replace
@@ -191,12 +190,6 @@ def test_the_example_of_the_learner():
     assert doctest.testmod(learning).failed == 0
 
 
-@functools.cache
-def learnt(name, condition):
-    """Runs of the paper's length; one of those that take longest."""
-    return learn_many(load_task(name), condition, seeds=range(2 if condition == "EC1" else 1))
-
-
 @pytest.mark.parametrize(
     ("name", "condition", "low", "high", "hands"),
     [
@@ -211,7 +204,8 @@ def learnt(name, condition):
     ],
 )
 def test_learned_rewards_of_the_paper(name, condition, low, high, hands):
-    runs = learnt(name, condition)
+    """In runs of the paper's length; one of those that take longest."""
+    runs = learn_many(name, condition, seeds=range(2 if condition == "EC1" else 1))
     assert low < np.mean([run.reward for run in runs]) < high
     assert {run.hands for run in runs} <= hands
     for run in runs:

@@ -2,9 +2,7 @@
 
 import re
 import runpy
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,8 +100,6 @@ def test_the_objective_ends_with_the_trials(budget, trials, before):
 
 
 EXAMPLES = DOCS / "examples"
-
-
 PROGRAMS = {"ioh_logger", "choose_hands"}
 METHODS = [path for path in sorted(EXAMPLES.glob("*.py")) if path.stem not in PROGRAMS]
 
@@ -125,29 +121,8 @@ def test_the_examples_are_methods(path, in_this_process):
     assert reward == max(session.rewards)
 
 
-class FewLines:
-    """Stands in for pycma: normal steps around the mean of the best quarter."""
-
-    popsize = 16
-
-    def __init__(self, x0, sigma, options):
-        self.mean, self.sigma, self.rng = x0, sigma, np.random.default_rng(options["seed"])
-
-    def ask(self):
-        return self.mean + self.sigma * self.rng.standard_normal((self.popsize, len(self.mean)))
-
-    def tell(self, points, costs):
-        self.mean = points[np.argsort(costs)[:4]].mean(axis=0)
-        self.sigma *= 0.98
-
-
-@pytest.mark.parametrize(("library", "gap"), [("numpy", 0.05), ("cma", 0.03)])
-def test_hands_are_chosen_by_the_program_of_the_page(library, gap, monkeypatch, capsys):
+def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
     """It ends near the optimum, from which given hands stay 14 % away."""
-    pytest.importorskip(library)
-    if library == "numpy":
-        stand_in = SimpleNamespace(CMAEvolutionStrategy=FewLines)
-        monkeypatch.setitem(sys.modules, "cma", stand_in)
     costs, objective = [], coartic.objective
     monkeypatch.setattr(coartic, "objective", lambda *a: costs.append(objective(*a)) or costs[-1])
     runpy.run_path(str(EXAMPLES / "choose_hands.py"), run_name="__main__")
@@ -155,7 +130,7 @@ def test_hands_are_chosen_by_the_program_of_the_page(library, gap, monkeypatch, 
     assert len(costs) == 16
     assert sum(cost.evaluations + 1 for cost in costs) <= 10_000
     found = min(cost.best_cost for cost in costs)
-    assert float(ticks) == found <= (1 + gap) * costs[0].best_known
+    assert float(ticks) == found <= 1.03 * costs[0].best_known
     assert objective("two-armed-2").hands != hands
 
 

@@ -7,15 +7,10 @@ import pytest
 from coartic.motion.compiled import entry, joint_lever
 from coartic.motion.trigonometry import joint_chain
 from coartic.robot import HANDS, Robot
-from tests.support import strategies
 from tests.support.strategies import UNEVEN
 
 PAPER_ROBOT = Robot()
 ROBOTS = [PAPER_ROBOT, UNEVEN]
-
-
-def configurations(robot, low=-10.0, high=10.0):
-    return strategies.configurations(robot, low, high)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

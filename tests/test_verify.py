@@ -157,6 +157,26 @@ EDITS = {  # what is said: of which run, and what was edited
         """UPDATE settings SET definition = json_set(definition,
         '$.title', hex(zeroblob(60000))) WHERE task = 'tiny'""",
     ),
+    # Of no run: the tables and views through which others read the runs.
+    "Row 1 of table cells: it has another task": (
+        None,
+        "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'",
+    ),
+    "Row 4 of table cells: its parameters are not": (
+        None,
+        "UPDATE cells SET variant = '' WHERE position = 4",
+    ),
+    "Row 5 of table cells: it has other param": (
+        None,
+        "UPDATE cells SET setting = 4 WHERE setting = 6",
+    ),
+    "Two rows of table cells show": (
+        None,
+        "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
+    ),
+    "Row 0 of table cells: its method has other code": (None, "UPDATE methods SET code = 'newer'"),
+    "Tables or views are not": (None, "ALTER TABLE learning ADD COLUMN base_x REAL"),
+    "ables or views are not": (None, "DROP VIEW paths"),
 }
 
 
@@ -164,42 +184,9 @@ EDITS = {  # what is said: of which run, and what was edited
 def test_an_edit_is_found(true_folder, tmp_path, words):
     run, statement = EDITS[words]
     with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
-        (run_id,) = db.execute("SELECT run_id FROM results WHERE run = ?", [run]).fetchone()
+        (run_id,) = db.execute("SELECT max(run_id) FROM results WHERE run = ?", [run]).fetchone()
     wrong = checker.check_runs(edited(true_folder, tmp_path, statement)).wrong
-    assert any(run_id in sentence and words in sentence for sentence in wrong), wrong
-
-
-@pytest.mark.parametrize(
-    ("words", "statement"),
-    [
-        (
-            "Row 1 of table cells: it has another task",
-            "UPDATE tasks SET definition = '{}' WHERE name = 'tiny'",
-        ),
-        (
-            "Row 4 of table cells: its parameters are not",
-            "UPDATE cells SET variant = '' WHERE position = 4",
-        ),
-        (
-            "Row 5 of table cells: it has other param",
-            "UPDATE cells SET setting = 4 WHERE setting = 6",
-        ),
-        (
-            "Two rows of table cells show",
-            "INSERT INTO cells SELECT 99, setting, variant, parameters, 1 FROM cells LIMIT 1",
-        ),
-        ("Row 0 of table cells: its method has other code", "UPDATE methods SET code = 'newer'"),
-        ("Tables or views are not", "ALTER TABLE learning ADD COLUMN base_x REAL"),
-        ("Tables or views are not", "DROP VIEW paths"),
-    ],
-)
-def test_what_is_shown_is_what_was_run(true_folder, tmp_path, words, statement):
-    """The tables and views through which others read the runs are checked as well."""
-    folder = shutil.copytree(true_folder, tmp_path / "edited")
-    with closing(sqlite3.connect(folder / RUNS_FILE)) as db:
-        db.execute(statement)
-        db.commit()
-    assert any(words in sentence for sentence in checker.check_runs(folder).wrong)
+    assert any((run_id or "") in sentence and words in sentence for sentence in wrong), wrong
 
 
 def test_a_movement_of_endless_steps_is_made_as_far_as_its_ticks():

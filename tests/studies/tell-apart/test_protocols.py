@@ -9,6 +9,7 @@ import pytest
 
 from coartic import Movement, learn, load_task
 from coartic.analysis import figures
+from tests.support.reference import correct, execute
 
 FOLDER = Path(__file__).parents[3] / "studies" / "tell-apart"
 
@@ -53,59 +54,13 @@ def test_learner_that_is_logged_is_the_papers(protocols):
     assert np.array_equal(best, run.execute().configurations)
 
 
-# ---- The same by other code: complex numbers, one step after the other ----
-
-
-def hand_at(task, q, hand):
-    shoulder = task.robot.left_shoulder if hand == "left" else task.robot.right_shoulder
-    links = task.robot.left_links if hand == "left" else task.robot.right_links
-    turns = np.exp(1j * np.cumsum(q[task.robot.joints(hand)]))
-    joints = complex(*q[:2]) + complex(*shoulder) + np.cumsum(np.append(0, links * turns))
-    return joints[-1], joints[:-1]
-
-
-def off(task, q, hand, goal):
-    return complex(*task.goals[goal]) - hand_at(task, q, hand)[0]
-
-
 def corrected(task, q, hand, goal):
-    q = q.copy()
-    while abs(error := off(task, q, hand, goal)) > 0.01:
-        tip, joints = hand_at(task, q, hand)
-        turn = 1j * (tip - joints)
-        q[task.robot.joints(hand)] += 0.05 * (turn.real * error.real + turn.imag * error.imag)
-        moves = [0.0 if axis in task.locked_base else 1.0 for axis in "xy"]
-        q[:2] += 0.05 * np.multiply(moves, [error.real, error.imag])
-    return q
-
-
-def moved(task, q, target, hand, goal, arrives):
-    distance, end = np.linalg.norm(target - q), hand_at(task, target, hand)[0]
-    for k in range(int(np.ceil(distance / 0.01)) + 1):
-        here = target if 0.01 * k >= distance else q + 0.01 * k / distance * (target - q)
-        hit = abs(off(task, here, hand, goal)) <= task.radius
-        if hit or (arrives and abs(end - hand_at(task, here, hand)[0]) <= 0.01):
-            break
-    return here, hit
-
-
-def postures(task, movements):
-    q, reached = task.q0, []
-    for goal in range(len(task.goals)):
-        due = [movement for movement in movements if movement.goal == goal + 1]
-        hand, hit = due[0].hand, abs(off(task, q, due[0].hand, goal)) <= task.radius
-        for n, movement in enumerate(due):
-            learned = movement.kind != "corrective"
-            if not hit or (learned and n == 0):
-                q, hit = moved(task, q, movement.target, hand, goal, learned)
-        if not hit:
-            q, hit = moved(task, q, corrected(task, q, hand, goal), hand, goal, False)
-        reached.append(q)
-    return np.array(reached)
+    return correct(task.robot, q, hand, task.goals[goal], locked_base=task.locked_base).q
 
 
 @pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
 def test_share_at_once_by_other_code(protocols, monkeypatch, name):
+    """By the step-by-step reference, one movement after the other."""
     monkeypatch.setattr(protocols, "AFTER", [1, 300])
     monkeypatch.setattr(protocols, "EVOLVED", 2)
     monkeypatch.setattr(protocols, "PLANNERS", {})
@@ -116,7 +71,7 @@ def test_share_at_once_by_other_code(protocols, monkeypatch, name):
     for n, (g, _, after) in enumerate(cases):
         run = learn(after, practised.condition, seed=1, trials=300, start=practised.solution)
         before, first, end = (
-            postures(*each)[g]
+            execute(*each).hits[g]
             for each in ((task, practised.solution), (after, practised.solution),
                          (after, run.solution))
         )  # fmt: skip
@@ -131,6 +86,6 @@ def test_share_at_once_by_other_code(protocols, monkeypatch, name):
                                                                  if m.goal > g + 1]  # fmt: skip
         told = [*parts[0], Movement(g + 1, hand, "learned", before + way), *parts[1]]
         run = learn(after, practised.condition, seed=1, trials=300, start=told)
-        first, end = (postures(after, movements)[g] for movements in (told, run.solution))
+        first, end = (execute(after, movements).hits[g] for movements in (told, run.solution))
         row = [row for row in rows if row["model"] == "learner, told"][n]
         assert (first - before) @ (end - before) == pytest.approx(row["dot_1"], abs=1e-6)
