@@ -63,12 +63,12 @@ addresses = st.builds(
 )
 
 
-def test_the_family_of_the_guide_is_one(tmp_path):
-    guide = (ROOT / "docs" / "howto" / "task.md").read_text(encoding="utf-8")
-    path = tmp_path / "six-links.v1.toml"
-    path.write_text(guide.partition("# six-links.v1.toml\n")[2].partition("```")[0])
-    family = read_family(path)
-    assert (family.name, family.links, family.base) == ("six-links/v1", (6, 6), ("rail",))
+def test_the_family_of_the_page_is_one(tmp_path):
+    page = (ROOT / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
+    path = tmp_path / "mine.v1.toml"
+    path.write_text(page.partition("## Family")[2].split("```")[1].removeprefix("toml"))
+    task = instance_of(read_family(path), address_of("mine/v1/i000"))
+    assert 3 <= len(task.goals) <= 5
 
 
 @pytest.mark.parametrize("name", RELEASED)
