@@ -203,6 +203,8 @@ def test_the_link_holds_the_whole_state(opened, address):
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
     assert trials_made(changed_to(page, address, "trials=900")) == 900
+    run = learn("two-armed-1", "EC3", seed=0, trials=TRIALS)
+    assert ticks(changed_to(page, address, "preset=3&explores=EC3"), "The learner") == -run.reward
     # What no state is is left out, and goals far out lie nearer.
     changed_to(page, address, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
     assert ticks(page, "Blue") > 0

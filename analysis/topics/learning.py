@@ -32,7 +32,7 @@ CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
 @table("task, method, runs, initial, after_100, after_1000, after_10000, half_gain[]")
 def list_learning(study: Study) -> Rows:
     """Best reward after so many trials (mean over runs), and the trial at which half of what a run
-    gains on the initial solution is there (median and middle half of the runs; ∞ without gain)."""
+    gains on the initial solution is there (median and quartiles of the runs; ∞ without gain)."""
     for (task, label), cell in study.cells.items():
         learned = [improvements(study).get(str(run_id)) for run_id in cell.runs.run_id]
         runs = [run for run in learned if run is not None]
@@ -64,7 +64,7 @@ def list_learning(study: Study) -> Rows:
 
 @figure(
     "Learning curves",
-    "Thick: best reward so far (mean over runs; band: middle half of the runs). Thin: reward of "
+    "Thick: best reward so far (mean over runs; band: their quartiles). Thin: reward of "
     f"the trials themselves (mean over runs and the last {WINDOW} trials; failed trials "
     "are left out). Dash-dotted: initial solution. Dotted: optimum, or best known reward. Trials "
     "far below the initial solution are cut off.",
