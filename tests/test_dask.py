@@ -8,7 +8,7 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.run import perform
 from tests.support.suites import InProcess, paper_cells, planned, run_and_write, same_results
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
+pytestmark = [pytest.mark.process, pytest.mark.filterwarnings("ignore")]  # Dask's own
 QUIET = {"dashboard_address": None, "silence_logs": 50}
 CELLS = paper_cells(tasks=["ascending", "descending"])
 

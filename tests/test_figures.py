@@ -28,21 +28,11 @@ def test_robots_and_goals_are_drawn_where_they_are():
         np.testing.assert_array_equal(line.get_xydata(), due)
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    return run_and_write(tmp_path_factory.mktemp("figures"), runs=4, trials=120)
-
-
-@pytest.fixture(scope="module")
-def figures(study):
-    """Every figure that these runs allow."""
-    drawn = {name: draw(study) for name, draw in FIGURES.items()}
-    return {name: plot for name, plot in drawn.items() if plot}
-
-
-def test_every_figure_of_the_papers_cells(figures):
+def test_every_figure_that_runs_allow(traced):
+    drawn = {name: draw(traced) for name, draw in FIGURES.items()}
+    figures = {name: plot for name, plot in drawn.items() if plot}
     assert {"tasks", "postures"} <= set(figures)
-    assert "published" not in figures  # printed means are of 10,000 trials, these runs of 120
+    assert "published" not in figures  # printed means are of 10,000 trials, these runs of 150
     for name, plot in figures.items():
         assert plot.id == name
         assert plot.alt
@@ -55,13 +45,13 @@ def test_the_gallery_shows_every_figure():
     assert sorted(shown) == sorted(FIGURES)
 
 
-def test_learning_curves_against_a_loop(study):
-    data = learning_curves(study)
-    rewards = dict(study.rewards())
+def test_learning_curves_against_a_loop(traced):
+    data = learning_curves(traced)
+    rewards = dict(traced.rewards())
     spread = 0
     for key, rows in data.groupby(["task", "method"]):
-        runs = [rewards[run_id] for run_id in study.cells[key].good.run_id]
-        assert rows.trial.iloc[[0, -1]].tolist() == [1, 120]
+        runs = [rewards[run_id] for run_id in traced.cells[key].good.run_id]
+        assert rows.trial.iloc[[0, -1]].tolist() == [1, 150]
         for row in rows.itertuples():
             best = sorted(np.nanmax(run[: row.trial]) for run in runs)
             assert row.best == pytest.approx(np.mean(best))

@@ -12,15 +12,6 @@ from tests.support.strategies import make_trials, sample
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
 
 
-def test_hands_that_do_not_fit():
-    task = load_task("two-armed-1")
-    hands, targets = sample(task, 6)
-    session = Session(task, 0, TOLD)
-    for wrong in (np.zeros((6, 4), int), hands[:5], "LLL", [hand[:3] for hand in hands]):
-        with pytest.raises(ValueError, match="hand"):
-            session.trials(wrong, targets)
-
-
 def test_a_budget_that_ends_within_a_batch():
     task = load_task("two-armed-2")
     hands, targets = sample(task, 10)
@@ -69,6 +60,9 @@ def test_what_was_given_is_left_alone():
     [
         ("ascending", "RRR", (3, 10), 0.0, "have shape"),
         ("ascending", ["RRR", ["R", "R", "R"]], (2, 3, 10), 0.0, "do not fit"),
+        ("ascending", ["RRR", "RR"], (2, 3, 10), 0.0, "do not fit"),
+        ("ascending", ["RRR"], (2, 3, 10), 0.0, "hand"),
+        ("ascending", np.zeros((2, 3), int), (2, 3, 10), 0.0, "hand"),
         ("ascending", "RRR", (1, 3, 9), 0.0, "have shape"),
         ("ascending", "RRR", (1, 3, 10), np.inf, "beyond"),
         ("two-armed-1", "RRRR", (1, 4, 10), 0.1, "moves the base in y"),
