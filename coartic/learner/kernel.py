@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
 from coartic.motion.compiled import entry, fill_row, generator_at, inlined, inner, record_type
-from coartic.motion.lanes import Lanes, lanes_for, runs_for, width_of
-from coartic.motion.reach import LOOK, MOVE, STAY, Bench, attempt, correct_missed
+from coartic.motion.lanes import lanes_for, runs_for, width_of
+from coartic.motion.reach import LOOK, MOVE, STAY, Batch, Bench, attempt, correct_missed
 from coartic.motion.setup import arm_of
 from coartic.motion.solution import Movement
 from coartic.motion.trigonometry import joint_chain
@@ -98,11 +98,9 @@ TENTHS = 10
 
 
 class Work(NamedTuple):
-    """Work space of runs, each now at the same goal of the same trial: that of
-    :class:`coartic.motion.reach.Batch` and the learner's own."""
+    """Work space of N runs, each now at the same goal of the same trial."""
 
-    runs: Any  # (N,) records: see runs_for
-    lanes: Lanes
+    batch: Batch
     trials: Any  # (N,) records: see _TRIAL
     xs: Any  # (n + 1,) for the longer arm: positions of its joints
     ys: Any
@@ -176,8 +174,7 @@ _TRIAL = record_type(
 def work_for(runs: int, task: Task) -> Work:
     """Work space of runs, as many as there are lanes at most; all counters are 0."""
     return Work(
-        runs=runs_for(runs, task.robot),
-        lanes=lanes_for(task.robot),
+        batch=Batch(runs_for(runs, task.robot), lanes_for(task.robot)),
         trials=np.zeros(runs, _TRIAL),
         xs=np.empty(task.robot.most_links + 1),
         ys=np.empty(task.robot.most_links + 1),
@@ -187,7 +184,7 @@ def work_for(runs: int, task: Task) -> Work:
 @inlined
 def distance_to_goal(n: int, hand: int, setup: Any, work: Any) -> float:
     """How far a hand of run ``n`` is from the centre of its goal, length unit."""
-    run, arm = work.runs[n], arm_of(setup, hand)
+    run, arm = work.batch.runs[n], arm_of(setup, hand)
     joint_chain(run.q, arm, work.xs, work.ys)
     run.evaluations += 1
     tip = len(arm.links)
@@ -238,7 +235,7 @@ def aim(
 ) -> None:
     """Choose the hand of a run and, where there is a target q*(s, a), set q^t = q*(s, a) + η;
     joints that are not to be modified keep their current values."""
-    run = work.runs[n]
+    run = work.batch.runs[n]
     if first:
         run.hand = rules.first_hands[number]
         if not math.isnan(rules.first_targets[number, 0]):
@@ -276,9 +273,9 @@ def make_trial(
     first: bool, explore: bool, setup: Any, rules: Any, tables: Any, log: Any, rngs: Any, work: Any
 ) -> None:
     """One trial of every run into ``log``; ``first``: trial 0. A trial fails at a goal missed."""
-    runs = len(work.runs)
+    runs = len(work.trials)
     for n in range(runs):
-        run, trial = work.runs[n], work.trials[n]
+        run, trial = work.batch.runs[n], work.trials[n]
         fill_row(run.q, rules.start)
         run.evaluations = 0
         run.going = True
@@ -287,21 +284,21 @@ def make_trial(
         log.count[n] = 0
     for number in range(len(rules.goals)):
         for n in range(runs):
-            run = work.runs[n]
+            run = work.batch.runs[n]
             fill_row(run.goal, rules.goals[number])
             fill_row(run.target, run.q)
             run.how, run.hit = LOOK if run.going else STAY, False
             if run.going:
                 aim(n, number, first, explore, setup, rules, tables, rngs, work)
-        attempt(runs, setup, work)
+        attempt(runs, setup, work.batch)
         for n in range(runs):
-            run = work.runs[n]
+            run = work.batch.runs[n]
             run.corrects = rules.corrects or first or run.how != MOVE
             if run.how == MOVE:
                 record_movement(log, n, number, LEARNED, run, work.trials[n])
-        correct_missed(runs, setup, work)
+        correct_missed(runs, setup, work.batch)
         for n in range(runs):
-            run, trial = work.runs[n], work.trials[n]
+            run, trial = work.batch.runs[n], work.trials[n]
             if run.going:
                 trial.counts[_ITERATIONS] += run.iterations
                 trial.counts[_CORRECTIONS] += run.converged
@@ -316,7 +313,7 @@ def make_trial(
                 else:
                     trial.counts[_FAILED] += 1
     for n in range(runs):
-        work.trials[n].counts[_EVALUATIONS] += work.runs[n].evaluations
+        work.trials[n].counts[_EVALUATIONS] += work.batch.runs[n].evaluations
 
 
 @inlined
@@ -358,8 +355,8 @@ def learn_from(number: int, rules: Any, tables: Any, kept: Any, log: Any, work: 
         kept.corrections[n, part] += trial.corrections
         reward = -trial.ticks
         kept.rewards[n, number] = reward
-        kept.completed[n, number] = work.runs[n].going
-        if not work.runs[n].going:
+        kept.completed[n, number] = work.batch.runs[n].going
+        if not work.batch.runs[n].going:
             continue
         if number == 0:
             copy_movements(n, log, kept.first)
@@ -388,13 +385,14 @@ def learn_kernel(
     ``tables`` and ``kept`` are filled; ``log`` is overwritten by every trial.
     """
     trials = kept.rewards.shape[1]
-    for number in range(trials):
-        make_trial(number == 0, True, setup[0], rules, tables, log, rngs, work)
-        learn_from(number, rules, tables, kept, log, work)
-    for n in range(len(work.trials)):  # the replay is not part of the runs
-        fill_row(kept.counts[n], work.trials[n].counts)
-    make_trial(False, False, setup[0], rules, tables, log, rngs, work)
+    for number in range(trials + 1):  # the last is the replay, which is not part of the runs
+        if number == trials:
+            for n in range(len(work.trials)):
+                fill_row(kept.counts[n], work.trials[n].counts)
+        make_trial(number == 0, number < trials, setup[0], rules, tables, log, rngs, work)
+        if number < trials:
+            learn_from(number, rules, tables, kept, log, work)
     for n in range(len(work.trials)):
-        kept.replayed[n] = work.runs[n].going
+        kept.replayed[n] = work.batch.runs[n].going
         kept.replay_rewards[n] = -work.trials[n].ticks
         copy_movements(n, log, kept.replay)

@@ -55,6 +55,11 @@ def inner(function: F) -> F:
     return cast(F, Kernel(function, "inner"))
 
 
+def shared(function: F) -> F:
+    """As :func:`inner`, but several entries call it: its machine code is kept on disk, too."""
+    return cast(F, Kernel(function, "shared"))
+
+
 def inlined(function: F) -> F:
     """As :func:`inner`, but a part of its callers, whose error model it has: passing whole tables
     would cost, and loops over a shape are unrolled where it is known."""

@@ -120,6 +120,8 @@ def compile_kernel(function: Callable[..., Any], kind: str) -> Any:
             return keep_on_disk(njit(**_OPTIONS)(function), function)
         case "inner":
             return for_any_number(njit(**_INNER, error_model="numpy")(function))
+        case "shared":
+            return keep_on_disk(compile_kernel(function, "inner"), function)
         case "inlined":
             return njit(**_INNER, inline="always")(function)
         case "scalar":

@@ -13,7 +13,7 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.compiled import entry, inlined, inner, joint_lever
+from coartic.motion.compiled import entry, inlined, inner, joint_lever, shared
 from coartic.motion.lanes import (
     GOING,
     board,
@@ -91,7 +91,7 @@ def descend(at: Any, count: int, gain: float, free_x: bool, free_y: bool) -> tup
     return ended, far == 0
 
 
-@inner
+@shared
 def correct_lanes(lanes: Any, count: int, setup: Any, runs: Any) -> None:
     """Let **A** descend in the first ``count`` lanes until each has ended.
 

@@ -26,7 +26,7 @@ import numpy as np
 from coartic.inputs import real_array
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
-from coartic.motion.compiled import entry, fill_row, inner
+from coartic.motion.compiled import entry, fill_row, inner, shared
 from coartic.motion.lanes import (
     GOING,
     depart,
@@ -192,7 +192,7 @@ def look(
     return ended
 
 
-@inner
+@shared
 def move_lanes(lanes: Any, count: int, stop_on_arrival: bool, setup: Any, runs: Any) -> None:
     """Move the first ``count`` lanes until each has ended.
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.compiled import entry, fill_row, inlined, inner
+from coartic.motion.compiled import entry, fill_row, inlined, shared
 from coartic.motion.corrective import correct_lanes
 from coartic.motion.lanes import LANES, board, depart, lanes_for, runs_for
 from coartic.motion.movement import check_goal, configuration, move_lanes
@@ -70,7 +70,7 @@ class Batch(NamedTuple):
     lanes: Any
 
 
-@inner
+@shared
 def move_acting(count: int, stops: bool, setup: Any, batch: Any) -> None:
     """Move the acting arms to their targets."""
     at, lane = batch.lanes.at[0], 0
@@ -97,7 +97,7 @@ def attempt(count: int, setup: Any, batch: Any) -> None:
             batch.runs[i].ticks = 0
 
 
-@inner
+@shared
 def find_corrections(count: int, setup: Any, batch: Any) -> None:
     """Have **A** look for where to finish missed goals: the ``target`` of runs ``converged``."""
     at, lane = batch.lanes.at[0], 0
