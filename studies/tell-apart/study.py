@@ -17,7 +17,7 @@ from scipy import stats
 from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
 
 HERE = Path(__file__).parent
-HALF = 0.5
+HALF, EXPERIMENTS = 0.5, 2000
 
 
 def share_by_task(changes):
@@ -148,10 +148,10 @@ def people_needed(learner, planner, noise, items, planned, rng):
     middle = (learner + planner) / 2
     nulls = {0: [middle], 1: [middle]}.get(planned, [learner, planner])
     for people in [*range(3, 30), *range(30, 201, 10)]:
-        plans = rng.binomial(items, planned, (2000, people)) / items
+        plans = rng.binomial(items, planned, (EXPERIMENTS, people)) / items
         scores = learner + (planner - learner) * plans
         scores += noise / np.sqrt(items) * rng.standard_normal(scores.shape)
-        right = np.ones(2000, bool)
+        right = np.ones(EXPERIMENTS, bool)
         for null in nulls:
             side = "greater" if learner + planned * (planner - learner) > null else "less"
             right &= stats.ttest_1samp(scores, null, axis=1, alternative=side).pvalue < 0.05
