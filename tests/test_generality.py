@@ -147,12 +147,6 @@ def test_claims_of_generality(monkeypatch):
     assert "fewer than 3 instances of one-armed/v1" in jerk.evidence
 
 
-def test_instances_for_tuning_are_not_judged():
-    study = rewarded({**RISING, EC4: lambda n: -540 - n}, families=ONE + TWO, split="d")
-    judged = judge_claims(study, [CLAIMS["other-arm-pays-in-general"]]).iloc[0]
-    assert "has no instances of two-armed/v1 that can be judged" in judged.evidence
-
-
 def test_hands_are_learned_where_they_differ_from_the_closest():
     """EC2 hits with the slower hand as often as hands are drawn: what counts is EC4 beyond it."""
     study = with_signatures(
@@ -185,5 +179,8 @@ def test_a_hypothesis_that_fails_in_one_family_does_not_hold_in_general():
 
 
 def test_development_instances_are_not_judged():
-    study = with_signatures(rewarded(RISING, split="d"))
-    assert set(judgements(study).verdict) == {"undecided"}
+    centres = {**RISING, EC4: lambda n: -540 - n}
+    entries = judgements(with_signatures(rewarded(centres, families=ONE + TWO, split="d")))
+    assert set(entries.verdict) == {"undecided"}
+    words = "has no instances of two-armed/v1 that can be judged"
+    assert words in entries.evidence["other-arm-pays-in-general"]

@@ -22,6 +22,14 @@ SPEC.loader.exec_module(practice)
 ROBOT, RIGHT, TRIALS = Robot(), slice(6, 10), 40 * practice.BATCH
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _kept(tmp_path_factory):
+    """Policies are kept for these tests alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(practice, "KEPT", tmp_path_factory.mktemp("kept"))
+        yield
+
+
 def ticks(network, q, goals, ahead):
     subtasks = practice.trial(network, q, goals, ahead, 0.1, PAPER)
     return np.array([subtask.reached[-1].ticks for subtask in subtasks])
