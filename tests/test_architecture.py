@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.forks import apart, forget
+from tests.support.processes import apart, forget
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from tests.support.forks import apart, forget
+from tests.support.processes import apart, forget
 
 pytestmark = pytest.mark.process
 

@@ -82,8 +82,6 @@ def test_long_runs_begin_first(tmp_path):
     begun, planner = [], "nullspace-qp/none"
 
     class Watched(InProcess):
-        workers = 2
-
         def perform(self, jobs):
             begun.extend((job.specification.method, len(job.numbers)) for job in jobs)
             return super().perform(jobs)
@@ -95,7 +93,7 @@ def test_long_runs_begin_first(tmp_path):
         'tasks = ["ascending"]\nmethods = ["dual-process/EC1-subtask"]\nruns = 4',
     )
     plan = plan_suite("paper", cells=cells)
-    perform(plan, tmp_path / "results", executor=Watched())
+    perform(plan, tmp_path / "results", executor=Watched(2))
     assert begun == [
         (planner, 1),
         (planner, 1),

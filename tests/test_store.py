@@ -142,18 +142,15 @@ def test_ctrl_c_keeps_what_is_done(undisturbed, tmp_path):
     """Batches are of eight runs and of one: the second is not begun."""
     plan = planned(ONE, **FEW)
 
-    class Two(InProcess):
-        workers = 2
-
     def watch(progress, _):
         if progress.done == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        perform(plan, tmp_path, executor=Two(), watch=watch)
+        perform(plan, tmp_path, executor=InProcess(2), watch=watch)
     with pytest.raises(CoarticError, match=r"has 8 of 9 runs.*Repeat"):
         load(tmp_path)
-    assert perform(plan, tmp_path, executor=Two()).done == 1
+    assert perform(plan, tmp_path, executor=InProcess(2)).done == 1
     same_results(load(tmp_path), undisturbed)
 
 
@@ -232,8 +229,6 @@ def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, be
         reader.close()
 
     class Read(InProcess):
-        workers = 2
-
         def perform(self, jobs):
             for pair in super().perform(jobs):
                 said.clear()
@@ -244,7 +239,7 @@ def test_a_run_waits_for_a_reader_and_the_reader_reads(undisturbed, tmp_path, be
                 yield pair
                 program.join()
 
-    perform(planned(ONE, **FEW), tmp_path, executor=Read())
+    perform(planned(ONE, **FEW), tmp_path, executor=Read(2))
     assert held == [[(0,)], [(0,)], [(8,)], [(8,)]]
     assert [path.name for path in tmp_path.iterdir()] == [RUNS_FILE]
     same_results(load(tmp_path), undisturbed)
@@ -267,16 +262,13 @@ def replace_by_a_copy(folder):
 )
 @pytest.mark.parametrize("when", [0, 8])
 def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lose, when):
-    class Two(InProcess):
-        workers = 2
-
     def watch(progress, _):
         if progress.done == when:
             lose(tmp_path / "out")
 
     plan = planned(ONE, **FEW)
     with pytest.raises(CoarticError, match="out was removed, renamed or replaced while the suite"):
-        perform(plan, tmp_path / "out", executor=Two(), watch=watch)
+        perform(plan, tmp_path / "out", executor=InProcess(2), watch=watch)
 
 
 class TooSlow(InProcess):

@@ -1,8 +1,11 @@
-"""Processes as Linux shows them; none elsewhere."""
+"""Processes as Linux shows them, none elsewhere; and what is done in one of its own."""
 
 import contextlib
+import multiprocessing
 import os
+import sys
 import time
+import warnings
 from pathlib import Path
 
 
@@ -30,3 +33,32 @@ def comes(condition):
             return True
         time.sleep(0.1)
     return False
+
+
+def apart(what, *arguments):
+    """What a function of a module returns, in a fork of this process, which has imported already
+    what takes longest (a fresh one where there are none). Raises ChildProcessError where it fails,
+    after its traceback."""
+    how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    received, answers = how.Pipe(duplex=False)
+    process = how.Process(target=_say, args=(answers, what, arguments))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        process.start()
+    answers.close()
+    try:
+        return received.recv()
+    except EOFError:
+        raise ChildProcessError("it ended without an answer") from None
+    finally:
+        process.join()
+
+
+def _say(answers, what, arguments):
+    answers.send(what(*arguments))
+
+
+def forget(*packages):
+    """Have these imported anew."""
+    for name in [name for name in sys.modules if name.partition(".")[0] in packages]:
+        del sys.modules[name]

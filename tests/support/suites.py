@@ -25,7 +25,7 @@ class InProcess:
     workers = 1
 
     def __init__(self, jobs=1):
-        pass
+        self.workers = max(1, jobs)
 
     def perform(self, jobs):
         yield from ((job, perform_job(job)) for job in jobs)
