@@ -59,13 +59,13 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
             sources[name] = stack.enter_context(open_store(folder_named(name)))
         whole = join(plan, sources)
         target = stack.enter_context(writing(out))
-        if SHIPPED in sources:
-            target.begin_as(sources[SHIPPED])
+        begun = SHIPPED in sources and target.begin_as(sources[SHIPPED])
         with target.transaction():
             target.replace_plan(whole, current_environment(), command(), now())
             origin = dict.fromkeys(target.ids(), str(out))
             for name, source in sources.items():
-                copy_runs(name, source, target, origin)
+                if not (begun and name == SHIPPED):  # whose runs are all here
+                    copy_runs(name, source, target, origin)
     return whole
 
 

@@ -26,28 +26,16 @@ def visible_sections(study: Study) -> list[Section]:
 
 
 @cached
-def sentences(study: Study) -> dict[str, list[str]]:
-    """Lines of findings by the section's id; sections without any are left out."""
-    visible = visible_sections(study)
-    texts = {each.id: each.sentence(study) for each in visible if each.sentence is not None}
-    return {
-        name: [shown(line.strip()) for line in text.strip().split("\n")]
-        for name, text in texts.items()
-        if text
-    }
+def finding(study: Study, section: Section) -> list[str]:
+    """Lines of a section's sentence; none where the runs say nothing."""
+    text = section.sentence(study).strip() if section.sentence else ""
+    return [shown(line.strip()) for line in text.split("\n")] if text else []
 
 
-def answers(study: Study) -> list[tuple[Section, str]]:
-    """Sections that answer a question in short, with their findings."""
-    texts = sentences(study)
-    return [
-        (each, " ".join(texts[each.id])) for each in SECTIONS if each.answer and each.id in texts
-    ]
-
-
-def cards(study: Study) -> list[tuple[Section, str]]:
-    """The same sections with the first lines of their findings, for the first screen."""
-    return [(each, sentences(study)[each.id][0]) for each, _ in answers(study)]
+def answers(study: Study) -> list[tuple[Section, list[str]]]:
+    """Sections that answer a question in short, with the lines of their findings."""
+    answering = [section for section in visible_sections(study) if section.answer]
+    return [(each, lines) for each in answering if (lines := finding(study, each))]
 
 
 @cached

@@ -92,7 +92,7 @@ def sections(study: Study) -> list[dict[str, Any]]:
                 "rows": len(frame),
                 "html": html_table(frame, name, section.caption) if len(frame) else "",
                 "example": f"'{frame.index[0]}'" if len(frame) else "",
-                "finding": about.sentences(study).get(section.id, []),
+                "finding": about.finding(study, section),
                 "figure": plot and for_page(plot),
             }
             allowed.append(vars(section) | words)
@@ -118,7 +118,8 @@ def page(study: Study, home: str) -> str:
         links = []
     verdicts, claims = list(get_args(Verdict)), TABLES["claims"](study).reset_index(names="id")
     claims = claims.sort_values("verdict", key=lambda each: each.map(verdicts.index), kind="stable")
-    made_with, cards = study.made_with, about.cards(study)
+    made_with = study.made_with
+    cards = [(section, lines[0]) for section, lines in about.answers(study)]
     return environment.get_template("page.html.jinja").render(
         title=f"Coarticulation of a simulated robot: suite {study.suite}",
         description=" ".join(text for _, text in cards),

@@ -64,7 +64,7 @@ def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
     """The answers of a folder, and why runs failed if some did: word and text."""
     from coartic.analysis.report.about import answers, limits
 
-    yield from ((section.answer, text) for section, text in answers(study))
+    yield from ((section.answer, " ".join(lines)) for section, lines in answers(study))
     what = limits(study)
     if what["failed"]:
         yield "Failed", f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"

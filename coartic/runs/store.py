@@ -133,10 +133,11 @@ class Store:
 
     # What was asked for.
 
-    def begin_as(self, other: Store) -> None:
-        """Become a copy of another store where no run is here."""
-        if not self.ids():
+    def begin_as(self, other: Store) -> bool:
+        """Become a copy of another store where no run is here, and say whether this is one."""
+        if empty := not self.ids():
             other._db.backup(self._db)
+        return empty
 
     def replace_plan(
         self, plan: Plan, environment: dict[str, Any], command: list[str], date: str
