@@ -89,3 +89,5 @@ def test_names_and_looks_tell_methods_apart():
     assert looks(["mine", learner])[learner] == looks([learner])[learner]
     both = looks(["mine", "theirs", "random-search/climbing"])
     assert len(set(map(str, both.values()))) == 3
+    built_in = {look["color"] for look in looks(drawn).values()}
+    assert not built_in & {both[name]["color"] for name in ("mine", "theirs")}

@@ -49,6 +49,8 @@ _COLORS: Mapping[Color, str] = {
     "ink": "#000000",
 }
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK = _COLORS.values()
+BROWN = "#8c564b"
+"""Of methods from files: no other has it."""
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 _DASHES: Mapping[Dash, Any] = {
     "solid": "-",
@@ -72,8 +74,8 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     """The look of each method of a figure, the same in all figures of a report.
 
     Built-in methods may have one of their own, the learner over all tasks that of its two-armed
-    condition. The others get what is free, methods from files first, in their order ``among`` the
-    labels of the report.
+    condition. Methods from files are brown; more than four of them, and the others, get what is
+    free, in their order ``among`` the labels of the report.
     """
     every = dict.fromkeys([*among, *labels])
     own = [label for label in every if not is_built_in(label)]
@@ -85,7 +87,9 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     dashes, colors = (DASHED, DOTTED, DASH_DOTTED, SOLID), (SKY, VERMILLION, ORANGE, PURPLE, BLUE)
     pairs = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
     free = itertools.cycle(look for look in pairs if look not in fixed.values())
-    given = {label: fixed.get(label) or next(free) for label in dict.fromkeys([*own, *every])}
+    theirs = itertools.chain([{"color": BROWN, "linestyle": dash} for dash in dashes], free)
+    given = {label: fixed.get(label) or next(theirs) for label in own}
+    given |= {label: fixed.get(label) or next(free) for label in every if label not in given}
     return {label: given[label] for label in dict.fromkeys(labels)}
 
 

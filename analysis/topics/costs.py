@@ -261,13 +261,14 @@ def what_it_costs(study: Study) -> str:
     names = ["the learner", *(name_of(row["method"]) for row in rows[1:])]
     named = list(zip(names, rows, strict=True))
     ends = "; ".join(f"{name} reaches {number(100 * row['reached'], 0)} %" for name, row in named)
-    best, text = scores.optimum_in_words(study), f"{capital(ends)} of the reward targets.\n"
+    text = f"{capital(ends)} of the reward targets.\n"
     if len(rows) == 2 and all(math.isfinite(row["trials_to_half"]) for row in rows):
         ours, theirs = (number(row["trials_to_half"], 0) for row in rows)
         needs = "; ".join(f"{name} {interval(row, 'trials_to_half', 0)}" for name, row in named)
         text = (
-            f"To get halfway to the {best.removesuffix(' reward')}, the learner needs {ours} "
-            f"trials; {names[1]} needs {theirs}.\nWith intervals: {needs} trials. {text}"
+            f"To reach half of the reward targets, the learner needs {ours} trials; {names[1]} "
+            f"needs {theirs}.\n"
+            f"With intervals: {needs} trials. {text}"
         )
     cells = (
         cell

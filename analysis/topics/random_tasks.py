@@ -11,11 +11,12 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.methods import is_setting, most_exploring, name_of
+from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.instances import best_of_instances, by_family, solved
-from coartic.analysis.words import number
+from coartic.analysis.words import listed, number
 
 MOST_GAPS = 4
 """Methods whose gaps a sentence tells."""
@@ -100,7 +101,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
 
 def on_random_tasks(study: Study) -> str:
     """Gaps of the nearest methods to the best known reward, over families with two arms."""
-    best = best_of_instances(study).values()
+    best = best_of_instances(study)
     gaps = list_family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
     if not len(gaps):
         return ""
@@ -113,6 +114,20 @@ def on_random_tasks(study: Study) -> str:
     return (
         f"Nearest to the best known reward: {'; '.join([first, *beside])}.\n"
         f"Gaps to the best known reward on {len(best)} random tasks (means over families with two "
-        f"arms): {', '.join(ends)}. On {sum(each.proven for each in best)} tasks this reward is "
-        "the proven optimum."
+        f"arms): {', '.join(ends)}. On {sum(each.proven for each in best.values())} tasks this "
+        f"reward is the proven optimum{how_loose(study)}."
+    )
+
+
+def how_loose(study: Study) -> str:
+    """How far the best known rewards lie from bounds that do not prove them, by family."""
+    rows = [
+        (str(study.tasks[name].family).partition("/")[0], 100 * gap_share(best.reward, best.bound))
+        for name, best in best_of_instances(study).items()
+        if best.bound is not None and not best.proven
+    ]
+    medians = pd.DataFrame(rows, columns=["family", "gap"]).groupby("family", sort=False).median()
+    texts = [f"{family} {number(gap, 0)} %" for family, gap in medians.gap.items()]
+    return (
+        f"; elsewhere its median distance to the proven bound is {listed(texts)}" if texts else ""
     )

@@ -317,7 +317,7 @@ def nearest(study: Study) -> str:
         if not test.least_p <= LEVEL:
             beside = f" (too few runs to tell it from {following[0]})"
         text += beside
-    text += f"{declared(rows.method[0])}."
+    text += f"{declared(rows.method[0])}.{from_files(study)}"
     for place in filter(None, places):
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
     for guessed in by_trial.gap[by_trial.method == methods.GUESSES] if len(learn) else ():
@@ -331,7 +331,7 @@ def nearest(study: Study) -> str:
         text += f"{declared(best.method)}."
     cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
     failed = scores.failed_runs(cells, ", which bars a method from the ranking")
-    return text + from_files(study) + failed
+    return text + failed
 
 
 def from_files(study: Study) -> str:
@@ -349,6 +349,7 @@ def from_files(study: Study) -> str:
             away = "away" if to == usual else f"from the {to}"
             on = f" on {listed(marked(study.tasks[task]) for task in there)}"
         text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % {away}{on}"
+        text += fewer_trials(study, row["method"])
         text += beside_learner(study, row) + "."
     more = len(rows) - MOST_FOREIGN
     text += f" And {more} more in the ranking." if more > 0 else ""
@@ -356,6 +357,23 @@ def from_files(study: Study) -> str:
         if not methods.is_built_in(label) and sum(other == task for other, _ in study.cells) == 1:
             text += f" {label} is the only method on {marked(study.tasks[task])}: name others, too."
     return text
+
+
+def fewer_trials(study: Study, method: str) -> str:
+    """The trials of a method that learns where the learner made another number of them."""
+    cells = scores.compared(study)[method]
+    learners = {task: methods.most_exploring(study.tasks[task]) for task in cells}
+    made, learner = (
+        {int(n) for cell in each for n in cell.runs.trials.dropna().unique()}
+        for each in (
+            cells.values(),
+            [study.cells[key] for key in learners.items() if key in study.cells],
+        )
+    )
+    if scores.groups(study)[method] != scores.BY_TRIAL or not made or not learner:
+        return ""
+    own, others = number(max(made)), number(max(learner))
+    return "" if made <= learner else f" with {own} trials (the learner: {others})"
 
 
 def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:

@@ -76,7 +76,8 @@ class Display:
                 count = counted(progress.stale, "run")
                 self.line(f"Ignoring {count} made by a different version of the code.")
             if progress.present:
-                self.line(f"{progress.present} of {counted(total, 'run')} are already there.")
+                coming = counted(total - progress.present, "run")
+                self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")
         if progress.present == total:
             return
         there, seconds, left = progress.present + progress.done, progress.time_left, ""
