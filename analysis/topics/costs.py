@@ -266,9 +266,8 @@ def what_it_costs(study: Study) -> str:
         ours, theirs = (number(row["trials_to_half"], 0) for row in rows)
         needs = "; ".join(f"{name} {interval(row, 'trials_to_half', 0)}" for name, row in named)
         text = (
-            f"To reach half of the reward targets, the learner needs {ours} trials; {names[1]} "
-            f"needs {theirs}.\n"
-            f"With intervals: {needs} trials. {text}"
+            f"For half of the reward targets the learner needs {ours} trials; {names[1]} needs "
+            f"{theirs}.\nWith intervals: {needs} trials. {text}"
         )
     cells = (
         cell
