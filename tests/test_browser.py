@@ -76,7 +76,7 @@ def test_tables_are_searched_filtered_sorted_and_unfolded(opened, address):
     assert page.locator(f"#{claim} dl").is_visible()
 
 
-def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
+def test_a_table_is_copied_for_a_spreadsheet_and_two_methods_are_compared(opened, traced):
     page = opened(permissions=["clipboard-read", "clipboard-write"])
     page.locator("#table-ranking").locator("xpath=../preceding-sibling::p[1]/button").click()
     page.get_by_text("rows are in the clipboard").wait_for()
@@ -88,10 +88,7 @@ def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
     assert [float(row[1].split()[0]) for row in rows[1:] if row[1] != "–"] == pytest.approx(
         list(100 * table.gap.dropna()), abs=0.05
     )
-
-
-def test_two_methods_are_compared(opened, traced):
-    page, said = opened(), differences(traced)
+    said = differences(traced)
     tools = page.locator("[data-differences]")
     first, *_, second = said
     tools.locator("select").first.select_option(first)
