@@ -362,18 +362,15 @@ def from_files(study: Study) -> str:
 def fewer_trials(study: Study, method: str) -> str:
     """The trials of a method that learns where the learner made another number of them."""
     cells = scores.compared(study)[method]
-    learners = {task: methods.most_exploring(study.tasks[task]) for task in cells}
-    made, learner = (
-        {int(n) for cell in each for n in cell.runs.trials.dropna().unique()}
-        for each in (
-            cells.values(),
-            [study.cells[key] for key in learners.items() if key in study.cells],
-        )
-    )
-    if scores.groups(study)[method] != scores.BY_TRIAL or not made or not learner:
+    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
+    beside = [study.cells[key] for key in keys if key in study.cells]
+    if not beside or scores.groups(study)[method] != scores.BY_TRIAL:
         return ""
-    own, others = number(max(made)), number(max(learner))
-    return "" if made <= learner else f" with {own} trials (the learner: {others})"
+    own, learner = (
+        max((made for each in of for made in each.runs.trials.dropna()), default=0)  # none: crashed
+        for of in (cells.values(), beside)
+    )
+    return f" with {number(own)} trials (the learner: {number(learner)})" * (0 < learner != own)
 
 
 def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:
