@@ -323,7 +323,7 @@ def new(
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a method of your own: ten lines that work, to be changed."""
+    """Write a method that works, to be changed into your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.reader import check_declaration
     from coartic.benchmarks.registry import add_cards, registry
