@@ -112,12 +112,9 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
         known = frame.attrs.get("methods", {}) if column.method else {}
         return [known.get(value) or word(value, column) for value in frame[name]]
     columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
-    parts = [
-        pd.to_numeric(frame[each]).to_numpy(float, na_value=math.nan)
-        if each in frame
-        else np.full(len(frame), math.nan)
-        for each in columns
-    ]
+    none = pd.Series(math.nan, frame.index)
+    parts = [pd.to_numeric(frame.get(each, none)).to_numpy(float, na_value=math.nan)
+             for each in columns]  # fmt: skip
     scaled = (100.0 if column.percent else 1.0) * np.column_stack(parts)
     texts = []
     for value, low, high, sd in scaled.tolist():
