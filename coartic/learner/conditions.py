@@ -49,9 +49,9 @@ class ExplorationCondition:
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     """Hands that the learner uses."""
     modify_chosen: bool
-    """AModChosen: whether noise moves the targets of the base and of the arm that is to hit."""
+    """Whether noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
     modify_other: bool
-    """AModOther: whether noise moves the targets of the other arm."""
+    """Whether noise moves the targets of the other arm (AModOther)."""
     hand_exploration: Literal["none", "closest", "random"]
     """How the hand for a goal is explored: not at all (``"none"``), by taking the one that is
     closest to the goal (``"closest"``), or at random (``"random"``, DASel)."""
