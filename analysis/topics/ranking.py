@@ -370,7 +370,9 @@ def fewer_trials(study: Study, method: str) -> str:
         max((made for each in of for made in each.runs.trials.dropna()), default=0)  # none: crashed
         for of in (cells.values(), beside)
     )
-    return f" with {number(own)} trials (the learner: {number(learner)})" * (0 < learner != own)
+    if learner in (0, own):
+        return ""
+    return f" with {number(own)} trials (the learner: {number(learner)})"
 
 
 def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:
