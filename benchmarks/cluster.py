@@ -33,7 +33,7 @@ class Dask:
         dies. Raises CoarticError where there is no scheduler, it is lost, or it
         has no workers of this version."""
         client = self._client()
-        from distributed import as_completed
+        from distributed import CancelledError, KilledWorker, as_completed
 
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
@@ -44,19 +44,18 @@ class Dask:
                 time.sleep(0.0 if finished.has_ready() else _PAUSE_S)
                 for future in finished.next_batch(block=False):
                     job = job_of[future.key]
-                    yield job, self._outcomes(future, job)
+                    try:
+                        outcomes = future.result()
+                    except KilledWorker:
+                        outcomes = fail(job, "crashed", "every worker that tried this run died")
+                    yield job, outcomes
+        except CoarticError:
+            raise
+        except (Exception, CancelledError) as error:
+            words = f"lost Dask scheduler {self.address}, or its workers cannot work"
+            raise CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}") from None
         finally:
             client.close(timeout=3)
-
-    def _outcomes(self, future: Any, job: Job) -> Any:
-        from distributed import CancelledError, KilledWorker
-
-        try:
-            return future.result()
-        except KilledWorker:
-            return fail(job, "crashed", "every worker that tried this run died")
-        except (Exception, CancelledError) as error:
-            raise error if isinstance(error, CoarticError) else self._lost(error) from None
 
     def _client(self) -> Any:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said here
@@ -73,19 +72,14 @@ class Dask:
             raise CoarticError(f"{words}it prints, such as tcp://127.0.0.1:8786.") from None
 
     def _wait_for_workers(self, client: Any) -> None:
+        if client.scheduler_info()["workers"]:
+            return
+        self.say(f"no Dask worker is connected to {self.address}: waiting for one")
         try:
-            if not client.scheduler_info()["workers"]:
-                self.say(f"no Dask worker is connected to {self.address}: waiting for one")
-                client.wait_for_workers(1, timeout=WORKERS_S)
+            client.wait_for_workers(1, timeout=WORKERS_S)
         except TimeoutError:
             words = f"Dask scheduler {self.address} had no workers for {WORKERS_S:g} s"
             raise CoarticError(f"{words}; start some. {_GOES_ON}") from None
-        except Exception as error:
-            raise self._lost(error) from None
-
-    def _lost(self, error: BaseException) -> CoarticError:
-        words = f"lost Dask scheduler {self.address}, or its workers cannot work"
-        return CoarticError(f"{words} ({error_line(error)}). {_GOES_ON}")
 
 
 def _remote(job: Job) -> list[Outcome]:

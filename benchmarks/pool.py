@@ -25,7 +25,7 @@ from collections.abc import Generator, Iterator, Sequence
 from multiprocessing import connection
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 from coartic.benchmarks.worker import Job, Outcome, answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
@@ -47,19 +47,6 @@ _KILLED = (-9, 255)  # exit codes of a process that somebody has killed, or whos
 _END_S = 1.0  # that a process which is killed has to end
 _OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 _BEGUN, _SAID = "begun", "said"  # files beside the answers of a process
-
-
-class Executor(Protocol):
-    """Performs jobs, somewhere."""
-
-    @property
-    def workers(self) -> int:
-        """How many at once."""
-        ...
-
-    def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Each job with its outcomes, as they come, in any order."""
-        ...
 
 
 class Local:
@@ -93,7 +80,8 @@ class Local:
                     while waiting and len(crew) < self.workers:
                         crew.append(Worker(folder, waiting.popleft(), self))
                         crew[-1].start()
-                    connection.wait([s for worker in crew for s in worker.sentinels], _POLL_S)
+                    sentinels = [w.process.sentinel for w in crew if w.process.pid is not None]
+                    connection.wait(sentinels, _POLL_S)
                     for worker in tuple(crew):
                         exit_code = worker.exit_code  # first: after the end comes no answer
                         yield from worker.answers()
@@ -104,7 +92,7 @@ class Local:
                         if not worker.jobs:
                             continue
                         job = worker.jobs[0]
-                        lost = lost + 1 if worker.since_s is None else 0
+                        lost = lost + 1 if worker.since_s == math.inf else 0
                         if lost == _STARTS:
                             raise CoarticError(
                                 f"processes cannot begin {worker.last_words}; finished runs are "
@@ -130,17 +118,18 @@ class Worker:
     def __init__(self, folder: str, jobs: Sequence[Job], local: Local) -> None:
         self.jobs = deque(jobs)
         """Jobs that are not answered yet."""
-        self.since_s: float | None = None
-        """Clock when it began the first of these; None before."""
+        self.since_s = math.inf
+        """Clock when it began the first of these."""
         self._patience_s = local.patience_s
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
-        self._process = WorkerProcess(target=perform_jobs, args=(self._folder, jobs, local.workers))
+        arguments = self._folder, jobs, local.workers
+        self.process = CONTEXT.Process(target=perform_jobs, args=arguments)
 
     def start(self) -> None:
         """Begin it; where it cannot begin, it has ended."""
         try:
-            self._process.start()
+            start_process(self.process)
         except (OSError, EOFError) as error:
             (self._folder / _SAID).write_text(error_line(error))
             return
@@ -149,20 +138,14 @@ class Worker:
             warm_up(self.jobs[0].specification.task, "trials")
 
     @property
-    def sentinels(self) -> list[int]:
-        """A handle that is ready when the process has ended."""
-        return [] if self._process.pid is None else [self._process.sentinel]
-
-    @property
     def exit_code(self) -> int | None:
         """Exit code, or minus the signal that ended it; None while it runs."""
-        return 1 if self._process.pid is None else self._process.exitcode
+        return 1 if self.process.pid is None else self.process.exitcode
 
     @property
     def is_late(self) -> bool:
         """Whether its job takes too long."""
-        since_s = self.since_s
-        return since_s is not None and time.monotonic() > since_s + self.wall_limit_s
+        return time.monotonic() > self.since_s + self.wall_limit_s
 
     @property
     def wall_limit_s(self) -> float:
@@ -171,7 +154,7 @@ class Worker:
 
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
         """The jobs that it has answered since, with their outcomes."""
-        if self.since_s is None and (self._folder / _BEGUN).exists():
+        if self.since_s == math.inf and (self._folder / _BEGUN).exists():
             self.since_s = time.monotonic()
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():
             job = self.jobs.popleft()
@@ -204,14 +187,14 @@ class Worker:
 
     def end(self) -> None:
         """End it, with the processes that it has started."""
-        if self._process.pid is not None:
-            end_group(self._process.pid)
-            self._process.join(_END_S)
+        if self.process.pid is not None:
+            end_group(self.process.pid)
+            self.process.join(_END_S)
 
 
 def perform_jobs(folder: Path, jobs: Sequence[Job], workers: int) -> None:
     """Perform jobs in this process, which answers in a folder of its own."""
-    os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
+    os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent)
     descriptor = os.open(folder / _SAID, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
     for stream in (1, 2):
@@ -275,26 +258,24 @@ def bound_resources(workers: int) -> None:
 # and the path of its socket is not too long: the system takes 103 characters, and some are to come.
 _HAS_SERVER = "forkserver" in multiprocessing.get_all_start_methods()
 _START = "forkserver" if _HAS_SERVER and len(tempfile.gettempdir()) <= 70 else "spawn"
-_Ordinary: Any = multiprocessing.get_context(_START).Process  # type: ignore[attr-defined]
+CONTEXT: Any = multiprocessing.get_context(_START)
 
 
-class WorkerProcess(_Ordinary):  # type: ignore[misc]
-    """A process with one thread for BLAS, in which the program that is running is not run again."""
+def start_process(process: Any) -> None:
+    """Start a process of :data:`CONTEXT` with one thread for BLAS, in which the program that is
+    running is not run again. Raises OSError or EOFError where it does not start."""
+    # It would look for modules in the working folder first, whoever has filled it.
+    safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    main = sys.modules["__main__"]
+    with environment(ONE_THREAD | safe):
+        if _START == "forkserver":
+            from multiprocessing import resource_tracker
 
-    def start(self) -> None:
-        """Start it. Raises OSError or EOFError where it does not."""
-        # It would look for modules in the working folder first, whoever has filled it.
-        safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        main = sys.modules["__main__"]
-        with environment(ONE_THREAD | safe):
-            if _START == "forkserver":
-                from multiprocessing import resource_tracker
-
-                multiprocessing.set_forkserver_preload([__name__, "coartic.motion.compiler"])
-                resource_tracker.ensure_running()  # first: it lets signals through again
-            sys.modules["__main__"] = ModuleType("__main__")
-            try:
-                with blocked_signals():  # Ctrl-C tells all that a terminal has
-                    super().start()
-            finally:
-                sys.modules["__main__"] = main
+            multiprocessing.set_forkserver_preload([__name__, "coartic.motion.compiler"])
+            resource_tracker.ensure_running()  # first: it lets signals through again
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            with blocked_signals():  # Ctrl-C tells all that a terminal has
+                process.start()
+        finally:
+            sys.modules["__main__"] = main

@@ -11,14 +11,14 @@ import inspect
 import json
 import multiprocessing
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.pool import WorkerProcess
+from coartic.benchmarks.pool import CONTEXT, start_process
 from coartic.errors import CoarticError
 from coartic.method import Information, Method
 from coartic.runs.card import MethodCard, answer, card_of, load_file, methods_in
@@ -29,35 +29,35 @@ _LIMIT_S = 300.0  # of an answer: libraries may take long to import
 _LONGEST_ANSWER = 2**24  # bytes
 
 
-class Reader:
-    """Asks a process that has imported a method file. It ends with this process, with all that it
-    has started."""
+def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
+    """Begin a process that has imported a method file. It ends with this process, with all that it
+    has started.
 
-    def __init__(self, path: Path, shown: str) -> None:
-        self._shown = shown
-        self._pipe, theirs = multiprocessing.Pipe()
-        self._process = WorkerProcess(
-            target=answer_questions, args=(theirs, str(path), shown), daemon=True
-        )
-        self._process.start()
-        atexit.register(end_group, self._process.pid)
-        theirs.close()
+    Returns a function that gives the answer of a method by its id, and raises CoarticError where it
+    has none.
+    """
+    pipe, theirs = multiprocessing.Pipe()
+    process = CONTEXT.Process(target=answer_questions, args=(theirs, str(path), shown), daemon=True)
+    start_process(process)
+    atexit.register(end_group, process.pid)
+    theirs.close()
 
-    def __call__(self, method: str, question: str, *arguments: Any) -> Any:
-        """The answer of a method by its id. Raises CoarticError where it has none."""
+    def ask(method: str, question: str, *arguments: Any) -> Any:
         try:
-            self._pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
-            if not self._pipe.poll(_LIMIT_S):
-                end_group(self._process.pid)
-                raise CoarticError(f"{self._shown}: gives no answer within {_LIMIT_S:g} s")
-            said = json.loads(self._pipe.recv_bytes(_LONGEST_ANSWER))
+            pipe.send_bytes(json.dumps([method, question, *arguments]).encode())
+            if not pipe.poll(_LIMIT_S):
+                end_group(process.pid)
+                raise CoarticError(f"{shown}: gives no answer within {_LIMIT_S:g} s")
+            said = json.loads(pipe.recv_bytes(_LONGEST_ANSWER))
         except (OSError, EOFError):
-            self._process.join(1.0)
-            how = f"its process ended with exit code {self._process.exitcode}"
-            raise CoarticError(f"{self._shown}: cannot be imported: {how}") from None
+            process.join(1.0)
+            how = f"its process ended with exit code {process.exitcode}"
+            raise CoarticError(f"{shown}: cannot be imported: {how}") from None
         if "error" in said:
             raise CoarticError(plain(str(said["error"])))
         return said["answer"]
+
+    return ask
 
 
 def answer_questions(pipe: Any, path: str, shown: str) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.code_identity import code_of
-from coartic.benchmarks.reader import Reader, cards_of_module
+from coartic.benchmarks.reader import begin_reader, cards_of_module
 from coartic.errors import CoarticError
 from coartic.inputs import check_file
 from coartic.learner.conditions import ABLATIONS, CONDITIONS, METHOD_PREFIX
@@ -118,9 +118,9 @@ def cards_of_file(path: Path) -> Iterator[MethodCard]:
     check_file(path)
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file ends in .py")
-    reader = Reader(path, shown)
-    for card in _CARDS.validate_python(reader("", "cards")):
-        READERS[str(path)] = reader
+    ask = begin_reader(path, shown)
+    for card in _CARDS.validate_python(ask("", "cards")):
+        READERS[str(path)] = ask
         yield replace(card, origin=shown, where=str(path))
 
 

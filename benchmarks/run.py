@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import Executor, Local
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
@@ -114,7 +114,7 @@ def run_suite(
     suite: str | Path | Suite,
     folder: str | Path,
     *,
-    executor: Executor | None = None,
+    executor: Any = None,
     watch: Watcher = lambda progress, specification: None,
     **options: Any,
 ) -> Progress:
@@ -153,7 +153,7 @@ def perform(
     plan: Plan,
     folder: str | Path,
     *,
-    executor: Executor | None = None,
+    executor: Any = None,
     watch: Watcher = lambda progress, specification: None,
 ) -> Progress:
     """Perform what a results folder lacks of a plan.
@@ -166,7 +166,7 @@ def perform(
         The runs that are asked for.
     folder : str or Path
         Results folder, made where there is none.
-    executor : Executor, optional
+    executor : Local or Dask, optional
         Where methods run; by default this machine, in a process for every core.
     watch : callable
         Called before the first run and after each.
