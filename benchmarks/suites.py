@@ -37,7 +37,6 @@ from coartic.text import Line, unknown
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
-NO_FAMILIES: Mapping[str, Family] = {}
 Scalar = bool | int | float | str
 
 
@@ -169,7 +168,7 @@ def select_cells(
     *,
     tasks: Sequence[str | Task] = (),
     methods: Sequence[str] = (),
-    families: Mapping[str, Family] = NO_FAMILIES,
+    families: Mapping[str, Family] | None = None,
 ) -> list[Cell]:
     """The cells of a suite, plus those of the user's own tasks, narrowed by name.
 
@@ -187,7 +186,7 @@ def select_cells(
 
     def task_named(name: str) -> Task:
         address = address_of(name)
-        if address is not None and address.family in families:
+        if address is not None and families and address.family in families:
             return instance_of(families[address.family], address)
         return load_task(name)
 

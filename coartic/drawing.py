@@ -87,8 +87,11 @@ def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
 
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
-    """Write the number of every goal above it, or below."""
-    for index, ((x, y), below) in enumerate(zip(task.goals, numbered_below(task), strict=True), 1):
+    """Write the number of every goal above it, or below where another goal is close above."""
+    goals = task.goal_array
+    right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
+    close = (np.abs(right) < _CROWDED / 2) & (up > 0) & (up < _CROWDED)
+    for index, ((x, y), below) in enumerate(zip(task.goals, close.any(axis=1), strict=True), 1):
         side = -1 if below else 1
         axes.annotate(
             str(index), (x, y + side * task.radius), (0, 1.5 * weight * side),
@@ -97,14 +100,6 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
             bbox={"boxstyle": "square,pad=0", "facecolor": WHITE, "alpha": 0.8, "linewidth": 0},
             **text,
         )  # fmt: skip
-
-
-def numbered_below(task: Task) -> list[bool]:
-    """Whether a goal's number goes below it, since another goal is close above."""
-    goals = task.goal_array
-    right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
-    close = (np.abs(right) < _CROWDED / 2) & (up > 0) & (up < _CROWDED)
-    return [bool(near) for near in close.any(axis=1)]
 
 
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:

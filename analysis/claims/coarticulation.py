@@ -25,12 +25,10 @@ from coartic.analysis.words import estimate, number
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 
-ONE_ARMED = ASCENDING, DESCENDING = "ascending", "descending"
+ONE_ARMED = "ascending", "descending"
 TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
 """The learner that is rewarded for each subtask by itself."""
-CONTROLS = ("posture-based/one-goal", methods.INITIAL)
-"""Methods that do not look beyond the current goal."""
 TEST_OF_MEANS = "one-tailed bootstrap test of the mean reward for each comparison"
 
 
@@ -63,7 +61,7 @@ def posture_depends_on_context(read: Reader) -> Finding:
     less_p = dependence_below(*contexts.configurations, margins.SPREAD, np.random.default_rng(SEED))
     tests = [test]
     against = [replace(test, value=margins.SPREAD - test.value, p=less_p)]
-    guesses = [contexts_of(read, label) for label in read.guesses(ASCENDING)]
+    guesses = [contexts_of(read, label) for label in read.guesses(ONE_ARMED[0])]
     farthest = max(guesses, key=lambda each: each.apart)
     for compared in (farthest, contexts_of(read, EC1_BY_SUBTASK)):
         more = contexts.apart - compared.apart
@@ -71,7 +69,7 @@ def posture_depends_on_context(read: Reader) -> Finding:
         tests.append(replace(beyond, p=contexts.p_beyond(compared)))
         against.append(replace(beyond, value=-more, p=compared.p_beyond(contexts)))
         parts.append(f"{methods.name_of(compared.method)}: {number(compared.apart, 2)} apart")
-    for label in CONTROLS:
+    for label in ("posture-based/one-goal", methods.INITIAL):  # which look at the current goal
         with suppress(MissingError):
             apart = contexts_of(read, label).apart
             parts.append(f"{methods.name_of(label)}: {number(apart, 2)} apart")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
-from coartic.analysis.claims.judging import Finding, tests_over_tasks
+from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, LEARNER, LEARNERS, most_exploring
 from coartic.analysis.statistics.estimates import FEWEST, mean
@@ -29,7 +29,7 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
 
     Rewards are in per cent of the best known.
     """
-    tests, without, against, parts = [], [], [], []
+    findings, parts = [], []
     for name, compare in comparisons:
         for family in families:
             values = []
@@ -41,16 +41,12 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
                     values.append(unit * float(first.numbers.mean() - other))
             if len(values) < FEWEST:
                 raise MissingError(f"fewer than {FEWEST} instances of {family} can be judged")
-            test, without_greatest = tests_over_tasks(values, margin)
-            tests.append(test)
-            without.append(without_greatest)
-            opposites = tests_over_tasks([-value for value in values], -margin)
-            against.append(max(opposites, key=lambda test: test.p))
+            findings.append(mean_beyond("", values, margin))
             seen = estimate(mean(values), 2 if first.quantity else 1) + " %" * (not first.quantity)
             quantity = first.quantity or "gain as a share of the best known reward"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances"))
-    finding = all_positive(tests, parts)
-    return replace(finding, against=tuple(against), without=tuple(without))
+    finding = all_of(*findings)
+    return replace(finding, evidence=all_positive(finding.tests, parts).evidence)
 
 
 def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:

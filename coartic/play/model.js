@@ -17,24 +17,18 @@ const PAPER = {
   step: 0.01, arrival_tolerance: 0.01, gain: 0.05, correction_tolerance: 0.01, max_iterations: 20000,
 };
 
-/* coartic/motion/problem.py; `task` has the content of a task file. */
+/* coartic/motion/setup.py; `task` is one of the package as plain data. */
 function problem_of(task, model = PAPER) {
-  const robot = {
-    left_links: [1, 1, 1, 1], right_links: [1, 1, 1, 1], left_shoulder: [-0.5, 0.1], right_shoulder: [0.5, 0.1],
-    base_size: [1, 0.2], ...task.robot,
-  };
-  const start = [...(task.start.base || [0, 0]), ...task.start.left, ...task.start.right];
+  const { robot, goals, radius, start: { base, left, right } } = task;
   const arm = (first, links, [shoulder_x, shoulder_y]) => ({ first, links, shoulder_x, shoulder_y });
-  const locked = task.locked_base || [];
   return {
-    task, robot, start, model,
-    goals: task.goals, radius: task.radius === undefined ? 0.1 : task.radius,
-    hands: (task.hands || HANDS).map((hand) => HANDS.indexOf(hand)).sort(),
+    task, robot, goals, radius, model, start: [...base, ...left, ...right],
+    hands: task.hands.map((hand) => HANDS.indexOf(hand)).sort(),
     arms: [
       arm(BASE_DOF, robot.left_links, robot.left_shoulder),
       arm(BASE_DOF + robot.left_links.length, robot.right_links, robot.right_shoulder),
     ],
-    free: [!locked.includes("x"), !locked.includes("y")],
+    free: ["x", "y"].map((axis) => !task.locked_base.includes(axis)),
   };
 }
 
@@ -557,16 +551,12 @@ class Learner {
 
 /* ---- CMA-ES on the same trials (coartic/baselines/cma_es.py) ---- */
 
-/* coartic/optimisers.py: entries [goal, joint] that are worth exploring with a hand sequence. */
-function explored_joints(problem, hands) {
-  return hands.flatMap((_, goal) => movable(problem, hands.slice(goal)).flatMap((moves, j) => (moves ? [[goal, j]] : [])));
-}
-
 /* CMA-ES (Hansen 2016) with a Cholesky factor in place of the matrix's root (Krause, Arbonès & Igel 2016). */
 class Strategy {
   constructor(search, hands) {
     Object.assign(this, { search, hands, sigma_0: 0.05, generations: 1, restarts: -1 });
-    this.entries = explored_joints(search.problem, hands);
+    // [goal, joint], as explored_joints of coartic/optimisers.py
+    this.entries = hands.flatMap((_, goal) => movable(search.problem, hands.slice(goal)).flatMap((moves, j) => (moves ? [[goal, j]] : [])));
     const first = search.try(hands, hands.map(() => null));
     this.reward = first.reward;
     if (first.going) this.first = this.entries.map(([goal, j]) => first.reached[goal][j]);
@@ -669,6 +659,8 @@ class Search {
     Object.assign(this, { problem, left: trials, trials: 0, best: null, strategies: [] });
     this.rng = new Generator(seed);
     this.exploration = 0.2;
+    const named = letters_of(initial_hands(problem));
+    this.sequences = hand_sequences(problem).sort((a, b) => (letters_of(b) === named) - (letters_of(a) === named));
   }
 
   try(hands, targets) {
@@ -681,10 +673,6 @@ class Search {
 
   /* The next trial or generation of trials. */
   step() {
-    if (!this.sequences) {
-      const named = letters_of(initial_hands(this.problem));
-      this.sequences = hand_sequences(this.problem).sort((a, b) => (letters_of(b) === named) - (letters_of(a) === named));
-    }
     if (this.sequences.length) {
       this.strategies.push(new Strategy(this, this.sequences.shift()));
       return;

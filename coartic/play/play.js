@@ -776,7 +776,6 @@ class Play {
       this.showMeeting();
       this.answer();
     });
-    on("trials", "change", () => this.keep());
     on("play", "click", () => {
       if (!this.playing) this.play();
       else {
@@ -791,7 +790,7 @@ class Play {
       this.state.tick = Number(event.target.value);
       this.refresh();
     });
-    on("tick", "change", () => this.keep());
+    ["trials", "tick"].forEach((name) => on(name, "change", () => this.keep()));
     on("png", "click", () => this.save());
     on("link", "click", () => this.copyLink());
   }

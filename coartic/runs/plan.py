@@ -208,11 +208,11 @@ class Plan:
         )
 
     def to_rows(self) -> dict[str, list[dict[str, Any]]]:
-        """Its rows by table; that of a cell has the specification itself in place of its number."""
+        """Its rows by table; that of a cell has the row of its specification, not its number."""
         cells = [
             {
                 "position": position,
-                "setting": specification,
+                "setting": specification.to_row(),
                 "variant": cell.setting,
                 "parameters": cell.parameters,
                 "runs": cell.runs,

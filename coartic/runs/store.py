@@ -161,7 +161,7 @@ class Store:
                 "environment": self._environment(environment),
             }
             for row in rows["cells"]:
-                row["setting"] = self._specification(row["setting"])
+                row["setting"] = self._id_of("settings", row["setting"], "asked", "code")
             for table, content in rows.items():
                 self._db.execute(f"DELETE FROM {table}")
                 for row in content:
@@ -341,7 +341,7 @@ class Store:
                 self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
             self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
         row = run.to_row()
-        row["setting"] = self._specification(run.specification)
+        row["setting"] = self._id_of("settings", run.specification.to_row(), "asked", "code")
         row["environment"] = self._environment(run.environment)
         result = self._insert("results", row)
 
@@ -362,10 +362,6 @@ class Store:
             stored = [FAILED_TRIAL if reward is None else reward for reward in run.rewards]
             blob = zlib.compress(np.array(stored, dtype="<i4").tobytes(), level=1)
             self._insert("learning", {"result_id": result, "rewards": blob})
-
-    def _specification(self, specification: Specification) -> int:
-        """Id of the row of a specification, which is inserted where there is none."""
-        return self._id_of("settings", specification.to_row(), "asked", "code")
 
     def _environment(self, content: dict[str, Any]) -> int:
         """Id of the row of an environment, which is inserted where there is none."""
