@@ -16,16 +16,17 @@ from coartic.inputs import check_limits
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
 
+
+def path(what: str, metavar: str, *names: str) -> Any:
+    """An option that is a file or a folder."""
+    return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
+
+
 Results = Annotated[
     Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
 ]
-In = Annotated[
-    Path,
-    typer.Option("--in", parser=folder_named, metavar="FOLDER", help="Where to look for the run."),
-]
-Out = Annotated[
-    Path | None, typer.Option(parser=folder_named, metavar="FILE", help="File to write.")
-]
+In = Annotated[Path, path("Where to look for the run.", "FOLDER", "--in")]
+Out = Annotated[Path | None, path("File to write.", "FILE")]
 Replace = Annotated[bool, typer.Option("--replace", help="Write over a file that is there.")]
 MethodFiles = Annotated[
     list[Path] | None,

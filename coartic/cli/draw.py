@@ -11,7 +11,6 @@ import typer
 from coartic.cli import arguments as given
 from coartic.cli.terminal import say
 from coartic.errors import CoarticError
-from coartic.files import folder_named
 from coartic.text import counted
 
 _PICTURED = 12
@@ -23,12 +22,9 @@ def draw(
         list[str] | None,
         typer.Argument(metavar="TASK", help="Tasks, task files, or long/v1/i000..i003."),
     ] = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            parser=folder_named, metavar="FILE", help="Picture (.png, .svg, .pdf), or a folder."
-        ),
-    ] = Path("tasks.svg"),
+    out: Annotated[Path, given.path("Picture (.png, .svg, .pdf), or a folder.", "FILE")] = Path(
+        "tasks.svg"
+    ),
     replace: given.Replace = False,
 ) -> None:
     """Draw tasks, or write them into a folder as files."""
@@ -58,10 +54,7 @@ def draw(
 
 def animate(
     run: Annotated[str, typer.Argument(metavar="RUN", help="Id of a run, or its beginning.")],
-    out: Annotated[
-        Path,
-        typer.Option(parser=folder_named, metavar="FILE", help="Film to write: .gif or .mp4."),
-    ] = Path("film.gif"),
+    out: Annotated[Path, given.path("Film to write: .gif or .mp4.", "FILE")] = Path("film.gif"),
     other: Annotated[
         str | None, typer.Argument(metavar="OTHER", help="Another run to show beside it.")
     ] = None,

@@ -26,12 +26,7 @@ if TYPE_CHECKING:
 def report(
     folder: given.Results,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            parser=folder_named,
-            metavar="FOLDER",
-            help="Folder to write; FOLDER/report if not given.",
-        ),
+        Path | None, given.path("Folder to write; FOLDER/report if not given.", "FOLDER")
     ] = None,
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
@@ -73,12 +68,9 @@ def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
 def trace(
     table: Annotated[str | None, typer.Argument(metavar="TABLE", help="Id of a table.")] = None,
     row: Annotated[str | None, typer.Argument(metavar="ROW", help="Name of a row.")] = None,
-    folder: Annotated[
-        Path,
-        typer.Option(
-            "--in", parser=folder_named, metavar="FOLDER", help="A report or its results."
-        ),
-    ] = Path("results"),
+    folder: Annotated[Path, given.path("A report or its results.", "FOLDER", "--in")] = Path(
+        "results"
+    ),
 ) -> None:
     """Name the runs behind a row of a report's table."""
     from coartic.analysis.report import trace as traced
