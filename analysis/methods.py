@@ -59,8 +59,6 @@ KNOWN_METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).v
     tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 )
 """Rows of the built-in methods by id, in the order of lists and figures."""
-HEADLINES = tuple(name for name, row in KNOWN_METHODS.items() if row.headline)
-"""Methods that stand for their algorithms where none are named."""
 _PARAMETERS = {
     "other_arm=": "other arm ",
     "noise_sd=": "σ ",
@@ -102,10 +100,8 @@ def is_search(label: str) -> bool:
 
 def algorithm_of(label: str) -> str:
     """Algorithm of a method; a method without a row is its own."""
-    method = label.partition(" ")[0]
-    if label.startswith(TOGETHER):
-        method = EC4
-    return KNOWN_METHODS[method].algorithm if method in KNOWN_METHODS else one_line(label)
+    row = KNOWN_METHODS.get(look_alike(label).partition(" ")[0])
+    return row.algorithm if row else one_line(label)
 
 
 def name_of(label: str) -> str:
@@ -147,8 +143,8 @@ def main_methods(labels: Iterable[str]) -> list[str]:
     together = [max(over_all)] if over_all else []
     single = [
         label
-        for label in HEADLINES
-        if label in labels and not (together and label.startswith(LEARNER))
+        for label, row in KNOWN_METHODS.items()
+        if row.headline and label in labels and not (together and label.startswith(LEARNER))
     ]
     foreign = [label for label in labels if not is_built_in(label)]
     return [*together, *single, *foreign] or labels

@@ -6,9 +6,7 @@ default says its value. Elsewhere methods are compared as they are by default.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from coartic.analysis.methods import ALL_GUESSES, INITIAL, is_search, main_methods, name_of
+from coartic.analysis.methods import ALL_GUESSES, INITIAL, is_search, name_of
 from coartic.analysis.study import Study, cached
 
 
@@ -54,8 +52,3 @@ def names_of_settings(study: Study) -> dict[str, str]:
 def name_in(study: Study, label: str) -> str:
     """The name of a method in a folder; a default that stands beside others has its value."""
     return names_of_settings(study).get(label) or name_of(label)
-
-
-def shown_methods(study: Study, labels: Iterable[str]) -> list[str]:
-    """Methods that figures and tables of a folder show: all settings where these are compared."""
-    return list(dict.fromkeys(labels)) if compares_settings(study) else main_methods(labels)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic import Execution, Hand, Task, corrective_trial, initial_hands
+from coartic import Execution, Task, corrective_trial, initial_hands
 from coartic.errors import NotApplicableError
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
@@ -23,14 +23,6 @@ class Solutions:
     """The method with its setting."""
     runs: tuple[Execution, ...]
     run_ids: tuple[str, ...] = ()
-
-    @cached_property
-    def initial(self) -> Execution | None:
-        """The initial solution: the corrective process alone with the task's hands.
-
-        None where it completes the task with none.
-        """
-        return initial_solution(self.task)
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
@@ -50,12 +42,6 @@ class Solutions:
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
         return starts
-
-    def configurations_at(self, goal: int, hand: Hand) -> Array:
-        """Configurations ``(k, dof)`` of the runs that hit a goal, from 1, with a hand."""
-        return np.asarray(
-            self.configurations[self.hands[:, goal - 1] == HANDS.index(hand), goal - 1]
-        )
 
     @cached_property
     def against_same_hands(self) -> Array:

@@ -79,8 +79,6 @@ Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 MOST_EXECUTED = 500
 """Runs of a method on a task whose solutions are executed again for the signatures."""
-MOST_INSTANCES = 8
-"""Instances that a report shows singly; more are shown together, by family."""
 
 
 def cached(
@@ -310,8 +308,8 @@ class Study:
 def one_by_one(study: Study) -> set[str]:
     """Names of the tasks that a report has one by one.
 
-    All, but no instances of families, if these are many. A changed task has the name of its task
-    before the first dot.
+    All, but no instances of families, if these are more than eight. A changed task has the name of
+    its task before the first dot.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
-    return set(study.tasks) - (drawn if len(drawn) > MOST_INSTANCES else set())
+    return set(study.tasks) - (drawn if len(drawn) > 8 else set())

@@ -27,8 +27,6 @@ _LATEX = str.maketrans(
         **{"“": "``", "”": "''", "<": "$<$", ">": "$>$", "×": "$\\times$"},
     }
 )
-LONGEST_SLUG = 80
-"""Characters of a slug before its number, since names of files must not be too long."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
@@ -149,7 +147,9 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
     """A slug for every name (small letters, digits, dashes), no two the same."""
     taken: dict[str, str] = {}
     for name in names:
-        base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:LONGEST_SLUG] or "x"
+        base = (
+            re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] or "x"
+        )  # names of files are short
         slug, count = base, 1
         while slug in taken.values():
             count += 1

@@ -17,6 +17,7 @@ from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.estimates import RESAMPLES, SEED
 from coartic.analysis.topics import costs, ranking, scores
 from coartic.analysis.topics.ranking import leaders, paired_difference
+from coartic.analysis.topics.rewards import changed_hands
 from coartic.analysis.topics.scores import BY_TRIAL
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
@@ -326,7 +327,8 @@ def test_a_method_from_a_file_stands_with_its_parameters():
     assert "declares" not in ranking.nearest(study(TEN))
 
 
-def test_the_best_condition_has_the_highest_mean():
-    learned = {("ascending", 1): -303, ("two-armed-1", 2): -670, ("two-armed-1", 4): -645}
-    seen = study({(task, f"dual-process/EC{k}"): [at] * 3 for (task, k), at in learned.items()})
-    assert scores.best_condition(seen, "two-armed-1") == "dual-process/EC4"
+def test_the_condition_with_the_highest_mean_says_which_hands_are_learned():
+    learned = {"EC2": (-670, "RRRR"), "EC4": (-645, "LRLR"), "EC3": (-650, "RRLR")}
+    rows = [row(f"dual-process/{name}", reward, hands=hands, initial_hands="RRRR")
+            for name, (reward, hands) in learned.items()]  # fmt: skip
+    assert changed_hands(study_of(rows)).endswith("on Two-armed 1 † from RRRR to LRLR.")

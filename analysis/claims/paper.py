@@ -226,7 +226,7 @@ def half_find(read: Reader, task: str, label: str, hands: str) -> Finding:
     low, high = stats.binomtest(count, total).proportion_ci()
     cell = published_cell(task, who_is(label))
     assert cell is not None
-    printed, of_printed = cell.sequences[hands], sum(s.runs for s in cell.sequences.values())
+    printed, of_printed = cell[hands], sum(s.runs for of, s in cell.items() if of)
     more = share_test(count, total, margins.FEW, "greater")
     fewer = share_test(count, total, margins.MOST, "less")
     inside = min(share - margins.FEW, margins.MOST - share)

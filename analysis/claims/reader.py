@@ -208,7 +208,7 @@ def in_words(printed: Summary | None) -> str:
 def printed_reward(task: str, label: str) -> str:
     """Mean reward of runs as the paper has it, in words; empty where it does not print it."""
     cell = published_cell(task, label.removeprefix(LEARNER))
-    return in_words(cell and cell.summary)
+    return in_words((cell or {}).get(""))
 
 
 def there(reads: Iterable[Callable[[], Measurement]]) -> Iterator[Measurement]:

@@ -33,12 +33,10 @@ from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
-DPI = 300
 MAGNIFIED = 1.3
 """Enlarges figures on the page, so that their 8 pt are as large as its text."""
 PHONE = 320 / 72
 """Width in inches that a phone shows: it scrolls a figure that is wider."""
-_NO_METADATA = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
     ".pdf": {"CreationDate": None},
     ".svg": {"Date": None},
@@ -112,7 +110,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
     """
     stream = io.BytesIO()
     with rc_context(RC):
-        drawing.savefig(stream, format=ending[1:], dpi=DPI, metadata=_NO_DATE[ending])
+        drawing.savefig(stream, format=ending[1:], dpi=300, metadata=_NO_DATE[ending])
     return stream.getvalue()
 
 
@@ -128,8 +126,9 @@ def for_page(plot: Plot) -> dict[str, Any]:
     :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
     """
     stream, inches = io.StringIO(), plot.figure.get_figwidth()
+    none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with rc_context({**RC, "svg.fonttype": "none"}):
-        plot.figure.savefig(stream, format="svg", transparent=True, metadata=_NO_METADATA)
+        plot.figure.savefig(stream, format="svg", transparent=True, metadata=none)
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
     text = re.sub(rf' id="{TIP}([^"]*)">', r"><title>\1</title>", text)

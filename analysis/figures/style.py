@@ -204,26 +204,6 @@ def log_axis(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def gap_axis(axes: Axes, gaps: pd.DataFrame) -> None:
-    """An x axis for gaps in per cent: logarithmic, but from 0 to 0.1 where there are such."""
-    nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
-    left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
-    axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
-    steps = (1, 2, 5) if farthest < 100 else (1,)
-    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
-    shown = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
-    axes.set_xticks(shown, [f"{tick:g}" for tick in shown])
-    axes.set_xticks([], minor=True)
-    axes.set_xlim(left, 1.1 * farthest)
-    axes.axvline(0, **OPTIMUM)
-
-
-def across(axes: Axes, x: float) -> float:
-    """How far a value lies to the right in a panel: 0 to 1."""
-    shown = axes.transData.transform((x, 0))
-    return float(axes.transAxes.inverted().transform(shown)[0])
-
-
 def letters(panels: Iterable[Axes]) -> None:
     """Name panels a, b, ... z before their titles."""
     for letter, axes in zip(ascii_lowercase, panels, strict=False):

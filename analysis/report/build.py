@@ -26,7 +26,6 @@ from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 HERE = Path(__file__).parent
-PAPER_LINK = "https://doi.org/10.1080/00222895.2013.828344"
 
 
 def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
@@ -140,6 +139,5 @@ def page(study: Study, home: str) -> str:
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
-        paper_link=PAPER_LINK,
         links=dict(link.split(", ", 1) for link in links),
     )

@@ -16,8 +16,6 @@ from coartic.analysis.topics.scores import labels_by_task
 from coartic.play.page import figure, preset_of
 from coartic.robot import HANDS
 
-NO_SCRIPTS = "<p>The movements are played by a script, and scripts are switched off here.</p>"
-
 
 def player(study: Study) -> str:
     """The figure as HTML; empty where no run has a solution.
@@ -43,7 +41,7 @@ def player(study: Study) -> str:
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return figure(
         presets,
-        still=NO_SCRIPTS,
+        still="<p>The movements are played by a script, and scripts are switched off here.</p>",
         page=None,
         first={"who": first if first in ids else ids[0]},
         cells=[

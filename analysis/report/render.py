@@ -11,7 +11,6 @@ import math
 import textwrap
 from collections.abc import Sequence
 from fnmatch import fnmatch
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +28,6 @@ from coartic.analysis.words import (
 )
 from coartic.text import one_line
 
-_COMPANIONS = ("_low", "_high", "_sd")
 TONES = {
     "supported": "good",
     "equivalent": "good",
@@ -41,10 +39,6 @@ TONES = {
 """Class of a verdict on the page, by its words."""
 PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
 """First line of every LaTeX table."""
-_LINK = '<a class="link" href="#{}" tabindex="-1" aria-label="Link to this row"></a>'
-"""Link to a row by its id."""
-FITS = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
-"""Shrinks a table that is wider than the text."""
 IN_LATEX = {
     "settings": "task, method, runs, reward, behind, p_holm",
     "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
@@ -62,8 +56,6 @@ IN_LATEX = {
 """Tables for a paper, and their columns, which fit the width of a text; others are CSV alone."""
 MOST_ROWS = 50
 """Rows of a table on one page; a longer one is CSV alone."""
-LONG = 0.8
-"""Width of a column of sentences, as a share of the text's."""
 
 
 def column_of(name: str) -> Column:
@@ -86,7 +78,7 @@ def columns_of(frame: pd.DataFrame) -> dict[str, str]:
     if "verdict" in names:  # it is what one looks for, also where a screen has room for two columns
         names.insert(1, names.pop(names.index("verdict")))
     for name in names:
-        if not name.endswith(_COMPANIONS) and column_of(name).page:
+        if not name.endswith(("_low", "_high", "_sd")) and column_of(name).page:
             header = column_of(name).header or name.replace("_", " ")
             if name == "gap" and not frame.attrs.get("known", True):
                 header = "gap to the best of this folder (%)"
@@ -110,7 +102,9 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
     column = column_of(name)
     if not is_number(frame[name]):
         known = frame.attrs.get("methods", {}) if column.method else {}
-        return [known.get(value) or word(value, column) for value in frame[name]]
+        shown = name_of if column.method else one_line
+        return [NONE if pd.isna(value) else known.get(value) or shown(str(value)) or NONE
+                for value in frame[name]]  # fmt: skip
     columns = [f"{name}{ending}" for ending in ("", "_low", "_high", "_sd")]
     none = pd.Series(math.nan, frame.index)
     parts = [pd.to_numeric(frame.get(each, none)).to_numpy(float, na_value=math.nan)
@@ -120,24 +114,10 @@ def texts_of(frame: pd.DataFrame, name: str) -> list[str]:
     for value, low, high, sd in scaled.tolist():
         spread = "" if math.isnan(sd) else f" ± {number(sd, column.digits)}"
         interval = in_brackets(low, high, column.digits)
-        texts.append(f"{digits(value, column)}{spread} {interval}".strip())
+        text = number(value, 3 if column.p else column.digits)
+        text = "< 0.001" if column.p and value < 0.001 else text
+        texts.append(f"{text}{spread} {interval}".strip())
     return texts
-
-
-def digits(value: float, column: Column) -> str:
-    """One number as its column shows it."""
-    if column.p and value < 0.001:
-        return "< 0.001"
-    return number(value, 3 if column.p else column.digits)
-
-
-def word(value: Any, column: Column) -> str:
-    """One value of a column that does not hold numbers alone."""
-    if value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value)):
-        return NONE
-    if isinstance(value, float | int) and not isinstance(value, bool):
-        return digits(float(value), column)
-    return name_of(str(value)) if column.method else one_line(str(value)) or NONE
 
 
 def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
@@ -168,7 +148,8 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
         if not cells:
             labels = [html.escape(row) for row in ids_of]
             texts = [
-                f'<span title="row {label}">{text}</span>{_LINK.format(id_)}'
+                f'<span title="row {label}">{text}</span><a class="link" href="#{id_}" '
+                'tabindex="-1" aria-label="Link to this row"></a>'
                 for label, id_, text in zip(labels, ids_of.values(), texts, strict=True)
             ]
         cells.append(texts)
@@ -202,7 +183,7 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
         side, longest = "r" if numbers else "l", max(map(len, texts))
         head = textwrap.wrap(columns[column], max(longest, 9), break_long_words=False)
         heads.append(f"\\shortstack[{side}]{{" + "\\\\{}".join(map(latex, head)) + "}")
-        sides += f"p{{{LONG}\\linewidth}}" if longest > 60 else side
+        sides += "p{0.8\\linewidth}" if longest > 60 else side
         cells.append(list(map(latex, texts)))
     # Two columns may have one header.
     shown = pd.DataFrame(dict(enumerate(cells))).set_axis(heads, axis="columns")
@@ -219,6 +200,7 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
     begin, end, below = "\\begin{tabular}", "\\end{tabular}", " ".join(map(latex, notes))
     if below:
         below = f"\n\n\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {below}}}"
-    body = body.replace(begin, f"\\footnotesize\n{FITS}{begin}", 1)
+    fit = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
+    body = body.replace(begin, f"\\footnotesize\n{fit}{begin}", 1)
     body = body.replace(end, f"{end}}}{below}", 1)
     return f"{PACKAGES}\n{body}"

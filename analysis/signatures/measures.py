@@ -15,13 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic import Execution, Hand, Task
-from coartic.analysis.solutions import Solutions
+from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.motion.reach import reach_unchecked
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
-
-ROUNDING = 1
-"""Ticks that a planned movement can lose to rounding alone."""
 
 
 def other(hand: Hand) -> Hand:
@@ -167,9 +164,10 @@ def preshaping_of_the_other_arm(runs: Solutions) -> Array:
 
     Shape ``(n, G - 1)``; NaN on a task for one hand, and without an initial solution.
     """
-    if not runs.runs or runs.initial is None or len(runs.task.hands) < 2:
+    initial = initial_solution(runs.task)
+    if not runs.runs or initial is None or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals) - 1), np.nan)
-    return np.array([preshaping(runs.task, run, runs.initial)[:-1] for run in runs.runs])
+    return np.array([preshaping(runs.task, run, initial)[:-1] for run in runs.runs])
 
 
 def arm(runs: Solutions) -> Array:

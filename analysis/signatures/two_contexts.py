@@ -25,7 +25,7 @@ from coartic.analysis.signatures.context_tests import (
 )
 from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.estimates import SEED
-from coartic.robot import Array
+from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
 
 
@@ -67,27 +67,15 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of one method that hit the same goal with the same hand before other successors.
-
-    Parameters
-    ----------
-    first, second : Solutions
-        Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them.
-    goal : int
-        Number of the goal, from 1.
-    hand : {"left", "right"}
-        Runs that hit the goal with the other hand do not count.
-
-    Examples
-    --------
-    In the page *Use it from Python*.
-    """
+    """Runs of one method that hit the same goal with the same hand before other successors."""
 
     first: Solutions
     second: Solutions
+    """Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them."""
     goal: int
     """Number of the goal, from 1."""
     hand: Hand
+    """Runs that hit the goal with the other hand do not count."""
 
     @property
     def tasks(self) -> tuple[Task, Task]:
@@ -105,8 +93,12 @@ class TwoContexts:
 
         Shape ``(runs, dof)``, length unit and rad.
         """
-        goal, hand = self.goal, self.hand
-        return self.first.configurations_at(goal, hand), self.second.configurations_at(goal, hand)
+        goal, hand = self.goal - 1, HANDS.index(self.hand)
+        first, second = (
+            runs.configurations[runs.hands[:, goal] == hand, goal]
+            for runs in (self.first, self.second)
+        )
+        return first, second
 
     @property
     def in_both(self) -> bool:

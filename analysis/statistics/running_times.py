@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.analysis.statistics.estimates import (
+    FEWER_RESAMPLES,
     FEWEST,
     IN_CACHE,
     SEED,
@@ -23,9 +24,7 @@ from coartic.analysis.statistics.estimates import (
 )
 from coartic.robot import Array
 
-BUDGET_RESAMPLES = 1_999
 _MOST_DRAWN = 20_000_000  # runs in all resamples of a budget: of very many runs there are fewer
-_FEWEST_RESAMPLES = 200
 RunningTimes = Sequence[Array]
 """Running times of one method: for each task the cost at which every run reached every target,
 shape ``(runs, targets)``; infinite where the target is not reached."""
@@ -84,7 +83,7 @@ def draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     A byte each, as there may be many runs; none is drawn 256 times.
     """
     rng = np.random.default_rng(SEED)
-    resamples = min(BUDGET_RESAMPLES, max(_MOST_DRAWN // sum(sizes), _FEWEST_RESAMPLES))
+    resamples = min(FEWER_RESAMPLES, max(_MOST_DRAWN // sum(sizes), 200))
     drawn = [np.empty((resamples, size), dtype=np.uint8) for size in sizes]
     for of_task, size in zip(drawn, sizes, strict=True):
         even = np.full(size, 1 / size)

@@ -24,7 +24,7 @@ from coartic.analysis.methods import (
     main_methods,
     name_of,
 )
-from coartic.analysis.settings import shown_methods
+from coartic.analysis.settings import compares_settings
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import (
     SIGNATURES,
@@ -97,7 +97,7 @@ def list_signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals."""
     for task in (name for name in study.tasks if name in one_by_one(study)):
         labels = [label for name, label in study.cells if name == task]
-        for label in in_order(shown_methods(study, labels)):
+        for label in in_order(labels if compares_settings(study) else main_methods(labels)):
             cell, runs = study.cells[task, label], study.executed(task, label)
             if runs.runs and not is_search(label):
                 row: Row = {

@@ -46,8 +46,6 @@ COSTS = (
 """Columns of :func:`runtimes`: kind of cost, and share of the targets."""
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
 """Spends that the figure of costs has a panel of, and their axes."""
-ECDF_STEPS = 150
-"""Steps of an ECDF that are drawn."""
 
 
 @cached
@@ -208,8 +206,8 @@ def draw_runtimes(study: Study) -> Parts | None:
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
         return None
-    steps = [
-        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, ECDF_STEPS).round()).astype(int)]
+    steps = [  # no more than are seen
+        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, 150).round()).astype(int)]
         for _, rows in data.groupby(["method", "spend"], sort=False)
     ]
     data = pd.concat(steps, ignore_index=True)

@@ -23,8 +23,6 @@ BUDGETS = (100, 1_000, 10_000)
 """Trials after which the table reads rewards."""
 WINDOW = 100
 """Trials over which a learning curve averages the reward of trials."""
-POINTS = 120
-"""Trials of a learning curve that are drawn."""
 CURVES = (*methods.LEARNERS, "random-search/climbing", "cma-es/bandit")
 """Built-in methods whose learning curves are drawn; of others they all are."""
 
@@ -147,7 +145,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
             continue
         length = min(map(len, runs))
         rewards = np.array([run[:length] for run in runs])
-        at = np.unique(np.round(np.geomspace(1, length, POINTS)).astype(np.int64))
+        at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.
         best = np.fmax.accumulate(rewards, axis=1)[:, at - 1]
         low, high = np.quantile(best, [0.25, 0.75], axis=0)

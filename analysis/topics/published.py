@@ -48,15 +48,6 @@ class Summary(NamedTuple):
         return f"{number(self.mean)}{' (derived)' * self.derived}"
 
 
-class PublishedCell(NamedTuple):
-    """Printed rewards of one task under one condition."""
-
-    summary: Summary | None
-    """Mean and spread over all runs."""
-    sequences: dict[str, Summary]
-    """Runs by hand sequence, where the paper tells them apart."""
-
-
 def published_alone(task: str, kind: str) -> Summary | None:
     """Reward of the corrective process alone with the ``initial hands`` of a task or the ``best of
     all sequences``; None where the paper prints none."""
@@ -68,16 +59,17 @@ def published_alone(task: str, kind: str) -> Summary | None:
     return None
 
 
-def published_cell(task: str, condition: str) -> PublishedCell | None:
-    """Printed rewards of a cell; None for a cell that the paper does not have."""
-    entries: dict[tuple[str, str | None], dict[str, Any]] = {
-        (entry["kind"], entry.get("hands")): entry
+def published_cell(task: str, condition: str) -> dict[str, Summary] | None:
+    """Printed rewards of a cell by hand sequence, where the paper tells them apart, and of all runs
+    under ``""``; None for a cell that the paper does not have."""
+    entries: dict[tuple[str, str], dict[str, Any]] = {
+        (entry["kind"], entry.get("hands", "")): entry
         for entry in ENTRIES.values()
         if (entry["task"], entry.get("condition")) == (task, condition)
     }
     if not entries:
         return None
-    summaries: dict[str | None, Summary] = {}
+    summaries: dict[str, Summary] = {}
     for (kind, hands), entry in entries.items():
         if kind == "reward":
             count = entries.get(("count", hands), {})
@@ -85,11 +77,12 @@ def published_cell(task: str, condition: str) -> PublishedCell | None:
                 entry["value"],
                 entries.get(("sd", hands), {}).get("value"),
                 count.get("value", RUNS),
-                RUNS if hands is None else count.get("value"),
+                count.get("value") if hands else RUNS,
                 derived_runs="difference_of" in count,
             )
-    sequences = {hands: summary for hands, summary in summaries.items() if hands is not None}
-    return PublishedCell(summaries.get(None) or pooled([*sequences.values()]), sequences)
+    if "" not in summaries and (whole := pooled([*summaries.values()])):
+        summaries[""] = whole
+    return summaries
 
 
 def pooled(parts: list[Summary]) -> Summary | None:

@@ -18,10 +18,6 @@ from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.instances import best_of_instances, by_family, solved
 from coartic.analysis.words import listed, number
 
-MOST_GAPS = 4
-"""Methods whose gaps a sentence tells."""
-_FARTHEST = 1.0  # gap at the right end; larger ones stand there too
-
 
 @table("method, instances, gap[], to_bound[], in *")
 def list_family_gaps(study: Study) -> Rows:
@@ -80,7 +76,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
             place = order.index(label)
             heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
             dot: Any = {"color": looks[label]["color"], "markersize": 2.5, "markeredgewidth": 0}
-            gaps = rows.gap.clip(upper=_FARTHEST)
+            gaps = rows.gap.clip(upper=1.0)
             axes.plot(gaps, heights, "o", linestyle="", alpha=0.5, **dot)
             mean = rows.iloc[0]
             ends = [mean.mean_low, mean.mean_high]
@@ -88,7 +84,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
             diamond: Any = {"markersize": 4, "markerfacecolor": style.BACKGROUND, "zorder": 4}
             axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
-        axes.set_xlim(-0.004, _FARTHEST * 1.15)
+        axes.set_xlim(-0.004, 1.15)
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])
@@ -102,7 +98,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
 def on_random_tasks(study: Study) -> str:
     """Gaps of the nearest methods to the best known reward, over families with two arms."""
     best = best_of_instances(study)
-    gaps = list_family_gaps(study).dropna(subset="gap").head(MOST_GAPS)
+    gaps = list_family_gaps(study).dropna(subset="gap").head(4)
     if not len(gaps):
         return ""
     ends = [
@@ -111,23 +107,17 @@ def on_random_tasks(study: Study) -> str:
     ]
     first, *others = ends
     beside = [end for end in others if end.startswith("the learner")] or others[:1]
+    unproven = [
+        (str(study.tasks[name].family).partition("/")[0], 100 * gap_share(each.reward, each.bound))
+        for name, each in best.items()
+        if each.bound is not None and not each.proven
+    ]
+    loose = pd.DataFrame(unproven, columns=["family", "gap"]).groupby("family", sort=False).median()
+    medians = [f"{family} {number(gap, 0)} %" for family, gap in loose.gap.items()]
+    elsewhere = f"; elsewhere its median distance to the proven bound is {listed(medians)}"
     return (
         f"Nearest to the best known reward: {'; '.join([first, *beside])}.\n"
         f"Gaps to the best known reward on {len(best)} random tasks (means over families with two "
         f"arms): {', '.join(ends)}. On {sum(each.proven for each in best.values())} tasks this "
-        f"reward is the proven optimum{how_loose(study)}."
-    )
-
-
-def how_loose(study: Study) -> str:
-    """How far the best known rewards lie from bounds that do not prove them, by family."""
-    rows = [
-        (str(study.tasks[name].family).partition("/")[0], 100 * gap_share(best.reward, best.bound))
-        for name, best in best_of_instances(study).items()
-        if best.bound is not None and not best.proven
-    ]
-    medians = pd.DataFrame(rows, columns=["family", "gap"]).groupby("family", sort=False).median()
-    texts = [f"{family} {number(gap, 0)} %" for family, gap in medians.gap.items()]
-    return (
-        f"; elsewhere its median distance to the proven bound is {listed(texts)}" if texts else ""
+        f"reward is the proven optimum{elsewhere if medians else ''}."
     )

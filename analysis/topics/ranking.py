@@ -13,6 +13,7 @@ import pandas as pd
 from coartic.analysis import frames, methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
+from coartic.analysis.optima import gap_share
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import (
     FEWER_RESAMPLES,
@@ -37,10 +38,6 @@ from coartic.analysis.words import (
 from coartic.robot import Array
 from coartic.text import counted
 
-TRIES = *methods.ALL_GUESSES, "corrective-alone/every"
-"""Methods that take the best of their trials and learn nothing between them."""
-_MOST_PAIRS = 24
-"""Methods of which the page compares any two."""
 MOST_FOREIGN = 3
 """Methods from files that a sentence names."""
 LONGEST = 36
@@ -172,27 +169,19 @@ def paired_difference(study: Study, first: str, second: str) -> Estimate:
     return sign_flip_test(np.concatenate([of_task / len(of_task) for of_task in differences]))
 
 
-@cached
-def gaps_of_runs(study: Study) -> dict[Any, Array]:
-    """Gaps of the runs, shape ``(n,)``, by compared method and task."""
-    frame = scores.scores(study)
-    gaps = frame.assign(gap=frames.gaps(frame)).groupby(["method", "task"]).gap
-    return {key: values.to_numpy() for key, values in gaps}
-
-
 def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
     """Mean gap of one method less that of another, both of :func:`main_gaps`.
 
     Its interval is for other runs of both on the same tasks, as those of the ranking; what a method
     that draws nothing does is exact.
     """
-    gaps, exact = gaps_of_runs(study), 0.0
-    tasks = scores.common_tasks(study)
+    tasks, exact = scores.common_tasks(study), 0.0
     signs, drawn = [], []
     for sign, method in ((1, first), (-1, second)):
         for task in tasks:
-            values = gaps[method, task]
-            if study.plan.methods[scores.compared(study)[method][task].method].stochastic:
+            cell = scores.compared(study)[method][task]
+            values = gap_share(cell.rewards, scores.best_rewards(study)[task])
+            if study.plan.methods[cell.method].stochastic:
                 signs.append(sign)
                 drawn.append(values)
             else:
@@ -211,7 +200,7 @@ def difference_of_gaps(study: Study, first: str, second: str) -> Estimate:
 
 def differences(study: Study) -> dict[str, dict[str, str]]:
     """Differences of the mean gaps of any two of the nearest methods in words, by their names."""
-    names = {method: name_in(study, method) for method in main_gaps(study).method[:_MOST_PAIRS]}
+    names = {method: name_in(study, method) for method in main_gaps(study).method[:24]}
     texts: dict[str, dict[str, str]] = {name: {} for name in names.values()}
     for first, second in itertools.combinations(names, 2):
         difference = difference_of_gaps(study, first, second)
@@ -241,7 +230,18 @@ def draw_ranking(study: Study) -> Parts | None:
     looks, line, of_groups = looks_in(study, rows.method), 0.0, percent.groupby("knows")
     size = style.ONE, 0.45 + 0.155 * (len(rows) + 1.4 * of_groups.ngroups)
     drawing, (axes,) = style.panels((1, 1), size)
-    style.gap_axis(axes, percent[["gap", "gap_low", "gap_high"]])
+    gaps = percent[["gap", "gap_low", "gap_high"]]
+    nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
+    left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
+    axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
+    steps = (1, 2, 5) if farthest < 100 else (1,)
+    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
+    ticks = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.set_xlim(left, 1.1 * farthest)
+    axes.axvline(0, **style.OPTIMUM)
+    across = axes.transData - axes.transAxes  # how far to the right: 0 to 1
     for group in [group for group in scores.GROUPS if group in of_groups.groups]:
         at = axes.get_yaxis_transform()
         axes.text(0.01, line, capital(group), color=style.GREY, va="center", transform=at)
@@ -256,7 +256,8 @@ def draw_ranking(study: Study) -> Parts | None:
             (dot,) = axes.plot(row["gap"], line, mark, markersize=2.6, markeredgewidth=0, **look)
             name, gap = name_in(study, row["method"]), number(row["gap"], 1)
             style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {row['runs']} runs")
-            right = style.across(axes, high) < 1 - style.across(axes, low)  # there is more room
+            ends = across.transform([(low, 0), (high, 0)])[:, 0]
+            right = ends[1] < 1 - ends[0]  # there is more room
             beside: Any = {"textcoords": "offset points", "va": "center_baseline"}
             beside |= {"ha": "left"} if right else {"ha": "right"}
             beside |= {"weight": "bold"} if learner else {}
@@ -280,7 +281,8 @@ def nearest(study: Study) -> str:
     """The method with the smallest gap and whether surely so, the learner's place, the best
     planner, methods from files, and failed runs: a sentence for each that there is."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
-    learn = by_trial[~by_trial.method.isin(TRIES)].reset_index(drop=True)
+    tries = *methods.ALL_GUESSES, "corrective-alone/every"  # which learn nothing from a trial
+    learn = by_trial[~by_trial.method.isin(tries)].reset_index(drop=True)
     rows = next((rows for rows in (learn, by_formula, others, by_trial) if len(rows)), learn)
     if not len(rows):
         return ""

@@ -13,15 +13,9 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
 from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_printed, equivalence
-from coartic.analysis.study import CellRuns, Study, cached
+from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.topics.published import (
-    RUNS,
-    PublishedCell,
-    published_alone,
-    published_cell,
-)
-from coartic.analysis.topics.scores import best_condition
+from coartic.analysis.topics.published import RUNS, published_alone, published_cell
 from coartic.analysis.words import interval, listed, marked
 from coartic.learner.learning import TRIALS
 
@@ -33,13 +27,6 @@ _MARKS = {
 }
 
 
-def published_of(cell: CellRuns) -> PublishedCell | None:
-    """Printed rewards of a cell; None but for the paper's own learner."""
-    if not cell.method.startswith(LEARNER) or cell.setting:
-        return None
-    return published_cell(cell.task, cell.method.removeprefix(LEARNER))
-
-
 @cached
 def beside_paper(study: Study) -> list[dict[str, Any]]:
     """Every cell that the paper has too, in the order of the plan, and its hand sequences.
@@ -48,30 +35,33 @@ def beside_paper(study: Study) -> list[dict[str, Any]]:
     prints come first, then ours by their number of runs. A row has ``cell``, ``hands`` (empty for
     the whole cell), ``published`` and its ``published_sd``, ``published_runs`` (of hands 0 only
     where all others are printed), ``pooled`` (whether the printed mean is one over several hand
-    sequences) and the ``margin`` of equivalence, ``ours``, ``ours_sd`` and ``runs`` of our runs
-    with a solution, ``of_runs`` of the cell. Where both are there, it has ``difference[]``, ours
-    less published, and a ``verdict`` if our runs have as many trials as the paper's.
+    sequences), ``several`` (whether the paper has them) and the ``margin`` of equivalence,
+    ``ours``, ``ours_sd`` and ``runs`` of our runs with a solution, ``of_runs`` of the cell. Where
+    both are there, it has ``difference[]``, ours less published, and a ``verdict`` if our runs have
+    as many trials as the paper's.
     """
     rows = []
     for cell in study.cells.values():
-        paper, hands = published_of(cell), cell.good.hands
-        if paper is None:
+        own, condition = cell.label in LEARNERS, cell.label.removeprefix(LEARNER)
+        printed, hands = published_cell(cell.task, condition) if own else None, cell.good.hands
+        if printed is None:
             continue
-        printed = paper.sequences
-        complete = sum(summary.printed_runs or 0 for summary in printed.values()) == RUNS
-        ours = map(str, hands.value_counts().index) if printed or len(set(hands)) > 1 else ()
+        complete = sum(each.printed_runs or 0 for of, each in printed.items() if of) == RUNS
+        several = len(printed) > 1 or len(set(hands)) > 1
+        ours = map(str, hands.value_counts().index) if several else ()
         for name in dict.fromkeys(["", *printed, *ours]):
             rewards = cell.rewards[(hands == name).to_numpy(bool)] if name else cell.rewards
-            summary = printed.get(name) if name else paper.summary
+            summary = printed.get(name)
             row: dict[str, Any] = {
                 "cell": cell,
                 "task": marked(study.tasks[cell.task]),
-                "condition": cell.label.removeprefix(LEARNER),
+                "condition": condition,
                 "hands": name,
                 "published": summary.mean if summary else None,
                 "published_sd": summary.sd if summary else None,
                 "published_runs": summary.printed_runs if summary else 0 if complete else None,
                 "pooled": summary.derived if summary else False,
+                "several": len(printed) > 2,  # with that of the whole cell
                 "margin": MARGIN * abs(summary.mean) if summary else None,
                 "ours": rewards.mean() if len(rewards) else math.nan,
                 "ours_sd": standard_deviation(rewards),
@@ -129,10 +119,9 @@ def draw_published(study: Study) -> Parts | None:
     """Difference of every mean reward to the printed one, with interval and margin."""
     shown = []
     for pair in beside_paper(study):
-        cell, paper = pair["cell"], published_of(pair["cell"])
+        cell = pair["cell"]
         comparable = len(cell.good) and (cell.good.trials == TRIALS).all()
-        several = paper is not None and len(paper.sequences) > 1
-        if comparable and pair["published"] is not None and (several or not pair["hands"]):
+        if comparable and pair["published"] is not None and (pair["several"] or not pair["hands"]):
             shown.append(pair | {"task": cell.task, "method": cell.label})
     if not shown:
         return None
@@ -198,9 +187,10 @@ def changed_hands(study: Study) -> str:
     """On which tasks the learner's best condition ends with other hands than it began with."""
     changes = []
     for name, task in study.tasks.items():
-        label = best_condition(study, name)
-        good = study.cells[name, label].good if label else None
-        if good is not None and good.initial_hands.notna().any():
+        learners = [study.cells.get((name, label)) for label in LEARNERS]
+        solved = [cell for cell in learners if cell is not None and len(cell.good)]
+        best = max(solved, key=lambda cell: cell.rewards.mean(), default=None)
+        if best is not None and (good := best.good).initial_hands.notna().any():
             before, commonest = good.initial_hands.dropna().iloc[0], list(good.hands.mode())
             if before not in commonest:
                 changes.append(f"on {marked(task)} from {before} to {' or '.join(commonest)}")

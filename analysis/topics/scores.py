@@ -18,7 +18,6 @@ from coartic.analysis.methods import (
     EC3,
     EC4,
     LEARNER,
-    LEARNERS,
     TOGETHER,
     is_search,
     is_setting,
@@ -50,14 +49,12 @@ def optimum_in_words(study: Study) -> str:
 def initial_and_optimum(study: Study) -> dict[str, tuple[float, int]]:
     """Rewards of the initial solution and of the optimum by task, where the optimum is better.
 
-    Without tasks where one of them is not known or the optimum is 0. The initial solution is the
-    corrective process alone with the task's initial hands, the optimum that with all joints free.
+    Without tasks where one of them is not known. The initial solution is the corrective process
+    alone with the task's initial hands, the optimum that with all joints free.
     """
-    known_of = {task: best.reward for task, best in study.optima.items() if best.reward != 0}
     both = {
-        name: (initial_reward(task), known_of[name])
-        for name, task in study.tasks.items()
-        if name in known_of
+        name: (initial_reward(study.tasks[name]), best.reward)
+        for name, best in study.optima.items()
     }
     return {name: pair for name, pair in both.items() if pair[0] < pair[1]}  # initial: NaN if none
 
@@ -179,13 +176,6 @@ def groups(study: Study) -> dict[str, str]:
         of_label[label] = BY_FORMULA if by_formula else BY_TRIAL if learns else WITHOUT_REWARD
     together = {name: EC1 for name in labels_by_task(study) if name not in of_label}
     return of_label | {name: of_label[label] for name, label in together.items()}
-
-
-def best_condition(study: Study, task: str) -> str | None:
-    """Label of the learner's own condition with the highest mean reward on a task."""
-    cells = [study.cells.get((task, label)) for label in LEARNERS]
-    solved = [cell for cell in cells if cell is not None and len(cell.good)]
-    return max(solved, key=lambda cell: cell.rewards.mean()).label if solved else None
 
 
 def cell_gap(study: Study, cell: CellRuns) -> float:
