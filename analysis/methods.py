@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Literal
-
-from pydantic import TypeAdapter
+from typing import NamedTuple
 
 from coartic import Task
-from coartic.inputs import FileData
 from coartic.learner import conditions
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.runs.plan import SEARCH
@@ -34,30 +31,28 @@ ALL_GUESSES = GUESSES, "guesses/hands"
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
 
-Color = Literal["blue", "sky", "green", "orange", "vermillion", "purple", "grey", "ink"]
-Dash = Literal["solid", "dashed", "dotted", "dash-dotted"]
 
-
-class KnownMethod(FileData):
+class KnownMethod(NamedTuple):
     """A built-in method's row."""
 
     name: str
     """Its one name, in figures, tables and sentences."""
     algorithm: str
     """Its algorithm, of which a ranking shows the best form."""
-    look: tuple[Color, Dash] | None = None
+    works: Sequence[str]
+    """Keys of ``references.bib``, the most telling first; none for this software's own."""
+    look: Sequence[str] | None = None
     """Colour and dash in all figures; None: one that is free."""
     headline: bool = False
     """Whether it stands for its algorithm where no methods are named."""
-    works: tuple[str, ...]
-    """Keys of ``references.bib``, the most telling first; none for this software's own."""
-    solvers: tuple[str, ...] = ()
+    solvers: Sequence[str] = ()
     """Keys of the works behind what poses and solves its programmes."""
 
 
-KNOWN_METHODS: Mapping[str, KnownMethod] = TypeAdapter(dict[str, KnownMethod]).validate_python(
-    tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-)
+KNOWN_METHODS = {
+    name: KnownMethod(**row)
+    for name, row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
+}
 """Rows of the built-in methods by id, in the order of lists and figures."""
 _PARAMETERS = {
     "other_arm=": "other arm ",

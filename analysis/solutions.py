@@ -49,23 +49,19 @@ class Solutions:
 
         Shape ``(n, G)``; NaN for runs with whose hands it does not complete the task.
         """
-        references = {hands: corrective(self.task, hands) for hands in {r.hands for r in self.runs}}
+        every = {run.hands for run in self.runs}
+        references = {hands: corrective_trial(self.task, hands) for hands in every}
         changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
         for row, run in zip(changes, self.runs, strict=True):
-            if (reference := references[run.hands]) is not None:
+            if (reference := references[run.hands]).completed:
                 row[:] = np.subtract(run.ticks_by_goal(), reference.ticks_by_goal())
         return changes
-
-
-def corrective(task: Task, hands: str) -> Execution | None:
-    """The corrective process alone with these hands; None where it fails the task."""
-    execution = corrective_trial(task, hands)
-    return execution if execution.completed else None
 
 
 def initial_solution(task: Task) -> Execution | None:
     """The corrective process alone with the task's hands; None where it completes it with none."""
     try:
-        return corrective(task, initial_hands(task))
+        execution = corrective_trial(task, initial_hands(task))
     except NotApplicableError:
         return None
+    return execution if execution.completed else None

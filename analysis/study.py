@@ -70,9 +70,10 @@ UNITS = {
 """Units of columns of :attr:`Study.runs`, which its ``attrs`` have."""
 
 
-def typical_run(cell: CellRuns) -> int:
-    """Index of the solved run whose reward is nearest to their median."""
-    return int(np.abs(cell.rewards - np.median(cell.rewards)).argmin())
+def typical_run(solved: pd.DataFrame) -> str:
+    """Id of the run whose reward is nearest to the median."""
+    rewards = solved.reward.to_numpy(dtype=np.float64)
+    return str(solved.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
 
 Asked = ParamSpec("Asked")

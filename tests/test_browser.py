@@ -1,7 +1,6 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
 import re
-from dataclasses import replace
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -119,9 +118,7 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
             if label:
                 part(page, "stored").select_option(label)
                 good = traced.cells[task, label].good
-                median = good.reward.iloc[
-                    typical_run(replace(traced.cells[task, label], runs=good))
-                ]
+                median = good.set_index("run_id").reward[typical_run(good)]
                 page.wait_for_function(
                     "ticks => document.querySelector('[data-is=score]').innerText.includes(ticks)",
                     arg=f" {-median:.0f} ticks",

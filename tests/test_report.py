@@ -154,7 +154,7 @@ def test_text_from_files_is_escaped():
     seen.feed(render.html_table(frame, "name", HOSTILE))
     assert "script" not in seen.elements
     assert HOSTILE in seen.text
-    latex = render.latex_table(frame, "name", HOSTILE)
+    latex = render.latex_table(frame, "methods", HOSTILE)
     assert "\\input{x}" not in latex
     assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in latex
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex

@@ -15,28 +15,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from coartic import Task
-from coartic.analysis.figures.style import (
-    BACKGROUND,
-    BLUE,
-    GREY,
-    INK,
-    RC,
-    SKY,
-    TIP,
-    Look,
-    looks,
-    styled,
-)
+from coartic.analysis.figures import style
 from coartic.analysis.methods import name_of
 from coartic.analysis.study import Study
 from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
-MAGNIFIED = 1.3
-"""Enlarges figures on the page, so that their 8 pt are as large as its text."""
-PHONE = 320 / 72
-"""Width in inches that a phone shows: it scrolls a figure that is wider."""
 _NO_DATE: Mapping[str, Mapping[str, Any]] = {
     ".pdf": {"CreationDate": None},
     ".svg": {"Date": None},
@@ -78,7 +63,7 @@ def figure(
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> Callable[[Study], Plot | None]:
         @wraps(draw)
-        @styled
+        @style.styled
         def plot(study: Study) -> Plot | None:
             if (parts := draw(study)) is None:
                 return None
@@ -91,9 +76,9 @@ def figure(
     return as_figure
 
 
-def looks_in(study: Study, labels: Collection[str]) -> dict[str, Look]:
+def looks_in(study: Study, labels: Collection[str]) -> dict[str, style.Look]:
     """The look of each method (:func:`~.style.looks`), the same in all figures of a study."""
-    return looks(labels, dict.fromkeys(label for _, label in study.cells))
+    return style.looks(labels, dict.fromkeys(label for _, label in study.cells))
 
 
 def spoken(rows: pd.DataFrame, template: str) -> str:
@@ -109,49 +94,42 @@ def picture(drawing: Figure, ending: str) -> bytes:
     written.
     """
     stream = io.BytesIO()
-    with rc_context(RC):
+    with rc_context(style.RC):
         drawing.savefig(stream, format=ending[1:], dpi=300, metadata=_NO_DATE[ending])
     return stream.getvalue()
 
 
-def for_page(plot: Plot) -> dict[str, Any]:
-    """A figure for the template of the page.
-
-    Keys ``id``, ``title`` and ``caption``; ``svg``, the figure as one ``<svg>`` element; ``width``
-    in rem; ``wide``, whether it is wider than a phone.
+def for_page(plot: Plot) -> str:
+    """A figure as one ``<svg>`` element of the page.
 
     It scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
     one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
     :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
     """
-    stream, inches = io.StringIO(), plot.figure.get_figwidth()
+    stream = io.StringIO()
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    with rc_context({**RC, "svg.fonttype": "none"}):
+    with rc_context({**style.RC, "svg.fonttype": "none"}):
         plot.figure.savefig(stream, format="svg", transparent=True, metadata=none)
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, stream.getvalue())
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
-    text = re.sub(rf' id="{TIP}([^"]*)">', r"><title>\1</title>", text)
+    text = re.sub(rf' id="{style.TIP}([^"]*)">', r"><title>\1</title>", text)
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
     # The backend leaves black fills out: they inherit the root's.
-    text = text.replace(INK, "currentColor").replace(BACKGROUND, "var(--paper, none)")
-    for color, name in ((GREY, "grey"), (BLUE, "blue"), (SKY, "sky")):
+    text = text.replace(style.INK, "currentColor").replace(style.BACKGROUND, "var(--paper, none)")
+    for color, name in ((style.GREY, "grey"), (style.BLUE, "blue"), (style.SKY, "sky")):
         text = text.replace(color, f"var(--{name}, {color})")
     head, body = text.split(">", 1)
     view = re.search(r'viewBox="[^"]*"', head)
     assert view is not None
     # Styles that the backend gives to all elements would apply to the whole page.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", body, flags=re.DOTALL)
-    svg = (
+    return (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
         f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
         'stroke-linecap="butt" fill="currentColor">'
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
-    return {
-        **{"id": plot.id, "title": plot.title, "caption": plot.caption, "svg": svg},
-        **{"wide": inches > PHONE, "width": f"{MAGNIFIED * inches * 72 / 12:.0f}"},
-    }
 
 
 def shorten(attribute: re.Match[str]) -> str:

@@ -7,7 +7,7 @@ white. All are legible on white and on #111; dashes tell what colours tell.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
-from coartic.analysis.methods import KNOWN_METHODS, Color, Dash, is_built_in, look_alike
+from coartic.analysis.methods import KNOWN_METHODS, is_built_in, look_alike
 from coartic.analysis.statistics import estimates
 
 INCH = 25.4  # mm
@@ -38,7 +38,7 @@ COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 BACKGROUND = "#ffffff"
 TIP = "tip:"
 """Beginning of the id of a mark with a :func:`tip`."""
-_COLORS: Mapping[Color, str] = {
+_COLORS = {
     "blue": "#0072b2",
     "sky": "#56b4e9",
     "green": "#009e73",
@@ -52,7 +52,7 @@ BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE, GREY, INK = _COLORS.values()
 BROWN = "#8c564b"
 """Of methods from files: no other has it."""
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
-_DASHES: Mapping[Dash, Any] = {
+_DASHES: dict[str, Any] = {
     "solid": "-",
     "dashed": (0, (4, 1.5)),
     "dotted": (0, (1, 1.2)),

@@ -92,7 +92,8 @@ def sections(study: Study) -> list[dict[str, Any]]:
                 "html": html_table(frame, name, section.caption) if len(frame) else "",
                 "example": f"'{frame.index[0]}'" if len(frame) else "",
                 "finding": about.finding(study, section),
-                "figure": plot and for_page(plot),
+                "figure": plot,
+                "svg": for_page(plot) if plot else "",
             }
             allowed.append(vars(section) | words)
     return allowed

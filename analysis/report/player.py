@@ -6,7 +6,6 @@ or another method answers anew.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from coartic.analysis.methods import LEARNERS, in_order, main_methods, name_of
@@ -76,10 +75,9 @@ def film_of(study: Study, key: CellKey) -> dict[str, Any]:
     has no solution, or one that follows a path."""
     if key not in study.cells or not len(study.cells[key].good):
         return {}
-    cell = replace(study.cells[key], runs=study.cells[key].good[:MOST_EXECUTED])
-    run = str(cell.runs.run_id.iloc[typical_run(cell)])
-    stored = study._movements("solution")
-    if any(movement.kind == "path" for each in cell.runs.run_id for movement in stored[each]):
+    good = study.cells[key].good[:MOST_EXECUTED]
+    run, stored = typical_run(good), study._movements("solution")
+    if any(movement.kind == "path" for each in good.run_id for movement in stored[each]):
         return {}
     movements = [
         {

@@ -165,15 +165,13 @@ def html_table(frame: pd.DataFrame, name: str, caption: str) -> str:
 
 
 def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs; all of a table that has none.
+    """Return the columns of :data:`IN_LATEX` in LaTeX, with booktabs.
 
     A text that is the same in all rows stands in the caption. ``notes`` stand below the table, with
     what a dagger means where there is one.
     """
     columns = columns_of(frame)
-    chosen = [
-        c for want in IN_LATEX.get(name, "*").split(", ") for c in columns if fnmatch(c, want)
-    ]
+    chosen = [c for want in IN_LATEX[name].split(", ") for c in columns if fnmatch(c, want)]
     cells, heads, sides = [], [], ""
     for column in chosen:
         texts, numbers = texts_of(frame, column), is_number(frame[column])

@@ -9,21 +9,18 @@ from typing import Any, NamedTuple
 
 from coartic.analysis.words import number
 
-
-def read_entries(text: str) -> dict[str, dict[str, Any]]:
-    """Entries by id from the text of ``published.toml``, with their tasks and derived values."""
-    tables = tomllib.loads(text).items()
-    entries = {f"{task}.{name}": {"task": task, **of} for task, each in tables
-               for name, of in each.items()}  # fmt: skip
-    for entry in entries.values():
-        if "difference_of" in entry:
-            first, second = (entries[name]["value"] for name in entry["difference_of"])
-            entry["value"] = first - second
-    return entries
-
-
-ENTRIES = read_entries(Path(__file__).with_name("published.toml").read_text("utf-8"))
-"""Every entry by id, in the paper's order of tasks."""
+ENTRIES: dict[str, dict[str, Any]] = {
+    f"{task}.{name}": {"task": task, **entry}
+    for task, entries in tomllib.loads(
+        Path(__file__).with_name("published.toml").read_text("utf-8")
+    ).items()
+    for name, entry in entries.items()
+}
+"""Every entry by id, in the paper's order of tasks, with its task."""
+for _entry in ENTRIES.values():
+    if "difference_of" in _entry:
+        _first, _second = (ENTRIES[name]["value"] for name in _entry["difference_of"])
+        _entry["value"] = _first - _second
 RUNS: int = ENTRIES["general.runs"]["value"]
 """Runs of every experiment."""
 

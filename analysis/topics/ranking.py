@@ -351,8 +351,7 @@ def from_files(study: Study) -> str:
             away = "away" if to == usual else f"from the {to}"
             on = f" on {listed(marked(study.tasks[task]) for task in there)}"
         text += f" {row['method']}, not of this project, ends {number(100 * gap, 1)} % {away}{on}"
-        text += fewer_trials(study, row["method"])
-        text += beside_learner(study, row) + "."
+        text += f"{beside_learner(study, row)}."
     more = len(rows) - MOST_FOREIGN
     text += f" And {more} more in the ranking." if more > 0 else ""
     for task, label in study.cells:
@@ -361,40 +360,33 @@ def from_files(study: Study) -> str:
     return text
 
 
-def fewer_trials(study: Study, method: str) -> str:
-    """The trials of a method that learns where the learner made another number of them."""
-    cells = scores.compared(study)[method]
-    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
-    beside = [study.cells[key] for key in keys if key in study.cells]
-    if not beside or scores.groups(study)[method] != scores.BY_TRIAL:
-        return ""
-    own, learner = (
-        max((made for each in of for made in each.runs.trials.dropna()), default=0)  # none: crashed
-        for of in (cells.values(), beside)
-    )
-    if learner in (0, own):
-        return ""
-    return f" with {number(own)} trials (the learner: {number(learner)})"
-
-
 def beside_learner(study: Study, row: Mapping[Any, Any]) -> str:
-    """The part of a sentence on whether a method of the ranking is better than the learner."""
+    """The part of a sentence on a method of the ranking beside the learner: its trials, where it
+    learns and the learner made another number of them, and whether it is better."""
+    text, cells = "", scores.compared(study)[row["method"]]
+    keys = [(task, methods.most_exploring(study.tasks[task])) for task in cells]
+    learners = [study.cells[key] for key in keys if key in study.cells]
+    own, others = (
+        max((made for each in of for made in each.runs.trials.dropna()), default=0)  # none: crashed
+        for of in (cells.values(), learners)
+    )
+    if row["knows"] == scores.BY_TRIAL and others not in (0, own):
+        text = f" with {number(own)} trials (the learner: {number(others)})"
     tests = list_against_learner(study)
     tests = tests[tests.method == row["method"]]
-    tasks, too_few = len(tests), " (the runs are too few, or too alike, for a test)"
-    tested = not math.isnan(row["better"])
+    tasks, tested = len(tests), not math.isnan(row["better"])
     if not tasks:
-        return ""
+        return text
     if tasks == 1:
         reward, learner, p = tests[["reward", "learner", "p_holm"]].iloc[0]
-        text = f"; its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
-        return text + (f" ({p_value(p)})" if tested else too_few)
-    if not tested:
+        text += f"; its mean reward is {number(reward, 1)}, the learner's {number(learner, 1)}"
+        text += f" ({p_value(p)})" * tested
+    elif not tested:
         higher = sum(tests.reward > tests.learner)
-        text = f"; its mean reward is higher than the learner's on {higher} of {tasks} tasks"
-        return text + too_few
-    if row["better"] or row["worse"]:
-        better = counted(int(row["better"]), "task")
-        worse = number(row["worse"])
-        return f"; significantly better than the learner on {better} and worse on {worse}"
-    return f"; not significantly different from the learner on any of {tasks} tasks"
+        text += f"; its mean reward is higher than the learner's on {higher} of {tasks} tasks"
+    elif row["better"] or row["worse"]:
+        better, worse = counted(int(row["better"]), "task"), number(row["worse"])
+        text += f"; significantly better than the learner on {better} and worse on {worse}"
+    else:
+        text += f"; not significantly different from the learner on any of {tasks} tasks"
+    return text + " (the runs are too few, or too alike, for a test)" * (not tested)

@@ -13,16 +13,8 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from coartic.analysis.methods import (
-    EC1,
-    EC3,
-    EC4,
-    LEARNER,
-    TOGETHER,
-    is_search,
-    is_setting,
-    name_of,
-)
+from coartic.analysis import methods
+from coartic.analysis.methods import EC1, EC3, EC4, is_search, is_setting, name_of
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
 from coartic.analysis.settings import compares_settings
 from coartic.analysis.statistics.estimates import standard_deviation
@@ -96,7 +88,7 @@ def labels_by_task(study: Study) -> dict[str, dict[str, str]]:
         two_armed = by_method.get(more, {})
         elsewhere = {task: label for task, label in one_armed.items() if task not in two_armed}
         if two_armed and elsewhere:
-            together = f"{TOGETHER}EC1, {more.removeprefix(LEARNER)})"
+            together = f"{methods.TOGETHER}EC1, {more.removeprefix(methods.LEARNER)})"
             by_method[together] = elsewhere | two_armed
     return by_method
 
@@ -246,5 +238,5 @@ def list_methods(study: Study) -> Rows:
             "solve_s": solve_times(good).astype(float).median(),
         }
         if len(good):
-            row["median_run"] = str(good.run_id.iloc[typical_run(cell)])[:SHORT_ID]
+            row["median_run"] = typical_run(good)[:SHORT_ID]
         yield f"{cell.task} {cell.label}", row | runs_of(cell)
