@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from coartic.analysis.claims import verdicts
+from coartic.analysis.claims import judgements
 from coartic.analysis.figures.plot import Plot
 from coartic.analysis.study import Study
 from coartic.analysis.topics import (
@@ -94,9 +94,9 @@ SECTIONS = (
         "claims",
         "Claims",
         "Do the paper's claims hold?",
-        table=verdicts.list_claims,
+        table=judgements.list_claims,
         caption="Claims",
-        sentence=verdicts.claims_hold,
+        sentence=judgements.claims_hold,
         answer="Paper",
         note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
         "goals that it does not print: the third column says in how many of the sets of goals that "

@@ -21,15 +21,6 @@ from coartic.runs.plan import Cell, Plan, hash_of, trials_in
 from coartic.tasks.families import own_families
 from coartic.tasks.task import check_task
 
-LIMITS = {
-    "runs": (1, MOST_RUNS),
-    "trials": (1, MOST_TRIALS),
-    "seed": (0, MOST_SEED),
-    "trial_budget": (1, MOST_TRIALS),
-    "time_limit_s": (1e-3, MOST_SECONDS),
-}
-"""Least and greatest value of options that are numbers; whole ones where the least value is."""
-
 
 def plan_suite(
     suite: str | Path | Suite,
@@ -87,12 +78,17 @@ def plan_suite(
         if not all(isinstance(item, kinds) for item in names):
             what = "names, paths or tasks" if name == "tasks" else "names or paths"
             raise CoarticError(f"{name} is {brief_value(names)}; it must be a list of {what}")
-    numbers = {"runs": runs, "trials": trials, "trial_budget": trial_budget}
+    numbers = {
+        "runs": (runs, 1, MOST_RUNS),
+        "trials": (trials, 1, MOST_TRIALS),
+        "trial_budget": (trial_budget, 1, MOST_TRIALS),
+        "time_limit_s": (time_limit_s, 1e-3, MOST_SECONDS),
+    }
     try:
-        check_limits("seed", seed, *LIMITS["seed"])
-        for name, number in (numbers | {"time_limit_s": time_limit_s}).items():
+        check_limits("seed", seed, 0, MOST_SEED)
+        for name, (number, least, most) in numbers.items():
             if number is not None:
-                check_limits(name, number, *LIMITS[name])
+                check_limits(name, number, least, most)
     except ValueError as error:
         raise CoarticError(str(error)) from None
     if not isinstance(suite, Suite):

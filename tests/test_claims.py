@@ -11,9 +11,14 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.analysis.claims import verdicts
 from coartic.analysis.claims.claim import Claim, Higher, all_higher
-from coartic.analysis.claims.judgements import CLAIMS, counts, judge_claims, judgements
+from coartic.analysis.claims.judgements import (
+    CLAIMS,
+    counts,
+    judge_claims,
+    judgements,
+    verdicts_in_words,
+)
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, some_of
 from coartic.analysis.claims.reader import Measurement, MissingError
@@ -111,9 +116,9 @@ def test_claims_are_counted_by_verdict():
     ).set_axis(["context", "rail", "overall-reward", "ec4-mixed"])
     numbers = {"supported": 1, "not supported": 1, "undecided": 2, "depends on the goals": 0}
     assert counts(entries.verdict) == numbers
-    half = verdicts.verdicts_in_words(entries)
+    half = verdicts_in_words(entries)
     assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
-    assert verdicts.verdicts_in_words(entries[:-1]).startswith(
+    assert verdicts_in_words(entries[:-1]).startswith(
         "Central claims: supported 1, undecided 1.\nSupported: the posture depends"
     )
 

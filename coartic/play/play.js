@@ -241,6 +241,9 @@ class Play {
     const ghost = this.movers.length < 2 && this.state.who !== "alone";
     if (ghost) this.movers.unshift(new Mover(this.problems[0], this.alone[0], "ghost"));
     this.plan = this.problems.map((_, k) => (this.stale || !this.fresh.has(`${k} far`) ? null : this.snapshot(`${k} far`, Infinity)));
+    const meets = (mover) => (this.main.length > 1 && mover.hits[this.shared]) || 0;
+    this.meeting = Math.max(...this.main.map(meets));
+    this.movers.forEach((mover) => Object.assign(mover, { meets: meets(mover), waits: this.meeting - meets(mover) }));
     this.refresh();
   }
 
@@ -254,31 +257,22 @@ class Play {
     return this.movers.filter((mover) => mover.role !== "ghost");
   }
 
-  get meeting() {
-    return this.main.length > 1 ? Math.max(...this.main.map((mover) => mover.hits[this.shared] || 0)) : 0;
-  }
-
   get tick() {
     const { tick } = this.state;
     return tick < 0 ? this.meeting || this.stops[0] || 0 : Math.min(tick, this.last);
   }
 
-  row(mover) {
-    const { tick } = this;
-    if (this.main.length < 2) return Math.min(tick, mover.last);
-    const hit = mover.hits[this.shared] || 0;
-    return tick <= this.meeting ? Math.min(tick, hit) : Math.min(hit + tick - this.meeting, mover.last);
+  row({ meets, waits, last }) {
+    return this.tick <= this.meeting ? Math.min(this.tick, meets) : Math.min(this.tick - waits, last);
   }
 
   get last() {
-    const { meeting } = this;
-    return Math.max(...this.movers.map((mover) => (meeting ? mover.last - (mover.hits[this.shared] || 0) + meeting : mover.last)));
+    return Math.max(...this.movers.map(({ last, waits }) => last + waits));
   }
 
   /* Ticks at which a playing film holds. */
   get stops() {
-    const { meeting } = this;
-    const stops = this.main.flatMap((mover) => mover.hits.map((hit) => (meeting ? hit - mover.hits[this.shared] + meeting : hit)));
+    const stops = this.main.flatMap(({ hits, waits }) => hits.map((hit) => hit + waits));
     return [...new Set(stops)].sort((a, b) => a - b);
   }
 
@@ -347,7 +341,7 @@ class Play {
         hit: mover.hits[g] !== undefined && mover.hits[g] <= this.row(mover),
       });
     }));
-    const stands = (mover, look) => stage.robot(mover.problem, mover.rows[mover.hits[this.shared] || 0], { colour: colours[mover.role], ...look });
+    const stands = (mover, look) => stage.robot(mover.problem, mover.rows[mover.meets], { colour: colours[mover.role], ...look });
     if (this.editing) {
       this.main.slice(1).forEach((mover) => stands(mover, { alpha: 0.5 }));
       this.postures.forEach(({ q }, g) => stage.robot(this.problems[0], q, {
