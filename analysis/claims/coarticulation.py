@@ -180,7 +180,6 @@ CLAIMS_OF_COARTICULATION = [
         "the initial solution, it takes longer than in guesses and in the learner rewarded "
         "by subtask, and the whole task is faster",
         judge=first_movement_sacrificed,
-        group="beside",
         short="the first movement is sacrificed",
     ),
     Claim(
@@ -193,7 +192,6 @@ CLAIMS_OF_COARTICULATION = [
         "apart than those of guesses and of the learner rewarded by subtask. For the opposite: "
         "fewer than 5 % of bootstrap samples are, or one of the others lies further apart",
         judge=posture_depends_on_context,
-        group="beside",
         short="the posture depends on the next goal",
     ),
     Claim(
@@ -206,7 +204,6 @@ CLAIMS_OF_COARTICULATION = [
         "for each subtask, both by what they learned (noiseless replay): it earns more, and its "
         "first movement takes more than 1 tick longer",
         judge=overall_reward,
-        group="beside",
         short="the reward for the whole task makes the difference",
     ),
     Claim(
@@ -222,7 +219,6 @@ CLAIMS_OF_COARTICULATION = [
         "and, under EC4, in the learner rewarded by subtask. The waiting arm is where it "
         "was before the movement. Mean over the goals of a run that others follow",
         judge=arm_coarticulation,
-        group="beside",
         fitted=True,
         sets="224 of 242 (Two-armed 1, refuted in 6); 131 of 240 (Two-armed 2, refuted in 44)",
     ),
@@ -237,7 +233,6 @@ CLAIMS_OF_COARTICULATION = [
         "in guesses and in the learner rewarded by subtask; mean over "
         "the goals of a run",
         judge=other_arm_coarticulation,
-        group="beside",
         fitted=True,
         sets="240 of 242 (Two-armed 1)",
     ),
@@ -251,7 +246,6 @@ CLAIMS_OF_COARTICULATION = [
         judge=lambda read: all_higher(
             Higher(read.replay(task, EC4), read.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
         ),
-        group="beside",
         fitted=True,
     ),
     Claim(
@@ -266,7 +260,6 @@ CLAIMS_OF_COARTICULATION = [
         "number). For the opposite: under each condition fewer than 25% of the runs do (exact "
         "binomial tests)",
         judge=slower_hands_are_chosen,
-        group="beside",
         fitted=True,
     ),
 ]

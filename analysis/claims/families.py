@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 from coartic.analysis.claims import margins
 from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_fails
@@ -88,18 +89,19 @@ def every_trial_completes(read: Reader) -> Finding:
     return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])
 
 
-TEST_OF_FAMILIES = (
-    "one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
-    "known reward, in each family"
+on_families = partial(
+    Claim,
+    test="one-tailed bootstrap tests over instances of the mean difference, as a share of the best "
+    "known reward, in each family",
+    group="families",
 )
 
 CLAIMS_ON_FAMILIES = [
-    Claim(
+    on_families(
         id="learning-improves-in-general",
         text="In every family of random tasks learning improves on the initial solution.",
         place="Results, Summary of Two-Armed Task Results",
         quote="each bar is significantly higher than the bar to its left",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: in_every_family(
             read,
             EVERY_FAMILY,
@@ -110,62 +112,51 @@ CLAIMS_ON_FAMILIES = [
                 ),
             ),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="proficiency-rises-in-general",
         text="In every family with two arms reward rises when more is explored: EC3 is better than "
         "EC2, and EC4 better than EC3.",
         place="Method, Experiments",
         quote="proficiency would increase as the number of levels",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC3, EC2), (EC4, EC3)),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="random-hands-pay-in-general",
         text="In every family with two arms it is better to try hands at random than to try the "
         "closest one: EC4 is better than EC2.",
         place="Results, Exploration Condition 2",
         quote="did not produce enough exploration to reliably find a better",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC2)),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="other-arm-pays-in-general",
         text="In every family with two arms moving the other arm as well is better: EC4 beats EC3.",
         place="Results, Exploration Condition 4",
         quote="but performance increased",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC3)),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="beats-exhaustive-in-general",
         text="In every family with two arms EC3 is better than trying every hand sequence with the "
         "corrective process alone.",
         place="Results, Exploration Condition 3",
         quote="the overall performance with exploration at AModChosen and DASel was better",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: in_every_family(
             read,
             OF_TWO_ARMS,
             (" EC3 > best", lambda task: Higher(read.reward(task, EC3), read.best(task))),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="beats-inaccurate-in-general",
         text="On random tasks for one arm the learner finds better movements than a planner whose "
         "objective is not the reward (minimum jerk).",
         place="Discussion, Implications of Using a Simple Learning Process",
         quote="movements can be found (if they exist) that deliver better consequences",
-        test=TEST_OF_FAMILIES,
         judge=lambda read: earns_more(read, OF_ONE_ARM, (EC1, JERK)),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="first-movement-sacrificed-in-general",
         text="On random tasks for one arm the first movement gets slower than in the initial "
         "solution while the whole task gets faster.",
@@ -181,9 +172,8 @@ CLAIMS_ON_FAMILIES = [
             shows(read, "first", beyond=GUESSES),
             shows(read, "whole"),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="hand-coarticulation-in-general",
         text="In every family with two arms coarticulation shows in the choice of hand: goals that "
         "others follow are hit with the slower hand for that goal alone more often where hands are "
@@ -198,9 +188,8 @@ CLAIMS_ON_FAMILIES = [
             shows(read, "hand", beyond=EC2),
             shows(read, "hand", beyond=GUESSES),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="arm-coarticulation-in-general",
         text="In every family learned postures of base and chosen arm leave the next goal nearer "
         "(the waiting arm is left out).",
@@ -217,9 +206,8 @@ CLAIMS_ON_FAMILIES = [
             shows(read, "arm", by=margins.TICKS),
             shows(read, "arm", beyond=GUESSES),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="other-arm-coarticulation-in-general",
         text="In every family with two arms the waiting arm brings its hand nearer to its own next "
         "goal under EC4.",
@@ -234,9 +222,8 @@ CLAIMS_ON_FAMILIES = [
             shows(read, "other arm"),
             shows(read, "other arm", beyond=GUESSES),
         ),
-        group="families",
     ),
-    Claim(
+    on_families(
         id="corrective-ensures-in-general",
         text="In every family the corrective process completes every trial of the learner.",
         place="Method, The Corrective Process; Discussion, Multiple Controller Schemes",

@@ -328,6 +328,7 @@ def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
             "movements in the first tenth of the trials than in the last. Trial 0 does not count, "
             "as it has no others by construction",
             judge=partial(corrected_less_later, cells=cells),
+            group="paper",
             fitted=fitted,
             sets="0 of 242 (Two-armed 1, refuted in 242); 0 of 240 (Two-armed 2, refuted in 231)"
             * fitted,
@@ -342,7 +343,6 @@ def on_either_kind(which: str, cells: Cells, best: str) -> list[Claim]:
             test="one-tailed bootstrap tests against plans for smoothness (free times); at least "
             "one of them holds, the smallest p times their number (Bonferroni)",
             judge=partial(beats_smooth_plans, tasks=tasks, label=best),
-            group="beside",
             fitted=fitted,
         ),
     ]
@@ -369,7 +369,6 @@ CLAIMS_OF_THE_PAPER = [
         judge=lambda read: all_higher(
             Higher(resemblance(read, task), by=margins.HALFWAY) for task in ONE_ARMED
         ),
-        group="beside",
     ),
     Claim(
         id="ec2-sequences",
@@ -379,6 +378,7 @@ CLAIMS_OF_THE_PAPER = [
         quote="in nine of the 20 runs, the learned solution continued to use",
         test=HALF,
         judge=partial(half_find, task=TASK_1, label=EC2, hands="RRLR"),
+        group="paper",
         fitted=True,
         sets="9 of 242 (Two-armed 1, refuted in 192)",
         depends=True,
@@ -392,6 +392,7 @@ CLAIMS_OF_THE_PAPER = [
         test="exact binomial test that more than 75% of the runs that learned RRLR do so (the "
         "paper shows one)",
         judge=no_reversal,
+        group="paper",
         fitted=True,
         sets="2 of 242 (Two-armed 1, refuted in 84)",
         depends=True,
@@ -404,6 +405,7 @@ CLAIMS_OF_THE_PAPER = [
         quote="in about half the runs of two-armed task 2",
         test=HALF,
         judge=partial(half_find, task=TASK_2, label=EC3, hands="RLRR"),
+        group="paper",
         fitted=True,
         sets="0 of 240 (Two-armed 2, refuted in 237)",
         depends=True,
@@ -429,6 +431,7 @@ CLAIMS_OF_THE_PAPER = [
         quote="each bar is significantly higher than the bar to its left",
         test=TEST_OF_MEANS,
         judge=proficiency_rises,
+        group="paper",
         fitted=True,
         sets="130 of 242 (Two-armed 1, refuted in 50); 7 of 240 (Two-armed 2, refuted in 201)",
         depends=True,
@@ -442,7 +445,6 @@ CLAIMS_OF_THE_PAPER = [
         test="exact binomial tests under EC3: with the base on its rail more than 75% of the runs "
         "have the commonest sequence, and with the base free fewer do",
         judge=rail,
-        group="beside",
         fitted=True,
     ),
     Claim(
@@ -455,7 +457,6 @@ CLAIMS_OF_THE_PAPER = [
         judge=lambda read: all_higher(
             Higher(read.reward(task, EC3), read.reward(task, EC1)) for task in TWO_ARMED
         ),
-        group="beside",
         fitted=True,
     ),
     *on_either_kind("two", CELLS_OF_TWO_ARMS, best=EC4),
