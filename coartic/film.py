@@ -90,10 +90,8 @@ def write_film(
 
 
 def check_film(path: Path, *, replace: bool = False) -> None:
-    """Raises CoarticError for what cannot be written: before anything is drawn.
-
-    An ending that is not supported, MP4 without ffmpeg, what :func:`check_output` refuses.
-    """
+    """Raises CoarticError, before anything is drawn, for an ending that is not supported, for MP4
+    without ffmpeg, and as :func:`check_output` does."""
     if path.suffix.lower() not in FILMS:
         raise CoarticError(f"{path}: the name must end in {', '.join(FILMS)}")
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():

@@ -209,29 +209,22 @@ class Plan:
 
     def to_rows(self) -> dict[str, list[dict[str, Any]]]:
         """Its rows by table; that of a cell has the row of its specification, not its number."""
-        cells = [
-            {
-                "position": position,
-                "setting": specification.to_row(),
-                "variant": cell.setting,
-                "parameters": cell.parameters,
-                "runs": cell.runs,
-            }
-            for position, (cell, specification) in enumerate(
-                zip(self.cells, self.specifications, strict=True)
-            )
-        ]
+        tasks = self.tasks.items()
         names = [each.name for each in fields(MethodCard) if each.name != "where"]
-        of_methods = [{name: getattr(m, name) for name in names} for m in self.methods.values()]
-        definitions = {
-            specification.task.name: specification.definition
-            for specification in self.specifications
-        }
         return {
             "suite": [{"name": self.suite, **{name: getattr(self, name) for name in _OF_SUITE}}],
-            "tasks": [{"name": name, "definition": d} for name, d in definitions.items()],
-            "methods": of_methods,
-            "cells": cells,
+            "tasks": [{"name": name, "definition": t.model_dump(mode="json")} for name, t in tasks],
+            "methods": [{name: getattr(m, name) for name in names} for m in self.methods.values()],
+            "cells": [
+                {
+                    "position": position,
+                    "setting": self.specifications[position].to_row(),
+                    "variant": cell.setting,
+                    "parameters": cell.parameters,
+                    "runs": cell.runs,
+                }
+                for position, cell in enumerate(self.cells)
+            ],
         }
 
     @classmethod
