@@ -146,7 +146,8 @@ def test_opposites_are_corrected_over_the_claims_too():
 
 def test_groups_are_corrected_apart():
     """A claim that is not judged counts in its group as one with p = 1."""
-    papers = [(found(True, p), {}) for p in (0.02, 0.001)] + [(None, {})]
+    findings = found(True, 0.02), found(True, 0.001), None
+    papers = [(finding, {"group": "paper"}) for finding in findings]
     groups = ("beside", "families") * 4
     others = [(found(True, 0.0001), {"group": group}) for group in groups]
     adjusted = judged(*papers, *others).p_holm.tolist()
