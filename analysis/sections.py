@@ -101,7 +101,8 @@ SECTIONS = (
         note="p is corrected for the number of claims (Holm). Some claims of the paper rest on "
         "goals that it does not print: the third column says in how many of the sets of goals that "
         "fit its text a claim holds. A claim that our goals support, but at most half of these "
-        "sets, depends on the goals. Rewards are those of the best trial of a run; a replay makes "
+        "sets, depends on the goals. Version 1.1.0 judged the sets, without the comparison with "
+        "guesses. Rewards are those of the best trial of a run; a replay makes "
         "what was learned once more, without noise and exploration.",
         single=False,
     ),

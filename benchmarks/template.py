@@ -9,8 +9,8 @@ class Mine(Optimiser):
     """Random steps from the best point."""
 
     name = "NAME"  # its id in commands and tables
-    title = "Random steps from the best point"  # what readers see
-    citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what they cite
+    title = "Random steps from the best point"  # in lists and citations
+    citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what others cite
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Minimise the cost of a trial; this ends when no trial is left; the best counts."""

@@ -80,10 +80,12 @@ def claim(name: str, suite: str = "") -> Row:
     return Row(claims(suite).loc[name])
 
 
-def verdicts(suite: str = "", *, others: bool = False) -> dict[str, int]:
+def verdicts(suite: str = "", *, others: bool = False, printed: bool = False) -> dict[str, int]:
     """How many claims have each verdict; ``others``: without the three that carry the paper's
-    point."""
+    point; ``printed``: that rest on printed goals alone."""
     judged = claims(suite)
+    if printed:
+        judged = judged[~judged.statement.str.contains("†")]
     if others:
         judged = judged[[not CLAIMS[name].short for name in judged.index]]
     counts = judged.verdict.value_counts()

@@ -11,7 +11,9 @@ from coartic.analysis.claims import judging, reader
 from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
+from coartic.analysis.report import about
 from coartic.analysis.study import one_by_one
+from coartic.analysis.topics import random_tasks
 from coartic.analysis.topics.instances import best_of_instances, signatures, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -184,3 +186,14 @@ def test_development_instances_are_not_judged():
     assert set(entries.verdict) == {"undecided"}
     words = "has no instances of two-armed/v1 that can be judged"
     assert words in entries.evidence["other-arm-pays-in-general"]
+
+
+@pytest.mark.parametrize(
+    ("name", "to"),
+    [("two-armed/v1/i000", "best known reward"), ("two-armed/v1/2030-000", "best of this folder")],
+)
+def test_what_only_a_folder_says_is_not_called_known(name, to):
+    runs = (runs_of(name, label, 9 * ALONE, commit="") for label in (EC4, GUESSES))
+    seen = study_of([run for of_label in runs for run in of_label])
+    assert random_tasks.on_random_tasks(seen).startswith(f"Nearest to the {to}: ")
+    assert len(about.limits(seen)["own"]) == (to == "best of this folder")

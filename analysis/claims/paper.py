@@ -84,7 +84,7 @@ def corrective_near_shortest(read: Reader, tasks: Iterable[str]) -> Finding:
         parts.append(f"{name} {each} (in all {ways.sum() / shortest.sum() - 1:.1%})")
     return Finding(
         most <= margins.CLOSE,
-        f"By so much each subtask is longer than the shortest path: {'; '.join(parts)}",
+        f"Excess of each subtask over the shortest path: {'; '.join(parts)}",
     )
 
 

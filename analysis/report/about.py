@@ -10,6 +10,7 @@ from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.sections import SECTIONS, Section
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.published import RUNS
+from coartic.analysis.topics.scores import is_known
 from coartic.analysis.words import NO_BREAK, listed, marked
 from coartic.learner.learning import TRIALS
 from coartic.text import one_line
@@ -57,7 +58,12 @@ def limits(study: Study) -> dict[str, Any]:
         "trials": sorted(trials) if trials != {TRIALS} else [],
         "few": fewest if fewest < RUNS else 0,
         "seed": study.plan.seed,
-        "unproven": [marked(task) for task, best in optima if best and not best.proven],
+        "unproven": [
+            marked(task)
+            for task, best in optima
+            if best and not best.proven and is_known(study, task.name)
+        ],
+        "own": [marked(task) for task, best in optima if best and not is_known(study, task.name)],
         "unknown": [marked(task) for task, best in optima if best is None],
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),

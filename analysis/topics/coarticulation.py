@@ -220,7 +220,7 @@ def next_goal(study: Study) -> str:
         f"{', '.join(filter(None, (runs, p)))})"
     )
     if guesses is not None:
-        text += f", those of guesses {number(guesses.apart, 2)}"
+        text += f", those of {name_of(guesses.method)} {number(guesses.apart, 2)}"
         text += f" ({p_value(beyond)} for the difference)" * (beyond >= 0)
     elif needed:
         text += f". Run method {GUESSES} as well to tell"
@@ -235,4 +235,7 @@ def joints_or_hand(study: Study) -> str:
         return ""
     larger = int((rows.equivalent > rows.other).sum())
     which = f"all {len(rows)}" if larger == len(rows) else f"{larger} of {len(rows)}"
-    return f"In {which} methods the next goal moves the joints more than the hand."
+    return (
+        f"In {which} methods in which the next goal changes the posture, it moves the joints more "
+        "than the hand."
+    )

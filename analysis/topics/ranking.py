@@ -310,7 +310,7 @@ def nearest(study: Study) -> str:
         text = f"{who} comes nearest{f' to the {to}' if 'folder' in to else of} ({gaps[0]})"
     if any(places) and "folder" not in to:
         standing = "last" if places[0] == len(learn) - 1 else f"number {places[0] + 1}"
-        text = f"{who} comes nearest ({gaps[0]}); the learner is {standing}{of} ({gaps[places[0]]})"
+        text = f"{who} comes nearest{of} ({gaps[0]}); the learner is {standing} ({gaps[places[0]]})"
     text = f"{capital(text)}.\nGap of {who} to the {to}: {gap(rows.iloc[0])}"
     if following:
         test = paired_difference(study, *rows.method[:2])

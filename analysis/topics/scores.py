@@ -22,6 +22,7 @@ from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, number, tally
 from coartic.method import Information
+from coartic.tasks.optima import best_shipped
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward of each trial",
@@ -64,10 +65,16 @@ def best_rewards(study: Study) -> dict[str, float]:
     return {task: best[task] for task in study.tasks if task in best}
 
 
+def is_known(study: Study, task: str) -> bool:
+    """Whether more than runs of this folder that search for no optimum tells the best reward."""
+    best = study.optima.get(task)
+    return best is not None and (best.bound or best_shipped(study.tasks[task])) is not None
+
+
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """What gaps on these tasks are to: ``optimum``, ``best known reward``, or ``best of this
     folder`` where no optimum is known."""
-    has_optimum = {task in study.optima for task in tasks}
+    has_optimum = {is_known(study, task) for task in tasks}
     if has_optimum == {True, False}:
         return "best known reward or best of this folder"
     return optimum_in_words(study) if True in has_optimum else "best of this folder"

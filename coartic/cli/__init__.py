@@ -58,7 +58,7 @@ class Command(TyperCommand):
 COMMANDS = (
     (draw.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
-    (run.run, "comparison --methods EC4,CMA-ES --tasks ascending --runs 5 --out results/mine"),
+    (run.run, "comparison --methods EC1,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
     (read.trace, "ranking cma-es/bandit --in results/comparison"),
     (draw.animate, "1a2b3c --in results/quick --initial --out race.gif"),

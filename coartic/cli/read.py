@@ -101,6 +101,9 @@ def trace(
         again = f"coartic report {quote(str(results))}"
         raise CoarticError(f"the report is older than the runs of {results}: {again}")
     say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])
+    if not len(behind):
+        say("No runs stand behind this row.")
+        return
     known = {*registry(), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
