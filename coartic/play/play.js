@@ -493,7 +493,8 @@ class Play {
     if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
-      return [`${saved ? counted(Math.abs(saved), "tick") : "No tick"} ${saved < 0 ? "more" : "fewer"} than one goal at a time.`];
+      const hands = this.problems[0].hands.length > 1 ? ` (hands ${this.alone[0].hands.map((hand) => "LR"[hand]).join("")})` : "";
+      return [`${saved ? counted(Math.abs(saved), "tick") : "No tick"} ${saved < 0 ? "more" : "fewer"} than one goal at a time${hands}.`];
     }
     if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
     if (!difference) return [""];
