@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -21,11 +21,13 @@ OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
-Comparing = tuple[str, Callable[[str], Higher]]
+Comparing = tuple[str, Callable[[Reader, str], Higher]]
 """Words behind the name of a family, and a comparison on a task."""
 
 
-def in_every_family(read: Reader, families: Iterable[str], *comparisons: Comparing) -> Finding:
+def in_every_family(
+    families: Sequence[str], comparisons: Iterable[Comparing], read: Reader
+) -> Finding:
     """Whether comparisons are as claimed in the mean over the instances of each family.
 
     Rewards are in per cent of the best known.
@@ -36,7 +38,7 @@ def in_every_family(read: Reader, families: Iterable[str], *comparisons: Compari
             values = []
             for task, best in reported_instances(read, family).items():
                 with suppress(MissingError):
-                    first, second, margin = compare(task)
+                    first, second, margin = compare(read, task)
                     other = 0.0 if second is None else second.numbers.mean()
                     unit = 1.0 if first.quantity else 100 / abs(best.reward)
                     values.append(unit * float(first.numbers.mean() - other))
@@ -62,24 +64,29 @@ def reported_instances(read: Reader, family: str) -> dict[str, KnownOptimum]:
     return reported
 
 
-def earns_more(read: Reader, families: Iterable[str], *pairs: tuple[str, str]) -> Finding:
-    """Whether the first of each pair of methods earns more."""
+def earns_more(families: Sequence[str], *pairs: tuple[str, str]) -> Callable[[Reader], Finding]:
+    """Judges whether the first of each pair of methods earns more."""
 
     def comparing(first: str, second: str) -> Comparing:
         words = f" {first.removeprefix(LEARNER)} > {second.removeprefix(LEARNER)}"
-        return words, lambda task: Higher(read.reward(task, first), read.reward(task, second))
+        return words, lambda read, task: Higher(read.reward(task, first), read.reward(task, second))
 
-    return in_every_family(read, families, *(comparing(*pair) for pair in pairs))
+    return partial(in_every_family, families, [comparing(*pair) for pair in pairs])
 
 
-def shows(read: Reader, signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
+def shows(signature: str, *, by: float = 0.0, beyond: str = "") -> Comparing:
     """A signature of the learner that explores most, alone or beside that of another method."""
 
-    def compare(task: str) -> Higher:
+    def compare(read: Reader, task: str) -> Higher:
         first = read.signature(signature, task, most_exploring(read.task(task)))
         return Higher(first, read.signature(signature, task, beyond) if beyond else None, by)
 
     return f", more than {who_is(beyond)}" if beyond else "", compare
+
+
+def improvement(read: Reader, task: str) -> Higher:
+    """What was learned beside the initial solution."""
+    return Higher(read.replay(task, most_exploring(read.task(task))), read.initial(task))
 
 
 def every_trial_completes(read: Reader) -> Finding:
@@ -102,16 +109,7 @@ CLAIMS_ON_FAMILIES = [
         text="In every family of random tasks learning improves on the initial solution.",
         place="Results, Summary of Two-Armed Task Results",
         quote="each bar is significantly higher than the bar to its left",
-        judge=lambda read: in_every_family(
-            read,
-            EVERY_FAMILY,
-            (
-                " replay EC > initial",
-                lambda task: Higher(
-                    read.replay(task, most_exploring(read.task(task))), read.initial(task)
-                ),
-            ),
-        ),
+        judge=partial(in_every_family, EVERY_FAMILY, [(" replay EC > initial", improvement)]),
     ),
     on_families(
         id="proficiency-rises-in-general",
@@ -119,7 +117,7 @@ CLAIMS_ON_FAMILIES = [
         "EC2, and EC4 better than EC3.",
         place="Method, Experiments",
         quote="proficiency would increase as the number of levels",
-        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC3, EC2), (EC4, EC3)),
+        judge=earns_more(OF_TWO_ARMS, (EC3, EC2), (EC4, EC3)),
     ),
     on_families(
         id="random-hands-pay-in-general",
@@ -127,14 +125,14 @@ CLAIMS_ON_FAMILIES = [
         "closest one: EC4 is better than EC2.",
         place="Results, Exploration Condition 2",
         quote="did not produce enough exploration to reliably find a better",
-        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC2)),
+        judge=earns_more(OF_TWO_ARMS, (EC4, EC2)),
     ),
     on_families(
         id="other-arm-pays-in-general",
         text="In every family with two arms moving the other arm as well is better: EC4 beats EC3.",
         place="Results, Exploration Condition 4",
         quote="but performance increased",
-        judge=lambda read: earns_more(read, OF_TWO_ARMS, (EC4, EC3)),
+        judge=earns_more(OF_TWO_ARMS, (EC4, EC3)),
     ),
     on_families(
         id="beats-exhaustive-in-general",
@@ -142,10 +140,10 @@ CLAIMS_ON_FAMILIES = [
         "corrective process alone.",
         place="Results, Exploration Condition 3",
         quote="the overall performance with exploration at AModChosen and DASel was better",
-        judge=lambda read: in_every_family(
-            read,
+        judge=partial(
+            in_every_family,
             OF_TWO_ARMS,
-            (" EC3 > best", lambda task: Higher(read.reward(task, EC3), read.best(task))),
+            [(" EC3 > best", lambda read, task: Higher(read.reward(task, EC3), read.best(task)))],
         ),
     ),
     on_families(
@@ -154,7 +152,7 @@ CLAIMS_ON_FAMILIES = [
         "objective is not the reward (minimum jerk).",
         place="Discussion, Implications of Using a Simple Learning Process",
         quote="movements can be found (if they exist) that deliver better consequences",
-        judge=lambda read: earns_more(read, OF_ONE_ARM, (EC1, JERK)),
+        judge=earns_more(OF_ONE_ARM, (EC1, JERK)),
     ),
     on_families(
         id="first-movement-sacrificed-in-general",
@@ -165,12 +163,10 @@ CLAIMS_ON_FAMILIES = [
         test="one-tailed bootstrap tests over instances, against the corrective process with the "
         "same hands: the first movement takes more than 1 tick longer, and longer than in "
         "guesses; the whole task is faster",
-        judge=lambda read: in_every_family(
-            read,
+        judge=partial(
+            in_every_family,
             OF_ONE_ARM,
-            shows(read, "first", by=margins.TICKS),
-            shows(read, "first", beyond=GUESSES),
-            shows(read, "whole"),
+            [shows("first", by=margins.TICKS), shows("first", beyond=GUESSES), shows("whole")],
         ),
     ),
     on_families(
@@ -182,11 +178,8 @@ CLAIMS_ON_FAMILIES = [
         quote="Coarticulation was seen in terms of which arm was used",
         test="one-tailed bootstrap tests over instances, in each family, of the difference of the "
         "shares of such goals, and of that to guesses",
-        judge=lambda read: in_every_family(
-            read,
-            OF_TWO_ARMS,
-            shows(read, "hand", beyond=EC2),
-            shows(read, "hand", beyond=GUESSES),
+        judge=partial(
+            in_every_family, OF_TWO_ARMS, [shows("hand", beyond=EC2), shows("hand", beyond=GUESSES)]
         ),
     ),
     on_families(
@@ -200,11 +193,10 @@ CLAIMS_ON_FAMILIES = [
         "sooner than from the posture in which it would itself have hit the goal, and by more "
         "ticks than in guesses. On both sides the waiting arm is "
         "where it was before the movement. EC1 on one arm, EC4 on two; mean over goals",
-        judge=lambda read: in_every_family(
-            read,
+        judge=partial(
+            in_every_family,
             EVERY_FAMILY,
-            shows(read, "arm", by=margins.TICKS),
-            shows(read, "arm", beyond=GUESSES),
+            [shows("arm", by=margins.TICKS), shows("arm", beyond=GUESSES)],
         ),
     ),
     on_families(
@@ -216,11 +208,8 @@ CLAIMS_ON_FAMILIES = [
         test="one-tailed bootstrap tests over instances, in each family, that the hand of the "
         "waiting arm gets nearer (0 where it keeps still; runs with both hands), and nearer than "
         "in guesses",
-        judge=lambda read: in_every_family(
-            read,
-            OF_TWO_ARMS,
-            shows(read, "other arm"),
-            shows(read, "other arm", beyond=GUESSES),
+        judge=partial(
+            in_every_family, OF_TWO_ARMS, [shows("other arm"), shows("other arm", beyond=GUESSES)]
         ),
     ),
     on_families(
