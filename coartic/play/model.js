@@ -451,8 +451,8 @@ const EQUALLY_NEAR = 1e-9;
 
 /* coartic/learner/kernel.py */
 class Learner {
-  constructor(problem, rules, seed, first_hands = initial_hands(problem)) {
-    Object.assign(this, { problem, rules, first_hands });
+  constructor(problem, rules, seed) {
+    Object.assign(this, { problem, rules, first_hands: initial_hands(problem) });
     this.rng = new Generator(seed);
     this.trials = 0;
     this.best = null;
@@ -766,14 +766,14 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
   return { corners, length, hands };
 }
 
-/* The best of such paths over hand sequences, from the corrective process's postures and others. */
-function shortest_plan(problem, q, from, to, starts) {
+/* The best of such paths over hand sequences, from the corrective process's postures and seven others. */
+function shortest_plan(problem, q, from, to) {
   const window = { ...problem, goals: problem.goals.slice(from, to), start: q };
   const rng = new Generator(from);
   let plans = [];
   hand_sequences(window).forEach((hands) => {
     const alone = corrective_trial(window, hands);
-    for (let n = 0; alone.going && n < starts; n += 1) {
+    for (let n = 0; alone.going && n < 8; n += 1) {
       const spread = n ? 0.6 : 0;
       const guess = alone.reached.map((posture) => posture.map((value) => value + (spread && spread * rng.standard_normal())));
       problem.free.forEach((free, axis) => { if (!free) guess.forEach((posture) => { posture[axis] = q[axis]; }); });
@@ -789,13 +789,13 @@ function shortest_plan(problem, q, from, to, starts) {
 const THROUGH = 0.06; // in joint space
 
 /* coartic/baselines/receding_horizon.py: `horizon` goals in view beyond the one to be hit. */
-function receding_horizon(problem, horizon, starts = 8) {
+function receding_horizon(problem, horizon) {
   const trial = new Trial(problem);
   const count = problem.goals.length;
   while (trial.going && trial.reached.length < count) {
     const goal = trial.reached.length;
     const end = Math.min(goal + horizon + 1, count);
-    const plan = shortest_plan(problem, trial.q, goal, end, starts);
+    const plan = shortest_plan(problem, trial.q, goal, end);
     if (!plan) trial.going = false;
     else {
       const followed = end < count ? 1 : end - goal;

@@ -239,8 +239,6 @@ class Run:
         Raises ValueError where it is not the run of its id.
         """
         made_trials = row["trials"] is not None
-        times = {each.name: row[each.name] for each in fields(Times)}
-        warm = None if row["warm"] is None else bool(row["warm"])
         run = cls(
             **{name: row[name] for name in _AS_THEY_ARE},
             specification=specification,
@@ -253,7 +251,7 @@ class Run:
             },
             rewards=rewards,
             meter=Meter(**{name: row[name] for name in vars(Meter())}) if made_trials else None,
-            times=Times(**times | {"warm": warm}),
+            times=Times(**{each.name: row[each.name] for each in fields(Times)}),
             bound=row["proven_bound"],
             used=tuple(filter(None, row["used"].split(", "))),
             details=json.loads(row["details"]),
