@@ -33,20 +33,14 @@ INITIAL = "corrective-alone/given"
 
 
 class KnownMethod(NamedTuple):
-    """A built-in method's row."""
+    """A built-in method's row; ``methods.toml`` explains the fields."""
 
     name: str
-    """Its one name, in figures, tables and sentences."""
     algorithm: str
-    """Its algorithm, of which a ranking shows the best form."""
     works: Sequence[str]
-    """Keys of ``references.bib``, the most telling first; none for this software's own."""
     look: Sequence[str] | None = None
-    """Colour and dash in all figures; None: one that is free."""
     headline: bool = False
-    """Whether it stands for its algorithm where no methods are named."""
     solvers: Sequence[str] = ()
-    """Keys of the works behind what poses and solves its programmes."""
 
 
 KNOWN_METHODS = {

@@ -1,9 +1,4 @@
-"""The optimum of each task: the best known reward and the proven bound.
-
-What is shipped is in :mod:`coartic.tasks.optima`. Searches for the optimum in a results folder of
-the user's own count as well, so a table for the user's own task has gaps as soon as the task's
-optimum is among its runs.
-"""
+"""The optimum of each task: the best known reward and the proven bound."""
 
 from __future__ import annotations
 

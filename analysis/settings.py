@@ -13,15 +13,14 @@ from coartic.analysis.study import Study, cached
 @cached
 def varied(study: Study) -> dict[str, list[str]]:
     """Parameters of each method that have several values on one task, by method."""
-    values: dict[tuple[str, str], dict[str, set[str]]] = {}
+    values: dict[tuple[str, str, str], set[str]] = {}
+    several: dict[str, list[str]] = {cell.method.name: [] for cell in study.plan.cells}
     for cell in study.plan.cells:
-        of_task = values.setdefault((cell.method.name, cell.task.name), {})
         for key, value in cell.complete.items():
-            of_task.setdefault(key, set()).add(repr(value))
-    several: dict[str, list[str]] = {}
-    for (method, _), of_task in values.items():
-        names = several.setdefault(method, [])
-        names += [key for key, seen in of_task.items() if len(seen) > 1 and key not in names]
+            values.setdefault((cell.method.name, cell.task.name, key), set()).add(repr(value))
+    for (method, _, key), seen in values.items():
+        if len(seen) > 1 and key not in several[method]:
+            several[method].append(key)
     return several
 
 

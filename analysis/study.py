@@ -306,11 +306,12 @@ class Study:
 
 
 @cached
-def one_by_one(study: Study) -> set[str]:
-    """Names of the tasks that a report has one by one.
+def one_by_one(study: Study) -> dict[str, Task]:
+    """The tasks that a report has one by one, by name.
 
     All, but no instances of families, if these are more than eight. A changed task has the name of
     its task before the first dot.
     """
     drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
-    return set(study.tasks) - (drawn if len(drawn) > 8 else set())
+    left_out = drawn if len(drawn) > 8 else ()
+    return {name: task for name, task in study.tasks.items() if name not in left_out}

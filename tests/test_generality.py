@@ -12,9 +12,11 @@ from coartic.analysis.claims.families import CLAIMS_ON_FAMILIES
 from coartic.analysis.claims.judgements import CLAIMS, judge_claims, judgements
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, INITIAL
 from coartic.analysis.report import about
+from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.study import one_by_one
 from coartic.analysis.topics import random_tasks
-from coartic.analysis.topics.instances import best_of_instances, signatures, solved
+from coartic.analysis.topics.guesses import signature_of
+from coartic.analysis.topics.instances import best_of_instances, solved
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import made, row, study_of
@@ -118,7 +120,10 @@ def made_up_signatures(study, hand=1.0, waiting=0.3, guessed=0.5):
 
 def with_signatures(study, **values):
     """A study whose runs are not executed: their signatures are made up."""
-    study._computed[signatures.__wrapped__, (), ()] = made_up_signatures(study, **values)
+    for cell, of_cell in made_up_signatures(study, **values).items():
+        for name in SIGNATURES:
+            made_up = signature_of.__wrapped__, (name, *cell), ()
+            study._computed[made_up] = of_cell.get(name, np.empty(0))
     return study
 
 
@@ -156,10 +161,11 @@ def test_hands_are_learned_where_they_differ_from_the_closest():
     )
 
     def verdict(more):
-        for (task, label), values in signatures(study).items():
+        for task, label in study.cells:
             if label in (EC2, EC4):
                 shift = (more + 0.01 * int(task[-1])) * (label == EC4)
-                values["hand"] = np.array([0.4, 0.6]) + shift
+                made_up = signature_of.__wrapped__, ("hand", task, label), ()
+                study._computed[made_up] = np.array([0.4, 0.6]) + shift
         return judge_claims(study, [CLAIMS["hand-coarticulation-in-general"]]).verdict.iloc[0]
 
     assert [verdict(more) for more in (0.1, -0.2, -0.02)] == [

@@ -22,7 +22,7 @@ from coartic.analysis.signatures.two_contexts import (
     movable,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.topics import coarticulation, guesses, instances
+from coartic.analysis.topics import coarticulation, guesses
 from coartic.robot import HANDS
 from tests.support.made_up import made, row, study_of
 from tests.support.strategies import AS_RELEASED, changed, tiny_task
@@ -392,7 +392,7 @@ def test_the_guesses_that_show_most_of_a_signature_count():
     ))  # fmt: skip
     assert guesses.guesses_on(study, "ascending") == [GUESSES, drawn]
     assert guesses.guesses_beside(study, coarticulation.shared_goal(study)).method == GUESSES
-    assert list(guesses.most_guessed(study, "ascending", "first")) == [2, 2, 2]
+    assert list(guesses.most_guessed(study, "first", "ascending")) == [2, 2, 2]
     assert not guesses.selects(study, drawn)
 
 
@@ -405,9 +405,9 @@ def test_of_a_family_one_width_counts():
         for label, slower in ((GUESSES, (9, -7)), (drawn, (3, 3)))
         for more in [[slower[number]] + [0] * (len(task.goals) - 1)]
     ]
-    shown = instances.signatures(study_with(*cells))
-    for cell in cells:
-        assert shown[cell.task.name, GUESSES]["first"].tolist() == [3]
+    study = study_with(*cells)
+    for name in study.tasks:
+        assert guesses.most_guessed(study, "first", name).tolist() == [3]
 
 
 def test_p_of_shared_goals_is_corrected_by_method():

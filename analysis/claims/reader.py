@@ -15,8 +15,7 @@ from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
 from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
-from coartic.analysis.topics.guesses import guesses_on, most_guessed
-from coartic.analysis.topics.instances import signatures
+from coartic.analysis.topics.guesses import guesses_on, most_guessed, signature_of
 from coartic.analysis.topics.published import (
     Summary,
     published_alone,
@@ -153,7 +152,7 @@ class Reader:
         return Measurement(task, "best", np.array(np.nanmax(rewards)), printed=printed)
 
     def signature(self, name: str, task: str, label: str, *, replay: bool = False) -> Measurement:
-        """A signature of coarticulation, of the runs that have one; of an instance, computed once.
+        """A signature of coarticulation, of the runs that have one.
 
         Of guesses, that of the widths and hands that show most of it on the task, or in the
         family.
@@ -164,12 +163,10 @@ class Reader:
         if replay:
             values = signature.of(self.study.executed(task, label, replay=True))
             words = f"in noiseless replays, {words}"
-        elif self.task(task).family is not None:
-            values = signatures(self.study)[task, label].get(name, np.empty(0))
         elif label == GUESSES:
-            values = most_guessed(self.study, task, name)
+            values = most_guessed(self.study, name, task)
         else:
-            values = signature.of(self.study.executed(task, label))
+            values = signature_of(self.study, name, task, label)
         if not len(values):
             raise MissingError(f"{who_is(label)} on {task} has no {name}")
         return Measurement(task, who_is(label), values, words)

@@ -47,7 +47,7 @@ def limits(study: Study) -> dict[str, Any]:
     learners = [cell for cell in study.cells.values() if cell.method.startswith(LEARNER)]
     trials = {int(n) for cell in learners for n in cell.runs.trials.dropna()}
     fewest = min((len(cell.runs) for cell in learners if cell.method in LEARNERS), default=RUNS)
-    tasks = [task for name, task in study.tasks.items() if name in one_by_one(study)]
+    tasks = list(one_by_one(study).values())
     optima = [(task, study.optima.get(task.name)) for task in tasks]
     reasons = Counter(map(str, failed.reason.dropna())).most_common(3)
     return {

@@ -22,15 +22,14 @@ def player(study: Study) -> str:
     Of each task it has, for each method of figures that moves straight, the run nearest its median
     reward. It begins with one goal before two others if two tasks share one.
     """
-    tasks = [name for name in study.tasks if name in one_by_one(study)]
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
         (up, down), first = shared.tasks, shared.method
         both = {**preset_of(up), "label": f"{up.label} or {down.label}", "others": down.goals[1:]}
         presets.append(both | {"runs": methods_played(study, [up.name, down.name])})
     alone = {
-        name: preset_of(study.tasks[name]) | {"runs": methods_played(study, [name])}
-        for name in tasks
+        name: preset_of(task) | {"runs": methods_played(study, [name])}
+        for name, task in one_by_one(study).items()
     }
     alone = {name: preset for name, preset in alone.items() if preset["runs"]}
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]

@@ -52,14 +52,14 @@ def stamp(runs: pd.DataFrame) -> str:
 
 def beginnings(frame: pd.DataFrame) -> list[tuple[str, str]]:
     """The rows of a table by id, with the first two columns of words that the page shows."""
-    words = [name for name in columns_of(frame) if not is_number(frame[name]) and name != "run_ids"]
+    words = [name for name in columns_of(frame) if not is_number(frame[name])]
     texts = [texts_of(frame, name) for name in words[:2]]
     return [(row, ", ".join(first)) for row, *first in zip(frame.index, *texts, strict=True)]
 
 
 def values_of(frame: pd.DataFrame, row: str, tasks: Mapping[str, Task]) -> list[tuple[str, str]]:
     """Headers and values of a row as the page shows them, without those that are missing."""
-    one = frame.loc[[row]].drop(columns="run_ids")
+    one = frame.loc[[row]]
     one.attrs["tasks"] = {name: marked(task) for name, task in tasks.items()}
     shown = ((header, texts_of(one, name)[0]) for name, header in columns_of(one).items())
     return [(header, text) for header, text in shown if text not in ("", NONE)]

@@ -49,7 +49,7 @@ def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
     in both."""
     for first, second, shared in context_pairs(study.tasks):
         keys = (first, label), (second, label)
-        if {first, second} <= one_by_one(study) and study.cells.keys() >= {*keys}:
+        if {first, second} <= one_by_one(study).keys() and study.cells.keys() >= {*keys}:
             runs = study.executed(first, label), study.executed(second, label)
             for goal in range(1, shared + 1):
                 for hand in HANDS:
@@ -95,13 +95,13 @@ def list_contexts(study: Study) -> Rows:
 @table("task, method, runs, first, total, as_in_isolation, preshaping")
 def list_signatures(study: Study) -> Rows:
     """The main signatures of every main method on every task, means over runs and goals."""
-    for task in (name for name in study.tasks if name in one_by_one(study)):
-        labels = [label for name, label in study.cells if name == task]
+    for name, task in one_by_one(study).items():
+        labels = [label for on, label in study.cells if on == name]
         for label in in_order(labels if compares_settings(study) else main_methods(labels)):
-            cell, runs = study.cells[task, label], study.executed(task, label)
+            cell, runs = study.cells[name, label], study.executed(name, label)
             if runs.runs and not is_search(label):
                 row: Row = {
-                    "task": marked(study.tasks[task]),
+                    "task": marked(task),
                     "method": label,
                     "runs": len(cell.good),
                     "first": mean_of_goals(SIGNATURES["first"].each(runs)[:, None]),
@@ -109,7 +109,7 @@ def list_signatures(study: Study) -> Rows:
                     "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
                     "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),
                 }
-                yield f"{task} {label}", row | runs_of(cell)
+                yield f"{name} {label}", row | runs_of(cell)
 
 
 def mean_of_goals(values: Array) -> float:

@@ -1,7 +1,4 @@
-"""Cost of coming near the optimum: running times to reward targets.
-
-Targets are rewards evenly spaced between those of the initial solution and of the optimum.
-"""
+"""Cost of coming near the optimum: running times to reward targets."""
 
 from __future__ import annotations
 

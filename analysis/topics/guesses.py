@@ -2,20 +2,20 @@
 
 A method that selects its solution from trials by their rewards shows signatures that selection
 alone shows, and has to exceed those of guesses. A folder may have guesses of several widths, and
-with every hand sequence. On each task, or in each family, the one that shows most of a signature
-counts.
+with every hand sequence: the one that shows most counts.
 """
 
 from __future__ import annotations
 
 import math
+from statistics import fmean
 
 import numpy as np
 
 from coartic.analysis.methods import ALL_GUESSES
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.scores import BY_TRIAL, groups
 from coartic.robot import Array
 
@@ -29,13 +29,23 @@ def guesses_on(study: Study, task: str) -> list[str]:
     ]
 
 
-def most_guessed(study: Study, task: str, signature: str) -> Array:
-    """A signature of the guesses whose runs show most of it in the mean, shape ``(n,)``; empty
-    where none has a value."""
-    signatures = [
-        SIGNATURES[signature].of(study.executed(task, each)) for each in guesses_on(study, task)
-    ]
-    return max((values for values in signatures if len(values)), key=np.mean, default=np.empty(0))
+@cached
+def signature_of(study: Study, signature: str, task: str, label: str) -> Array:
+    """A signature of the runs of a method on a task that have it, shape ``(n,)``."""
+    return SIGNATURES[signature].of(study.executed(task, label))
+
+
+def most_guessed(study: Study, signature: str, task: str) -> Array:
+    """A signature of the guesses that show most of it in the mean on a task, or over the instances
+    of its family, shape ``(n,)``; empty where they have none on the task."""
+    family, shown = study.tasks[task].family, dict[str, dict[str, Array]]()
+    for each, other in study.tasks.items():
+        if each == task or (family is not None and other.family == family):
+            for label in guesses_on(study, each):
+                if len(values := signature_of(study, signature, each, label)):
+                    shown.setdefault(label, {})[each] = values
+    most = max(shown.values(), key=lambda of: fmean(map(np.mean, of.values())), default={})
+    return most.get(task, np.empty(0))
 
 
 def selects(study: Study, label: str) -> bool:

@@ -1,17 +1,13 @@
-"""The instances of a folder: the best known of each, how far methods stay behind it, and in how
-many coarticulation is there."""
+"""The instances of a folder: the best known of each, and how far methods stay behind it."""
 
 from __future__ import annotations
 
 import pandas as pd
 
-from coartic.analysis.methods import GUESSES, LEARNERS, most_exploring
+from coartic.analysis.methods import most_exploring
 from coartic.analysis.optima import gap_share, locks_base
-from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics.instances import Scores
 from coartic.analysis.study import Study, cached
-from coartic.analysis.topics.guesses import guesses_on
-from coartic.robot import Array
 from coartic.runs.plan import SEARCH
 from coartic.tasks.optima import KnownOptimum
 
@@ -55,43 +51,3 @@ def by_family(rows: pd.DataFrame, column: str) -> Scores:
         str(family): [(values,) for values in of_family[column]]
         for family, of_family in rows.groupby("family", sort=False)
     }
-
-
-@cached
-def signatures(study: Study) -> dict[tuple[str, str], dict[str, Array]]:
-    """Values of signatures (n,) on every instance, of the learner by condition and of guesses.
-
-    By the instance's name and the method's label, then by the signature's name in
-    :data:`SIGNATURES`; a value for each run that has one. A signature without any is left out.
-    Label ``GUESSES`` has each signature of the guesses that show most of it over the instances
-    of the family.
-    """
-    by_cell: dict[tuple[str, str], dict[str, Array]] = {}
-    for name in best_of_instances(study):
-        for label in (*LEARNERS, *guesses_on(study, name)):
-            cell = study.cells.get((name, label))
-            if cell is not None and len(cell.good):
-                runs = study.executed(name, label)
-                measured = {signature: SIGNATURES[signature].of(runs) for signature in SIGNATURES}
-                by_cell[name, label] = {
-                    signature: each for signature, each in measured.items() if len(each)
-                }
-    # Of each family and signature, the guesses with the highest mean over instances.
-    means = pd.DataFrame(
-        [(study.tasks[name].family, signature, label, each.mean())
-         for (name, label), of_cell in by_cell.items() if label not in LEARNERS
-         for signature, each in of_cell.items()],
-        columns=["family", "signature", "label", "mean"],
-    ).groupby(["family", "signature", "label"], sort=False)["mean"].mean()  # fmt: skip
-    most = means.groupby(["family", "signature"], sort=False).idxmax().to_dict()
-    for name in [name for name, label in by_cell if label == GUESSES]:
-        chosen = {
-            signature: most.get((study.tasks[name].family, signature), ("",))[-1]
-            for signature in SIGNATURES
-        }
-        by_cell[name, GUESSES] = {
-            signature: by_cell[name, label][signature]
-            for signature, label in chosen.items()
-            if signature in by_cell.get((name, label), {})
-        }
-    return by_cell

@@ -126,7 +126,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
     ``best_high``, ``trials`` (mean over runs and the last :data:`WINDOW` trials).
     """
     shown: list[tuple[str, str]] = []
-    for task in (name for name in study.tasks if name in one_by_one(study)):
+    for task in one_by_one(study):
         labels = [
             label
             for label in methods.in_order([label for name, label in study.cells if name == task])

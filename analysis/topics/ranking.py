@@ -76,11 +76,9 @@ def list_against_learner(study: Study) -> Rows:
     """
     for label in dict.fromkeys(label for _, label in study.cells):
         cells, tests = [], []
-        for task in (task for task in study.tasks if task in one_by_one(study)):
-            cell, learner = (
-                study.cells.get((task, name))
-                for name in (label, methods.most_exploring(study.tasks[task]))
-            )
+        for name, task in one_by_one(study).items():
+            cell = study.cells.get((name, label))
+            learner = study.cells.get((name, methods.most_exploring(task)))
             if cell is None or learner is None or cell is learner:
                 continue
             solved = all(len(each.good) == len(each.runs) for each in (cell, learner))

@@ -225,7 +225,7 @@ def list_methods(study: Study) -> Rows:
     Within a task searches for the optimum come first, then the highest mean reward.
     ``median_run``: beginning of the id of the run whose reward is nearest the median.
     """
-    places = {task: place for place, task in enumerate(study.tasks) if task in one_by_one(study)}
+    places = {task: place for place, task in enumerate(one_by_one(study))}
     cells = [cell for cell in study.cells.values() if cell.task in places]
     means = {id(cell): cell.rewards.mean() if len(cell.good) else -math.inf for cell in cells}
     cells.sort(key=lambda c: (places[c.task], not is_search(c.label), -means[id(c)]))

@@ -22,21 +22,17 @@ from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 @table("task, arms, base, initial, optimum, bound")
 def list_tasks(study: Study) -> Rows:
     """One row a task: initial and best possible reward."""
-    for name, task in study.tasks.items():
-        best = study.optima.get(name)
-        if name in one_by_one(study):
-            row: Row = {
-                "task": marked(task),
-                "arms": len(task.hands),
-                "base": f"locked in {' and '.join(task.locked_base)}"
-                if task.locked_base
-                else "free",
-                "initial": initial_reward(task),
-                "optimum": best.reward if best else None,
-                "bound": best.bound if best else None,
-                **runs_of(),
-            }
-            yield name, row
+    for name, task in one_by_one(study).items():
+        best, locked = study.optima.get(name), " and ".join(task.locked_base)
+        row: Row = {
+            "task": marked(task),
+            "arms": len(task.hands),
+            "base": f"locked in {locked}" if locked else "free",
+            "initial": initial_reward(task),
+            "optimum": best.reward if best else None,
+            "bound": best.bound if best else None,
+        }
+        yield name, row | runs_of()
 
 
 def how_long(study: Study) -> str:
@@ -60,7 +56,7 @@ def how_long(study: Study) -> str:
 )
 def draw_tasks(study: Study) -> Parts | None:
     """Draw start configuration and goals, a panel for each task."""
-    shown = [task for name, task in study.tasks.items() if name in one_by_one(study)]
+    shown = list(one_by_one(study).values())
     if not shown:
         return None
     rows: list[dict[str, object]] = []
