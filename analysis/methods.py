@@ -56,7 +56,6 @@ _PARAMETERS = {
     "half_width=": "± ",
     "stop=": "stop ",
 }
-_SETTING = re.compile(r"=|\bEC\d-")
 
 
 def most_exploring(task: Task) -> str:
@@ -79,7 +78,7 @@ def is_setting(label: str) -> bool:
 
     A method of somebody else stands by itself with whatever parameters it was run.
     """
-    return is_built_in(label) and bool(_SETTING.search(label))
+    return is_built_in(label) and bool(re.search(r"=|\bEC\d-", label))
 
 
 def is_search(label: str) -> bool:

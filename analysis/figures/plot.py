@@ -5,10 +5,9 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any
 
 import pandas as pd
 from matplotlib import rc_context
@@ -22,11 +21,6 @@ from coartic.analysis.words import RECONSTRUCTED, id_of
 from coartic.text import one_line
 
 FORMATS = (".svg", ".pdf", ".png")
-_NO_DATE: Mapping[str, Mapping[str, Any]] = {
-    ".pdf": {"CreationDate": None},
-    ".svg": {"Date": None},
-    ".png": {"Software": None},
-}
 
 
 @dataclass(frozen=True)
@@ -93,9 +87,9 @@ def picture(drawing: Figure, ending: str) -> bytes:
     The same figure gives the same bytes on machines with the same fonts: ids are salted, no date is
     written.
     """
-    stream = io.BytesIO()
+    stream, dated = io.BytesIO(), {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}
     with rc_context(style.RC):
-        drawing.savefig(stream, format=ending[1:], dpi=300, metadata=_NO_DATE[ending])
+        drawing.savefig(stream, format=ending[1:], dpi=300, metadata={dated[ending]: None})
     return stream.getvalue()
 
 
@@ -107,6 +101,11 @@ def for_page(plot: Plot) -> str:
     one, its grey is ``--grey``, its blues ``--blue`` and ``--sky``. Marks with a
     :func:`~.style.tip` show it. Ids begin with the plot's id, so that several can share a page.
     """
+
+    def shorten(attribute: re.Match[str]) -> str:  # lengths to hundredths of a point
+        cut = re.sub(r"(\.\d\d)\d+", r"\1", attribute[0])
+        return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
+
     stream = io.StringIO()
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with rc_context({**style.RC, "svg.fonttype": "none"}):
@@ -130,10 +129,3 @@ def for_page(plot: Plot) -> str:
         'stroke-linecap="butt" fill="currentColor">'
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
-
-
-def shorten(attribute: re.Match[str]) -> str:
-    """An attribute of SVG whose lengths, in points, are cut to hundredths, without the spaces that
-    a path does not need: the page is a seventh smaller."""
-    cut = re.sub(r"(\.\d\d)\d+", r"\1", attribute[0])
-    return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut

@@ -78,7 +78,6 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     free, in their order ``among`` the labels of the report.
     """
     every = dict.fromkeys([*among, *labels])
-    own = [label for label in every if not is_built_in(label)]
     fixed = {}
     for label in every:
         row = KNOWN_METHODS.get(look_alike(label))
@@ -88,8 +87,10 @@ def looks(labels: Collection[str], among: Iterable[str] = ()) -> dict[str, Look]
     pairs = [{"color": c, "linestyle": dash} for dash in dashes for c in colors]
     free = itertools.cycle(look for look in pairs if look not in fixed.values())
     theirs = itertools.chain([{"color": BROWN, "linestyle": dash} for dash in dashes], free)
-    given = {label: fixed.get(label) or next(theirs) for label in own}
-    given |= {label: fixed.get(label) or next(free) for label in every if label not in given}
+    given = {
+        label: fixed.get(label) or next(free if is_built_in(label) else theirs)
+        for label in sorted(every, key=is_built_in)
+    }
     return {label: given[label] for label in dict.fromkeys(labels)}
 
 

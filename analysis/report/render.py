@@ -37,8 +37,6 @@ TONES = {
     "depends on the goals": "open",
 }
 """Class of a verdict on the page, by its words."""
-PACKAGES = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
-"""First line of every LaTeX table."""
 IN_LATEX = {
     "settings": "task, method, runs, reward, behind, p_holm",
     "contexts": "place, method, runs, distance, dependence, p_holm, p_guesses",
@@ -201,4 +199,5 @@ def latex_table(frame: pd.DataFrame, name: str, caption: str, notes: Sequence[st
     fit = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{"
     body = body.replace(begin, f"\\footnotesize\n{fit}{begin}", 1)
     body = body.replace(end, f"{end}}}{below}", 1)
-    return f"{PACKAGES}\n{body}"
+    needs = "% needs \\usepackage{booktabs,graphicx} and \\usepackage[T1]{fontenc}"
+    return f"{needs}\n{body}"

@@ -67,15 +67,22 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of one method that hit the same goal with the same hand before other successors."""
+    """Runs of one method that hit the same goal with the same hand before other successors.
+
+    Parameters
+    ----------
+    first, second : Solutions
+        Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them.
+    goal : int
+        Number of the goal, from 1.
+    hand : {"left", "right"}
+        Runs that hit the goal with the other hand do not count.
+    """
 
     first: Solutions
     second: Solutions
-    """Runs on two tasks that share the goal, as ``study.executed(task, method)`` gives them."""
     goal: int
-    """Number of the goal, from 1."""
     hand: Hand
-    """Runs that hit the goal with the other hand do not count."""
 
     @property
     def tasks(self) -> tuple[Task, Task]:

@@ -41,7 +41,6 @@ FEWER_RESAMPLES = 1_999
 LARGE = 500
 """Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
 in the square of the number of values, and corrects nothing there."""
-_AT_ONCE = 1_000_000  # values of the resamples that are in memory
 IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
@@ -163,7 +162,7 @@ def bootstrap_estimate(
             samples,
             statistic,
             n_resamples=resamples,
-            batch=max(1, min(100, _AT_ONCE // max(n))) if large else 1_000,
+            batch=max(1, min(100, 1_000_000 // max(n))) if large else 1_000,
             vectorized=True,
             confidence_level=CONFIDENCE,
             method="percentile" if large else "BCa",

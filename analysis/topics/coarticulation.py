@@ -26,11 +26,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.settings import compares_settings
 from coartic.analysis.signatures.context_tests import smallest_p
-from coartic.analysis.signatures.measures import (
-    SIGNATURES,
-    as_in_isolation,
-    preshaping_of_the_other_arm,
-)
+from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
 from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
@@ -104,7 +100,7 @@ def list_signatures(study: Study) -> Rows:
                     "task": marked(task),
                     "method": label,
                     "runs": len(cell.good),
-                    "first": mean_of_goals(SIGNATURES["first"].each(runs)[:, None]),
+                    "first": mean_of_goals(runs.against_same_hands[:, :1]),
                     "total": mean_of_goals(runs.against_same_hands.sum(axis=1)[:, None]),
                     "as_in_isolation": mean_of_goals(as_in_isolation(runs)),
                     "preshaping": mean_of_goals(preshaping_of_the_other_arm(runs)),

@@ -10,16 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from coartic.analysis import methods
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
-from coartic.analysis.methods import (
-    TOGETHER,
-    in_order,
-    is_built_in,
-    is_learner,
-    main_methods,
-    name_of,
-)
 from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics import running_times
 from coartic.analysis.study import CellRuns, Study, cached, load
@@ -96,10 +89,10 @@ def cells_compared(study: Study) -> dict[str, list[CellRuns]]:
     tasks = [task for task in scores.common_tasks(study) if task in rewards]
     return {
         method: [cell for task, cell in compared[method].items() if task in tasks]
-        for method in in_order(compared)
+        for method in methods.in_order(compared)
         if tasks
         and compared[method].keys() >= {*tasks}
-        and not (len(tasks) == 1 and method.startswith(TOGETHER))
+        and not (len(tasks) == 1 and method.startswith(methods.TOGETHER))
     }
 
 
@@ -180,11 +173,11 @@ def curves(study: Study, labels: Collection[str]) -> list[str]:
     the best planner and methods from files."""
     if compares_settings(study):
         return list(labels)
-    kept = [label for label in main_methods(labels) if label != "corrective-alone/every"]
+    kept = [label for label in methods.main_methods(labels) if label != "corrective-alone/every"]
     learn = [label for label in kept if scores.groups(study)[label] == scores.BY_TRIAL]
     plan = [label for label in kept if label not in learn]
     best = list_runtimes(study).reached[plan].idxmax() if plan else None
-    return [label for label in kept if label in (*learn, best) or not is_built_in(label)]
+    return [label for label in kept if label in (*learn, best) or not methods.is_built_in(label)]
 
 
 @figure(
@@ -242,18 +235,18 @@ def draw_runtimes(study: Study) -> Parts | None:
 def what_it_costs(study: Study) -> str:
     """Trials that the learner and its rival need for half of the targets."""
     table = list_runtimes(study)
-    learners = [label for label in main_methods(table.index) if is_learner(label)]
+    learners = [label for label in methods.main_methods(table.index) if methods.is_learner(label)]
     if not learners:
         return ""
     others = [
         label
         for label in table.index
-        if not is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
+        if not methods.is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
     ]
     # The other method that learns from the reward of trials and reaches most targets.
     rival = [table.reached[others].idxmax()] if others else []
     rows = table.loc[[learners[0], *rival]].to_dict("records")
-    names = ["the learner", *(name_of(row["method"]) for row in rows[1:])]
+    names = ["the learner", *(methods.name_of(row["method"]) for row in rows[1:])]
     named = list(zip(names, rows, strict=True))
     ends = "; ".join(f"{name} reaches {number(100 * row['reached'], 0)} %" for name, row in named)
     text = f"{capital(ends)} of the reward targets.\n"

@@ -15,8 +15,8 @@ from coartic.tasks.optima import KnownOptimum
 @cached
 def best_of_instances(study: Study) -> dict[str, KnownOptimum]:
     """Best known reward of each instance of a family that has one."""
-    drawn = [name for name, task in study.tasks.items() if task.family is not None]
-    return {name: study.optima[name] for name in drawn if name in study.optima}
+    optima = study.optima.items()
+    return {name: best for name, best in optima if study.tasks[name].family is not None}
 
 
 @cached
