@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -168,18 +168,6 @@ def list_runtimes(study: Study) -> Rows:
         yield method, row | runs_of(*cells)
 
 
-def curves(study: Study, labels: Collection[str]) -> list[str]:
-    """Methods with a curve: all settings where these are compared, else those that learn, guesses,
-    the best planner and methods from files."""
-    if compares_settings(study):
-        return list(labels)
-    kept = [label for label in methods.main_methods(labels) if label != "corrective-alone/every"]
-    learn = [label for label in kept if scores.groups(study)[label] == scores.BY_TRIAL]
-    plan = [label for label in kept if label not in learn]
-    best = list_runtimes(study).reached[plan].idxmax() if plan else None
-    return [label for label in kept if label in (*learn, best) or not methods.is_built_in(label)]
-
-
 @figure(
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget (mean over all "
@@ -189,9 +177,16 @@ def curves(study: Study, labels: Collection[str]) -> list[str]:
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Share of targets reached, against trials and kinematics."""
-    tabled = list_runtimes(study).index
+    tabled = list_runtimes(study)
+    curves = list(tabled.index)
+    if not compares_settings(study):  # methods that learn, guesses, the best planner, from files
+        kept = [each for each in methods.main_methods(curves) if each != "corrective-alone/every"]
+        plan = [each for each in kept if scores.groups(study)[each] != scores.BY_TRIAL]
+        best = tabled.reached[plan].idxmax() if plan else None
+        left_out = {*filter(methods.is_built_in, plan)} - {best}
+        curves = [label for label in kept if label not in left_out]
     data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
-    shown = data.method.isin(curves(study, tabled)) & (data.budget < math.inf)
+    shown = data.method.isin(curves) & (data.budget < math.inf)
     data = data[shown & data.spend.isin(PANELS)]
     spends = [spend for spend in PANELS if (data.budget[data.spend == spend] > 0).any()]
     if not spends:
