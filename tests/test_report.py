@@ -25,7 +25,7 @@ from coartic.analysis.table import SHORT_ID
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
-from tests.support.suites import KNOWN, run_and_write
+from tests.support.suites import KNOWN, run_and_write, suite_of
 
 
 @pytest.fixture(scope="module")
@@ -288,3 +288,14 @@ def test_tables_compile_and_fit_the_text(tables_by_name, tmp_path):
     wide = re.findall(r"^wide ([\d.]+)pt", done.stdout, re.MULTILINE)
     assert len(wide) == len(tables)
     assert max(map(float, wide)) <= 345 * 8 / 6
+
+
+def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
+    """Two tasks, each with goal 2 in two places: six pairs that share goal 1."""
+    moved = 'tasks = ["ascending", "descending"]\nmethods = ["dual-process/EC1"]\n[blocks.move]\n'
+    cells = suite_of(tmp_path, moved + "goal = 2\nby = [[0.0, 0.0], [0.0, 0.5]]")
+    seen = run_and_write(tmp_path / "moved", cells=cells, runs=2, trials=30)
+    contexts = TABLES["contexts"](seen)
+    assert contexts.index.is_unique
+    assert len(contexts) == 6
+    write_report(seen, tmp_path / "report", for_paper=False)

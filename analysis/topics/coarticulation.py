@@ -85,7 +85,7 @@ def list_contexts(study: Study) -> Rows:
                 "other": shared.parts[1],
                 **runs_of(*(study.cells[task.name, label] for task in shared.tasks)),
             }
-            yield f"{first.name} {label} goal {shared.goal} {shared.hand}", row
+            yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
 @table("task, method, runs, first, total, as_in_isolation, preshaping")
