@@ -169,8 +169,8 @@ def rewards_reproduced(study: Study) -> str:
     agree, undecided, differ = map(verdicts.count, ("equivalent", "undecided", "different"))
     text = (
         f"Of the {len(rows)} learned rewards that the paper prints, ours agree with {agree} within "
-        f"1 %; {differ} {'differs' if differ == 1 else 'differ'} by more, {undecided} "
-        f"{'is' if undecided == 1 else 'are'} undecided.\n"
+        f"1 %; {differ or 'none'} {'differ' if differ > 1 else 'differs'} by more, "
+        f"{undecided or 'none'} {'are' if undecided > 1 else 'is'} undecided.\n"
     )
     for row in rows:
         sure = row["difference_low"] > 0 or row["difference_high"] < 0

@@ -503,7 +503,7 @@ class Play {
     if (spreads === null) return [`At goal 1 the robots' postures lie ${short(distance)} apart.`, far];
     return [
       `At goal 1 the robots' postures lie ${spreads.toFixed(1)} standard deviations apart.`,
-      `One standard deviation is how far single runs lie from their mean (${runs} runs each). Two samples of such runs on one task would lie about ${chance.toFixed(1)} apart by chance.`,
+      `One standard deviation is how far single runs lie from their mean (${runs} runs each). Two such samples of one task would lie about ${chance.toFixed(1)} standard deviations apart by chance.`,
     ];
   }
 
