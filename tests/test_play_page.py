@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from coartic import Movement, corrective_trial, execute, learn, load_task
+from coartic import Movement, Task, corrective_trial, execute, learn, load_task
 from coartic.analysis.signatures.context_tests import context_dependence
+from coartic.baselines.random_search import Guesses
+from coartic.motion.initial import hand_sequences, initial_hands
 from coartic.play import page as pages
-from tests.support.strategies import changed
+from tests.support.strategies import changed, solve
 
 pytestmark = pytest.mark.browser
 
@@ -92,31 +94,59 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
+def median_run(runs):
+    return sorted(runs, key=lambda run: run.reward)[len(runs) // 2]
+
+
+def random_search(task, seeds, trials):
+    """Best trials of random search, as executed."""
+    runs = [solve(Guesses, task, seed, trials=trials)[0] for seed in seeds]
+    return [execute(task, run.solution) for run in runs]
+
+
 def test_coarticulation_appears_with_practice(visited, tmp_path):
     file = tmp_path / "play.html"
     file.write_text(pages.play_page(), encoding="utf-8")
     page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
     trials = trials_made(page)
     assert trials == 10_000  # on every machine
-    postures = []  # at the goal that they share
-    for role, task in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
-        runs = [learn(task, "EC1", seed=seed, trials=trials) for seed in range(5)]
-        assert ticks(page, role) == -runs[0].reward
+    postures, by_chance = [], []  # at the goal that they share
+    for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
+        runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
+        assert ticks(page, role) == -median_run(runs).reward
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
-    spreads = context_dependence(*postures)
-    assert spreads > 2
-    assert f"postures lie {spreads:.1f} standard deviations apart" in text(page, "finding")
+        best = random_search(load_task(name), range(5), trials)
+        by_chance.append(np.array([run.configurations[0] for run in best]))
+    learned, random = context_dependence(*postures), context_dependence(*by_chance)
+    assert learned > 2
+    words = f"lie {learned:.1f} standard deviations apart (random search: {random:.1f})."
+    assert words in text(page, "finding")
     assert "(5 runs each)" in text(page, "meaning")
     # Earlier, by the slider, there was less of it.
     page.get_by_role("slider", name="Practice").fill("1")
     assert "alike" in text(page, "finding")
 
 
-def test_evolution_reports_every_run_to_its_end(opened):
-    """Ten runs, which end at different times: none loses its last trials."""
-    page = settled(opened("who=cma-es"))
-    assert trials_made(page) == TRIALS
-    assert "(5 runs each)" in text(page, "meaning")
+@pytest.mark.parametrize("rule", [None, "best-single-hand", "best-of-all", "RLLR"])
+def test_a_task_from_a_file_begins_with_the_hands_of_the_package(visited, tmp_path, rule):
+    """Trial 0, the learner, and the corrective process with its best hands, by each rule."""
+    file = tmp_path / "shelf.toml"
+    goals = [(2.1, 3.6), (4.4, 3.6), (5.2, 0.55), (7.0, 3.6)]
+    Task(name="shelf", goals=goals, **({} if rule is None else {"initial_hands": rule})).save(file)
+    task, page_file = load_task(file), tmp_path / "play.html"
+    html = pages.play_page(task).replace("TRIALS = 10000;", f"TRIALS = {TRIALS};")
+    page_file.write_text(html, encoding="utf-8")
+    page = settled(visited(f"{page_file.as_uri()}#open=1", reduced_motion="reduce"))
+    runs = [learn(task, "EC4", seed=seed, trials=TRIALS) for seed in range(5)]
+    assert ticks(page, "The learner") == -median_run(runs).reward
+    best = max(hand_sequences(task), key=lambda hands: corrective_trial(task, hands).reward)
+    alone = corrective_trial(task, best).reward
+    assert ticks(page, "One goal at a time") == -alone
+    fewer = median_run(runs).reward - alone
+    words = f"{abs(fewer)} ticks {'fewer' if fewer > 0 else 'more'} than one goal at a time"
+    assert f"{words} (best hands {best})." in text(page, "finding")
+    page.get_by_role("slider", name="Practice").fill("0")
+    assert ticks(page, "The learner") == -corrective_trial(task, initial_hands(task)).reward
 
 
 def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
@@ -132,8 +162,8 @@ def test_a_moved_goal_is_answered_at_once_and_by_what_is_learned(opened):
     page.get_by_role("radio", name="learner").check()
     settled(page)
     assert trials_made(page) == TRIALS
-    run = learn(task, "EC1", seed=0, trials=TRIALS)
-    assert ticks(page, "The learner") == -run.reward
+    runs = [learn(task, "EC1", seed=seed, trials=TRIALS) for seed in range(5)]
+    assert ticks(page, "The learner") == -median_run(runs).reward
     # By the pointer, too, and out of reach it says so.
     box = handle.bounding_box()
     page.mouse.move(box["x"] + 22, box["y"] + 22)
@@ -163,7 +193,7 @@ def test_when_a_goal_moves_the_learner_repeats_its_posture_and_the_planner_does_
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page = settled(opened("preset=3&who=you"))
     assert ticks(page, "You") == ticks(page, "One goal at a time")
-    handle = page.get_by_role("button", name="right arm, elbow 2")
+    handle = page.get_by_role("button", name="left arm, elbow 2")
     box = handle.bounding_box()
     page.mouse.move(box["x"] + 15, box["y"] + 15)
     page.mouse.down()
@@ -183,7 +213,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
         movements.append(Movement(goal, side, "learned" if joints else "corrective", placed))
     assert [movement.kind for movement in movements] == ["learned"] * 2 + ["corrective"] * 2
     done = execute("two-armed-1", movements)
-    assert done.hands.startswith("RL")
+    assert done.hands == "LLLR"
     assert ticks(page, "You") == done.ticks
     comes_back(page)
 
@@ -203,9 +233,15 @@ def test_the_link_holds_the_whole_state(opened, address):
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page)
     assert trials_made(changed_to(page, address, "trials=900")) == 900
-    run = learn("two-armed-1", "EC3", seed=0, trials=TRIALS)
-    assert ticks(changed_to(page, address, "preset=3&explores=EC3"), "The learner") == -run.reward
-    # What no state is is left out, and goals far out lie nearer.
+    runs = [learn("two-armed-1", "EC3", seed=seed, trials=TRIALS) for seed in range(5)]
+    changed_to(page, address, "preset=3&explores=EC3")
+    assert ticks(page, "The learner") == -median_run(runs).reward
+    # Entries that are no state are left out, and goals and joints far out lie nearer.
+    for name in ("constructor", "toString", "__proto__"):
+        changed_to(page, address, f"preset=3&who={name}&mate={name}&explores={name}&{name}=1")
+        assert ticks(page, "The learner") > 0
+    changed_to(page, address, "preset=1&others=&who=you&own=1,0,1e308,0,0,0,0,0,0,1e9,0")
+    assert ticks(page, "You") > 0
     changed_to(page, address, "who=learner&trials=x&preset=99&goals=1,a&nothing=1&tick=1e9")
     assert ticks(page, "Blue") > 0
     changed_to(page, address, "who=alone&preset=1&goals=60,0;6,-70,1;6,-70")
@@ -217,7 +253,8 @@ def test_you_place_the_first_robot_beside_the_same_second_one_and_all_comes_back
     page = settled(opened("who=plan&tick=200"))
     state, second = page.url, ticks(page, "Orange")
     page.get_by_role("radio", name="You").check()
-    assert ticks(settled(page), "You") == ticks(page, "One goal at a time")
+    assert ticks(settled(page), "You") == -corrective_trial("ascending", "RRR").reward
+    assert ticks(page, "Orange: the planner") == second
     assert "blue robot, a posture for each goal. Orange: the planner." in text(page, "lead")
     page.get_by_role("button", name="elbow 2").focus()
     page.keyboard.press("ArrowDown")

@@ -76,7 +76,7 @@
 
   /* A link to a row unfolds its table, and a link to a claim its evidence. */
   const reveal = () => {
-    const target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
+    const target = document.querySelector(":target");
     const folded = target && (target.querySelector("details") || target.closest("details"));
     if (!folded) return;
     folded.open = true;

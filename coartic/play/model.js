@@ -4,13 +4,13 @@
    Each function has the name of its counterpart in the Python package and does the same operations
    in the same order. A comment names the module of the counterpart. A configuration is an
    array, which is soon copied: x and y of the base, the joints of the left arm, those of the right one. Hands are
-   0 (left) and 1 (right), goals are counted from 0. Without a counterpart are Strategy, which is a
-   smaller CMA-ES than pycma's, and shortest_plan, a local search. */
+   0 (left) and 1 (right), goals are counted from 0. Without a counterpart is shortest_plan, a local search. */
 
 const HANDS = ["left", "right"];
 const [LEFT, RIGHT, NO_HAND] = [0, 1, 2];
 const BASE_DOF = 2;
 const MOST_LINKS = 100;
+const MOST_SEQUENCES = 4096; // hand sequences that are tried one by one
 
 /* coartic/model.py */
 const PAPER = {
@@ -316,16 +316,20 @@ function hand_sequences(problem) {
 
 const letters_of = (hands) => hands.map((hand) => "LR"[hand]).join("");
 
-/* coartic/motion/initial.py: the hands that the task names, or those its policy finds. */
-function initial_hands(problem) {
-  const named = problem.task.initial_hands;
-  if (/^[LR]*$/.test(named) && named.length === problem.goals.length) return [...named].map((letter) => "LR".indexOf(letter));
+/* coartic/motion/initial.py: the hands that the task names, or those that its rule finds. */
+function initial_hands(problem, named = problem.task.initial_hands) {
+  if (/^[LR]+$/.test(named)) return [...named].map((letter) => "LR".indexOf(letter));
   const single = problem.hands.map((hand) => problem.goals.map(() => hand));
   const changes = (hands) => hands.filter((hand, k) => k && hand !== hands[k - 1]).length;
   const ranked = (named === "best-of-all" ? hand_sequences(problem) : single)
     .map((hands) => ({ hands, reward: corrective_trial(problem, hands).reward, changes: changes(hands) }))
     .sort((a, b) => (b.reward === a.reward ? a.changes - b.changes : b.reward - a.reward));
   return ranked[0].hands;
+}
+
+/* The hands with which the corrective process alone is fastest; the initial ones where there are too many to try. */
+function best_hands(problem) {
+  return initial_hands(problem, problem.hands.length ** problem.goals.length > MOST_SEQUENCES ? undefined : "best-of-all");
 }
 
 /* ---- Random numbers: those of numpy.random.default_rng(seed), so that a seed gives the same run ----
@@ -549,147 +553,23 @@ class Learner {
   }
 }
 
-/* ---- CMA-ES on the same trials (coartic/baselines/cma_es.py) ---- */
-
-/* CMA-ES (Hansen 2016) with a Cholesky factor in place of the matrix's root (Krause, Arbonès & Igel 2016). */
-class Strategy {
-  constructor(search, hands) {
-    Object.assign(this, { search, hands, sigma_0: 0.05, generations: 1, restarts: -1 });
-    // [goal, joint], as explored_joints of coartic/optimisers.py
-    this.entries = hands.flatMap((_, goal) => movable(search.problem, hands.slice(goal)).flatMap((moves, j) => (moves ? [[goal, j]] : [])));
-    const first = search.try(hands, hands.map(() => null));
-    this.reward = first.reward;
-    if (first.going) this.first = this.entries.map(([goal, j]) => first.reached[goal][j]);
+/* coartic/baselines/random_search.py, `Guesses`: uniform targets in a box around the postures in which the corrective
+   process alone hits the goals with its best hands. The best trial is kept; nothing is learned. */
+class RandomSearch {
+  constructor(problem, seed, half_width = 0.12) {
+    Object.assign(this, { problem, rng: new Generator(seed), hands: best_hands(problem) });
+    this.trials = hand_sequences(problem).length; // to find the hands
+    this.best = corrective_trial(problem, this.hands);
+    this.explored = this.hands.map((_, goal) => movable(problem, this.hands.slice(goal)));
+    this.box = this.best.reached.map((posture) => posture.map((value) => [value - half_width, value + half_width]));
   }
 
-  restart() {
-    this.restarts += 1;
-    const n = this.entries.length;
-    const size = (4 + Math.floor(3 * Math.log(n))) * 2 ** this.restarts;
-    const raw = Array.from({ length: Math.floor(size / 2) }, (_, i) => Math.log((size + 1) / 2) - Math.log(i + 1));
-    const sum = raw.reduce((a, b) => a + b);
-    const weights = raw.map((w) => w / sum);
-    const mass = 1 / weights.reduce((a, w) => a + w * w, 0);
-    const cs = (mass + 2) / (n + mass + 5);
-    const c1 = 2 / ((n + 1.3) ** 2 + mass);
-    Object.assign(this, {
-      n, size, weights, mass, cs, c1, mean: [...this.first], sigma: this.sigma_0, made: 0, seen: [],
-      cc: (4 + mass / n) / (n + 4 + (2 * mass) / n),
-      cmu: Math.min(1 - c1, (2 * (mass - 2 + 1 / mass)) / ((n + 2) ** 2 + mass)),
-      damps: 1 + 2 * Math.max(0, Math.sqrt((mass - 1) / (n + 1)) - 1) + cs,
-      expected: Math.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n)),
-      ps: new Float64Array(n), pc: new Float64Array(n),
-      C: Array.from({ length: n }, (_, i) => Float64Array.from({ length: n }, (__, j) => (i === j ? 1 : 0))),
-    });
-    this.factorise();
-  }
-
-  factorise() {
-    const { n, C } = this;
-    const A = C.map(() => new Float64Array(n));
-    for (let i = 0; i < n; i += 1) {
-      for (let j = 0; j <= i; j += 1) {
-        let rest = C[i][j];
-        for (let k = 0; k < j; k += 1) rest -= A[i][k] * A[j][k];
-        A[i][j] = i === j ? Math.sqrt(Math.max(rest, 1e-20)) : rest / A[j][j];
-      }
-    }
-    this.A = A;
-  }
-
-  /* As pycma: the best rewards have not changed for so long, or no step is left. */
-  stops() {
-    const recent = this.seen.slice(-(10 + Math.ceil((30 * this.n) / this.size)));
-    return (this.made > recent.length && Math.max(...recent) === Math.min(...recent)) || this.sigma < 1e-9;
-  }
-
-  generation() {
-    if (this.restarts < 0 || this.stops()) this.restart();
-    const { n, A, search, hands, entries } = this;
-    const points = [];
-    for (let i = 0; i < this.size && search.left > 0; i += 1) {
-      const z = Float64Array.from({ length: n }, () => search.rng.standard_normal());
-      const y = new Float64Array(n);
-      for (let r = 0; r < n; r += 1) for (let k = 0; k <= r; k += 1) y[r] += A[r][k] * z[k];
-      const targets = hands.map(() => search.problem.start.map(() => NaN));
-      entries.forEach(([goal, j], k) => { targets[goal][j] = this.mean[k] + this.sigma * y[k]; });
-      const { reward } = search.try(hands, targets);
-      points.push({ z, y, reward });
-      this.reward = Math.max(this.reward, reward);
-    }
-    this.generations += 1;
-    if (points.length === this.size) this.tell(points.sort((a, b) => b.reward - a.reward));
-  }
-
-  tell(points) {
-    const { n, weights, mass, cs, cc, c1, cmu, ps, pc, C } = this;
-    const best = points.slice(0, weights.length);
-    const combined = (key, k) => best.reduce((sum, point, i) => sum + weights[i] * point[key][k], 0);
-    let norm = 0;
-    const step = new Float64Array(n);
-    for (let k = 0; k < n; k += 1) {
-      step[k] = combined("y", k);
-      this.mean[k] += this.sigma * step[k];
-      ps[k] = (1 - cs) * ps[k] + Math.sqrt(cs * (2 - cs) * mass) * combined("z", k);
-      norm += ps[k] * ps[k];
-    }
-    norm = Math.sqrt(norm);
-    this.made += 1;
-    const heavy = norm / Math.sqrt(1 - (1 - cs) ** (2 * this.made)) < (1.4 + 2 / (n + 1)) * this.expected ? 1 : 0;
-    for (let k = 0; k < n; k += 1) pc[k] = (1 - cc) * pc[k] + heavy * Math.sqrt(cc * (2 - cc) * mass) * step[k];
-    const keep = 1 - c1 - cmu + (1 - heavy) * c1 * cc * (2 - cc);
-    for (let i = 0; i < n; i += 1) {
-      for (let j = 0; j <= i; j += 1) {
-        let rank = 0;
-        for (let p = 0; p < best.length; p += 1) rank += weights[p] * best[p].y[i] * best[p].y[j];
-        C[i][j] = keep * C[i][j] + c1 * pc[i] * pc[j] + cmu * rank;
-        C[j][i] = C[i][j];
-      }
-    }
-    this.sigma *= Math.exp((cs / this.damps) * (norm / this.expected - 1));
-    this.seen.push(points[0].reward);
-    this.factorise();
-  }
-}
-
-/* coartic/baselines/cma_es.py, `Bandit`: a strategy for each hand sequence, the next generation to the
-   one whose upper confidence bound is highest. */
-class Search {
-  constructor(problem, seed, trials) {
-    Object.assign(this, { problem, left: trials, trials: 0, best: null, strategies: [] });
-    this.rng = new Generator(seed);
-    this.exploration = 0.2;
-    const named = letters_of(initial_hands(problem));
-    this.sequences = hand_sequences(problem).sort((a, b) => (letters_of(b) === named) - (letters_of(a) === named));
-  }
-
-  try(hands, targets) {
-    const trial = make_trial(this.problem, hands, targets);
-    this.trials += 1;
-    this.left -= 1;
-    if (trial.going && (!this.best || trial.reward > this.best.reward)) this.best = trial;
-    return trial;
-  }
-
-  /* The next trial or generation of trials. */
   step() {
-    if (this.sequences.length) {
-      this.strategies.push(new Strategy(this, this.sequences.shift()));
-      return;
-    }
-    if (!this.generations) {
-      this.strategies = this.strategies.filter((strategy) => strategy.first);
-      this.generations = this.strategies.length;
-      const first = this.strategies.map((strategy) => strategy.reward);
-      this.width = this.exploration * Math.max(Math.max(...first) - Math.min(...first), 1);
-    }
-    if (!this.strategies.length) {
-      this.left = 0;
-      return;
-    }
-    const bound = (strategy) => strategy.reward + this.width * Math.sqrt((2 * Math.log(this.generations)) / strategy.generations);
-    this.strategies.reduce((a, b) => (bound(b) > bound(a) ? b : a)).generation();
-    this.generations += 1;
+    const value = ([low, high]) => low + (high - low) * this.rng.random();
+    const targets = this.explored.map((explored, goal) => explored.map((moves, j) => (moves ? value(this.box[goal][j]) : NaN)));
+    const trial = make_trial(this.problem, this.hands, targets);
+    this.trials += 1;
+    if (trial.reward > this.best.reward) this.best = trial;
   }
 
   learned() {
@@ -813,7 +693,7 @@ function receding_horizon(problem, horizon) {
 
 if (typeof module !== "undefined") {
   module.exports = {
-    CONDITIONS, PAPER, Generator, Learner, Search, execute, initial_hands, letters_of, make_trial, problem_of,
+    CONDITIONS, PAPER, Generator, Learner, RandomSearch, best_hands, execute, initial_hands, letters_of, make_trial, problem_of,
     receding_horizon, trajectory,
   };
 }

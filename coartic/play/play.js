@@ -8,18 +8,19 @@ const PACE = 90; // ticks a second
 const PRACTICE = 1.05; // by which the trials shown grow in two pictures, at first
 const HOLD_S = 0.9; // at a hit
 const MOST_GOALS = 6;
-const FAR = 12; // length units: no goal lies farther
+const FAR = 12; // length units or rad: no goal lies farther, no joint is turned more
 const STRIDE = 2; // length units, to a new goal
 const ROLES = ["first", "second"];
 const NAMES = {
-  alone: "one goal at a time", learner: "the learner", "cma-es": "evolution (CMA-ES)", plan: "the planner", you: "you",
+  alone: "one goal at a time", learner: "the learner", plan: "the planner", you: "you",
 };
-const LEARNS = ["learner", "cma-es"];
+const RANDOM_SEARCH = "guesses"; // among stored runs
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
-const within = (place) => place.map((value) => Math.round(100 * Math.max(-FAR, Math.min(FAR, value))) / 100);
+const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
+const within = (place) => bounded(place).map((value) => Math.round(100 * value) / 100);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 /* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first. `told`
@@ -48,6 +49,17 @@ function read(link, first) {
     }
   });
   return state;
+}
+
+/* How far two samples of postures lie apart: their means, and how far these are apart, also in pooled standard
+   deviations; null without any spread. */
+function posture_difference(samples) {
+  const means = samples.map((runs) => runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length));
+  const distance = apart(...means);
+  const squares = samples.reduce((sum, runs, k) => sum + runs.reduce((part, q) => part + apart(q, means[k]) ** 2, 0), 0);
+  const [n, m] = samples.map((runs) => runs.length);
+  const deviation = n > 1 && m > 1 ? Math.sqrt(squares / (n + m - 2)) : 0;
+  return { means, distance, deviations: deviation ? distance / deviation : null, runs: Math.min(n, m) };
 }
 
 /* A film of what one robot does: its rows, and ticks at which goals are hit. */
@@ -107,7 +119,8 @@ class Play {
 
   taskWith(goals) {
     const { task } = this.preset;
-    return { ...task, goals, initial_hands: task.initial_hands.length === goals.length ? task.initial_hands : "best-of-all" };
+    const fits = !/^[LR]+$/.test(task.initial_hands) || task.initial_hands.length === goals.length;
+    return { ...task, goals, initial_hands: fits ? task.initial_hands : "best-of-all" };
   }
 
   /* Who moves a robot. */
@@ -135,21 +148,22 @@ class Play {
     return run && kept ? run : null;
   }
 
-  rules(who) {
+  /* The learner's condition. */
+  get rules() {
     const { reward, explores } = this.state;
-    if (who === "cma-es") return who;
     const two = this.problems[0].hands.length > 1;
-    const rules = two ? CONDITIONS[explores] || CONDITIONS.EC4 : { ...CONDITIONS.EC1, hands: this.problems[0].hands };
+    const chosen = Object.hasOwn(CONDITIONS, explores) ? explores : "EC4";
+    const rules = two ? CONDITIONS[chosen] : { ...CONDITIONS.EC1, hands: this.problems[0].hands };
     return reward === "movement" ? { ...rules, credit: "subtask" } : rules;
   }
 
   /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
   ask() {
     const { state } = this;
-    const mover = (who) => (who in NAMES || this.stored(who) ? who : "learner");
+    const mover = (who) => (Object.hasOwn(NAMES, who) || this.stored(who) ? who : "learner");
     [state.who, state.mate] = [mover(state.who), mover(state.mate === "you" ? "learner" : state.mate)];
     this.problems = this.tasks.map((task) => problem_of(task));
-    this.alone = this.problems.map((problem) => corrective_trial(problem, initial_hands(problem)));
+    this.alone = this.problems.map((problem) => corrective_trial(problem, best_hands(problem)));
     this.stale = true;
     this.showControls();
     this.send();
@@ -163,13 +177,16 @@ class Play {
     const { told } = this;
     const jobs = [];
     const order = (key, task, job) => jobs.push({ key, task, trials: 1, turn: 1, ...job });
+    const practise = (key, task, rules, turn) => {
+      for (let seed = 0; seed < (told ? 1 : SEEDS); seed += 1) {
+        order(`${key} ${seed}`, task, { rules, seed, trials: TRIALS, turn: turn || (seed && seed + 1) });
+      }
+    };
     this.tasks.forEach((task, k) => {
       const who = this.by(k);
       if (!this.alone[k].going || this.stored(who)) return; // or a goal is out of reach
-      const seeds = this.state.others && this.state.who !== "you" ? SEEDS : 1;
-      for (let seed = 0; LEARNS.includes(who) && seed < seeds; seed += 1) {
-        order(`${k} run ${seed}`, told ? told.task : task, { rules: this.rules(who), seed, trials: TRIALS, turn: seed && seed + 1 });
-      }
+      if (who === "learner") practise(`${k} run`, told ? told.task : task, this.rules);
+      if (this.state.others && ["learner", "plan"].includes(this.state.who)) practise(`${k} random`, task, "random search", SEEDS + 1);
       if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
       else order(`${k} far`, task, { horizon: MOST_GOALS });
     });
@@ -211,6 +228,13 @@ class Play {
     return result ? result.snapshots.findLast((each) => each.trials <= trials) || null : null;
   }
 
+  /* What each run knows after the trials shown, of runs that have made them; the first may be on its way. */
+  practised(key) {
+    const keys = Array.from({ length: SEEDS }, (_, seed) => `${key} ${seed}`);
+    const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || (!seed && key.endsWith("run"))));
+    return there.map((each) => this.snapshot(each)).filter(Boolean);
+  }
+
   get shown() {
     return this.state.trials || Math.floor(this.paced);
   }
@@ -224,8 +248,11 @@ class Play {
       return this.own.map(([hand, ...q], goal) => (q.length
         ? { goal, hand, kind: "learned", target: q } : { goal, hand, kind: "corrective", target: null }));
     }
-    const snapshot = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : this.snapshot(`${k} run 0`);
-    return who === "alone" || !snapshot ? null : snapshot.movements;
+    if (who === "alone") return null;
+    const runs = this.practised(`${k} run`).sort((a, b) => a.reward - b.reward);
+    const median = runs[Math.floor(runs.length / 2)] || this.snapshot(`${k} run 0`);
+    const snapshot = who === "plan" ? this.snapshot(`${k} plan`, Infinity) : median;
+    return snapshot && snapshot.movements;
   }
 
   /* The films of the answer, made from what is known by now. */
@@ -373,50 +400,44 @@ class Play {
     }
   }
 
-  /* Postures in which the robots hit the shared goal: of each run, and their mean. */
-  get runs() {
+  /* Postures in which the robots hit the shared goal, of each run; where a goal has moved, before and after. */
+  get postures_met() {
     const { told, shared } = this;
     return this.main.map(({ trial }, k) => {
       const who = this.by(k);
-      let runs = [trial.reached[shared]];
-      if (told) runs = [this.snapshot("0 run 0"), this.snapshot("0 before", Infinity)].slice(k, k + 1).map((each) => each && each.reached[shared]);
-      else if (this.stored(who)) runs = this.stored(who).films[k].reached;
-      else if (LEARNS.includes(who)) {
-        for (let seed = 1; seed < SEEDS; seed += 1) {
-          const snapshot = this.fresh.has(`${k} run ${seed}`) && this.snapshot(`${k} run ${seed}`);
-          if (snapshot && (snapshot.trials >= this.shown || this.result(`${k} run ${seed}`).done)) runs.push(snapshot.reached[0]);
-        }
+      if (told) {
+        const before = k ? this.snapshot("0 before", Infinity) : this.snapshot("0 run 0");
+        return before ? [before.reached[shared], trial.reached[shared]] : [];
       }
-      runs = runs.filter(Boolean);
-      const mean = told ? trial.reached[shared] : runs.length && runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length);
-      return { runs, mean };
-    });
+      if (this.stored(who)) return this.stored(who).films[k].reached;
+      return who === "learner" ? this.practised(`${k} run`).map(({ reached }) => reached[0]) : [trial.reached[0]];
+    }).map((runs) => runs.filter(Boolean));
   }
 
   /* How far apart the robots hit the goal they share, in words and as a picture. */
   compare() {
-    const both = this.main.length > 1 ? this.runs : [];
-    this.find("together").hidden = !both.length || !both.every(({ runs, mean }) => runs.length && mean);
-    this.difference = null;
+    const both = this.main.length > 1 ? this.postures_met : [];
+    this.find("together").hidden = !both.length || !both.every((runs) => runs.length);
+    [this.difference, this.by_chance] = [null, null];
     if (this.find("together").hidden) return;
-    const distance = apart(both[0].mean, both[1].mean);
-    const [n, m] = both.map(({ runs }) => runs.length);
-    const squares = both.reduce((sum, { runs, mean }) => sum + runs.reduce((part, q) => part + apart(q, mean) ** 2, 0), 0);
-    const spread = n > 1 && m > 1 ? Math.sqrt(squares / (n + m - 2)) : 0;
-    this.difference = {
-      distance, runs: Math.min(n, m), spreads: spread ? distance / spread : null, chance: Math.sqrt(1 / n + 1 / m),
-      shifts: both.map(({ runs: [before], mean }) => apart(mean, before)),
-    };
+    this.difference = posture_difference(this.told ? both.map((runs) => runs.slice(1)) : both);
+    if (this.told) this.difference.shifts = both.map(([before, after]) => apart(before, after));
+    else {
+      const stored = this.stored(RANDOM_SEARCH);
+      const random = both.map((_, k) => (stored ? stored.films[k].reached : this.practised(`${k} random`).map(({ reached }) => reached[0])));
+      if (random.every((runs) => runs.length)) this.by_chance = posture_difference(random);
+    }
     if (!this.state.open) return;
     const { inset, colours, problems: [problem] } = this;
-    const points = both.flatMap(({ runs, mean }) => [...runs, mean].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
+    const { means } = this.difference;
+    const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
     const [x, y] = problem.goals[this.shared];
-    inset.begin(around([...points, [x + 0.3, y + 0.2], ...both.map(({ mean }) => [mean[0] - 0.5, mean[1] - 0.1])], 0.3));
-    const thin = this.told ? " Thin: before the goal moved." : n > 1 || m > 1 ? " Thin: single runs; thick: their mean." : "";
+    inset.begin(around([...points, [x + 0.3, y + 0.2], ...means.map(([base_x, base_y]) => [base_x - 0.5, base_y - 0.1])], 0.3));
+    const thin = this.told ? " Thin: before the goal moved." : both.some((runs) => runs.length > 1) ? " Thin: single runs; thick: their mean." : "";
     this.find("enlarged").textContent = `At goal ${this.shared + 1}, enlarged.${thin}`;
-    both.forEach(({ runs, mean }, k) => {
+    both.forEach((runs, k) => {
       runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
-      inset.robot(problem, mean, { colour: colours[ROLES[k]], alpha: 0.9 });
+      inset.robot(problem, means[k], { colour: colours[ROLES[k]], alpha: 0.9 });
     });
     inset.goal([x, y], problem.radius, { label: `${this.shared + 1}`, colour: colours.ink, hit: true });
   }
@@ -424,10 +445,11 @@ class Play {
   /* Ticks needed against trials, on a logarithmic scale. */
   drawCurve() {
     const { curve, colours } = this;
-    const learns = LEARNS.includes(this.state.who) && !this.told;
+    const learns = this.state.who === "learner" && !this.told;
     this.find("learning").hidden = !learns;
     if (!learns) return;
-    const runs = this.problems.map((_, k) => this.result(`${k} run 0`)).filter(Boolean);
+    const runs_of = (k) => Array.from({ length: SEEDS }, (_, seed) => this.result(`${k} run ${seed}`)).filter(Boolean);
+    const runs = this.problems.flatMap((_, k) => runs_of(k));
     const references = [...this.alone.map((trial) => -trial.reward), ...this.plan.map((plan) => plan && -plan.reward)].filter(Number.isFinite);
     const learned = runs.flatMap(({ snapshots }) => snapshots.map(({ reward }) => -reward));
     const all = [...references, ...learned].filter(Number.isFinite);
@@ -450,11 +472,11 @@ class Play {
     }
     this.problems.forEach((_, k) => {
       const level = (reward, dash) => { if (Number.isFinite(reward)) curve.path([[left, y(-reward)], [right, y(-reward)]], 1.2, dash); };
-      const { snapshots = [] } = this.result(`${k} run 0`) || {};
       context.strokeStyle = colours[ROLES[k]];
       level(this.alone[k].reward, [2, 4]);
       level(this.plan[k] && this.plan[k].reward, [8, 4]);
-      curve.path(snapshots.flatMap(({ trials, reward }, i) => [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)])), 2.5);
+      runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
+        [snapshots[Math.max(0, i - 1)].reward, reward].map((each) => [x(trials), y(-each)]))), 1.5));
     });
     const at = Math.min(this.shown, Math.max(1, ...runs.map(({ made }) => made)));
     context.fillStyle = colours.ink;
@@ -493,36 +515,45 @@ class Play {
     if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
-      const hands = this.problems[0].hands.length > 1 ? ` (hands ${this.alone[0].hands.map((hand) => "LR"[hand]).join("")})` : "";
-      return [`${saved ? counted(Math.abs(saved), "tick") : "No tick"} ${saved < 0 ? "more" : "fewer"} than one goal at a time${hands}.`];
+      const [{ hands, goals }] = this.problems;
+      const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
+      const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
+      const runs = this.practised("0 run").length;
+      return [
+        `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} one goal at a time${used}.`,
+        runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
+      ];
     }
     if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
     if (!difference) return [""];
-    const { spreads, distance, runs, chance } = difference;
+    const { deviations, distance, runs } = difference;
+    const { by_chance } = this;
+    const beside = (value) => (by_chance ? ` (random search: ${value})` : "");
     if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
-    if (spreads === null) return [`At goal 1 the robots' postures lie ${short(distance)} apart.`, far];
+    if (deviations === null) return [`At goal 1 the robots' postures lie ${short(distance)} apart${beside(by_chance && short(by_chance.distance))}.`, far];
     return [
-      `At goal 1 the robots' postures lie ${spreads.toFixed(1)} standard deviations apart.`,
-      `One standard deviation is how far single runs lie from their mean (${runs} runs each). Two such samples of one task would lie about ${chance.toFixed(1)} standard deviations apart by chance.`,
+      `At goal 1 the robots' postures lie ${deviations.toFixed(1)} standard deviations apart${beside(by_chance && (by_chance.deviations || 0).toFixed(1))}.`,
+      `One standard deviation is how far single runs lie from their mean (${runs} runs each). Random search keeps the best of as many random trials.`,
     ];
   }
 
   /* Who needs how many ticks: role, name, trial. */
   get scores() {
     const { state, main } = this;
-    if (main.length > 1 && state.who !== "you") {
-      const names = this.told ? ["The learner's next trial", "The planner"] : ["Blue", "Orange"];
-      return main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
-    }
-    const scores = [["first", capital(this.nameOf(state.who)), main[0].trial.reward]];
-    if (state.who !== "alone") scores.push(["ghost", "One goal at a time", this.alone[0].reward]);
+    const you = state.who === "you";
+    let names = you ? ["You", `Orange: ${this.nameOf(state.mate)}`] : ["Blue", "Orange"];
+    if (this.told) names = ["The learner's next trial", "The planner"];
+    if (main.length < 2) names = [capital(this.nameOf(state.who))];
+    const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
+    if (main.length > 1 && !you) return scores;
+    if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "One goal at a time", this.alone[0].reward]);
     if (this.plan[0] && state.who !== "plan") scores.push(["plan", "Planner that sees all goals", this.plan[0].reward]);
     return scores;
   }
 
   say() {
     const { state } = this;
-    const learns = LEARNS.includes(state.who);
+    const learns = state.who === "learner";
     const run = this.result("0 run 0");
     const at = learns && run ? Math.min(this.shown, run.made) : 0;
     const [finding, meaning = ""] = this.finding;
@@ -537,7 +568,7 @@ class Play {
     this.find("score").replaceChildren(...scores);
     this.set("textContent", {
       lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") : "", play: this.playing ? "Pause" : "Play",
-      count: `${this.tick + 1} of ${this.last + 1} ticks`,
+      count: `${this.main.map((mover, k) => `${this.main.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${mover.last + 1}`).join(", ")} ticks`,
     });
     if (state.who === "you") [this.find("hand").value] = this.own[state.edited - 1];
     this.find("practice").hidden = !learns;
@@ -720,7 +751,7 @@ class Play {
     /* The task as it is chosen. */
     const choose = (preset) => {
       const { who, mate, reward, open } = this.state;
-      const live = who in NAMES ? who : this.first.who;
+      const live = Object.hasOwn(NAMES, who) ? who : this.first.who;
       this.restore(written({ ...this.first, preset, who: live, mate, reward, open }, this.first));
       this.keep();
     };
@@ -816,6 +847,7 @@ class Play {
     state.goals = goals && goals.length ? goals : task.goals;
     state.others = second ? (second.length && state.goals.length > 1 ? second : null) : others;
     state.told = told && told.length ? told : null;
+    state.own = state.own && state.own.map(bounded);
     if (!(state.trials >= 1 && state.trials < TRIALS)) state.trials = 0;
     [state.tick, state.trials] = [state.tick, state.trials].map(Math.round);
     this.find("more").open = Boolean(state.open);
@@ -824,7 +856,7 @@ class Play {
     this.view = null;
     this.playing = false;
     this.waits = state.tick < 0 && state.who !== "you";
-    this.paced = this.waits && !state.trials && !this.calm.matches && LEARNS.includes(state.who) ? 1 : Infinity;
+    this.paced = this.waits && !state.trials && !this.calm.matches && state.who === "learner" ? 1 : Infinity;
     this.ask();
   }
 

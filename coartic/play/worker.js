@@ -2,12 +2,12 @@
 
 const SLICE_MS = 50;
 
-/* A run of the learner, of CMA-ES or of a planner, as an order names it. */
+/* A run of the learner, of random search or of a planner, as an order names it. */
 class Job {
   constructor({ key, task, rules, seed, horizon, trials, turn = 0 }) {
     const problem = problem_of(task);
     Object.assign(this, { key, trials, turn, made: 0, due: 1, snapshots: [], done: false });
-    if (rules === "cma-es") this.method = new Search(problem, seed, trials);
+    if (rules === "random search") this.method = new RandomSearch(problem, seed);
     else if (rules) this.method = new Learner(problem, rules, seed);
     else this.method = { learned: () => receding_horizon(problem, horizon), step() {} };
   }
@@ -16,7 +16,7 @@ class Job {
     const { method } = this;
     method.step();
     this.made = method.trials || 1;
-    this.done = this.made >= this.trials || method.left <= 0;
+    this.done = this.made >= this.trials;
     if (this.made >= this.due || this.done) {
       this.due = Math.max(this.made + 1, Math.ceil(1.1 * this.made));
       const learned = method.learned();
