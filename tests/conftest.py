@@ -38,6 +38,16 @@ def _kernels():
         warm_up(load_task("ascending"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _parts_of_reports_fail_aloud():
+    """A part of a report that cannot be made fails the test, where a user gets the others."""
+    from coartic.analysis.report import about
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(about, "attempt", lambda study, _, make: make(study))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _plain_width(monkeypatch):
     """Output as wide as it is without a terminal, whatever started the tests."""

@@ -86,6 +86,14 @@ def test_verdicts_of_planted_means(monkeypatch):
     assert judged.p_holm["above"] == pytest.approx(min(1, alone * len(claims)))
 
 
+def test_a_claim_on_nothing_and_an_unknown_side_are_refused():
+    with pytest.raises(coartic.CoarticError, match="one finding at least"):
+        all_of(*[])
+    for side in ("larger", "two-sided", "Greater"):
+        with pytest.raises(coartic.CoarticError, match="unknown side"):
+            mean_beyond("{}", [4.0, 5.0, 6.0], 1.0, side)
+
+
 CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
 """Values whose mean is above 0 because of the last one."""
 

@@ -13,15 +13,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, Task, load_task
 from coartic.analysis.methods import name_of
-from coartic.analysis.report import render
-from coartic.analysis.report.about import answers, limits
+from coartic.analysis.report import about, render
+from coartic.analysis.report.about import answers, attempt, limits
 from coartic.analysis.report.build import write_report
 from coartic.analysis.report.trace import rows_of, runs_behind, tables_of
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.study import Study
 from coartic.analysis.table import SHORT_ID
+from coartic.analysis.topics import coarticulation
 from coartic.benchmarks.suites import load_suite, select_cells
 from coartic.runs.store import RUNS_FILE
 from tests.support import made_up
@@ -299,3 +300,38 @@ def test_a_row_for_each_pair_of_tasks_that_share_a_goal(tmp_path):
     assert contexts.index.is_unique
     assert len(contexts) == 6
     write_report(seen, tmp_path / "report", for_paper=False)
+
+
+def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
+    """The page names it in its place, the command names it and exits with 1."""
+    cells = select_cells(load_suite("paper"), KNOWN, tasks=["ascending"], methods=["EC1"])
+    run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
+
+    def shared_goal(study):
+        return [][study.plan.seed]
+
+    monkeypatch.setattr(coarticulation, "shared_goal", shared_goal)
+    with pytest.raises(IndexError):  # what every other test would meet
+        coartic("report", tmp_path / "runs")
+    monkeypatch.setattr(about, "attempt", attempt)
+    code, said, error = coartic("report", tmp_path / "runs")
+    assert code == 1
+    assert "Nearest" in said
+    assert "Error: Coarticulation could not be made" in error
+    assert f"IndexError: list index out of range ({__file__.rpartition('/')[2]}, line" in error
+    report = tmp_path / "runs" / "report"
+    text = (report / "report.html").read_text("utf-8")
+    section = re.search(r'<section aria-labelledby="coarticulation">.*?</section>', text, re.S)
+    assert "could not be made: IndexError: list index out of range" in section[0]
+    assert {path.stem for path in report.glob("tables/*.csv")} >= {"ranking", "claims", "tasks"}
+
+
+def test_a_goal_alone_and_followed_have_a_report(tmp_path):
+    """The usual control: one task is the beginning of the other, and they have no context each."""
+    for name, goals in (("alone", [(6, 2)]), ("followed", [(6, 2), (6, 4)])):
+        Task(name=name, goals=goals, hands=["right"]).save(tmp_path / f"{name}.toml")
+    names = [str(tmp_path / f"{name}.toml") for name in ("alone", "followed")]
+    cells = select_cells(load_suite("paper"), KNOWN, tasks=names, methods=["EC1"])
+    study = run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)
+    assert TABLES["contexts"](study).empty
+    write_report(study, tmp_path / "report", for_paper=False)

@@ -151,6 +151,13 @@ def test_pairs_of_contexts():
     assert context_pairs({"a": moved, "b": wider}) == []
 
 
+def test_a_context_is_another_next_goal():
+    """The end of a task is none."""
+    goals = [(4.5, 0.1), (4.6, 0.1), (4.7, 0.1)]
+    tasks = {str(n): tiny_task(goals=goals[:n], initial_hands="R" * n) for n in (1, 2, 3)}
+    assert context_pairs(tasks) == [("2", "3", 1)]
+
+
 def test_permutations_by_brute_force():
     """Every division of seven runs, counted one by one."""
     draw = rng(11)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -20,10 +20,13 @@ from numpy.typing import ArrayLike
 from coartic.analysis.statistics.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate, p_value
+from coartic.errors import CoarticError
+from coartic.text import unknown
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
+Side = Literal["greater", "less"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def mean_beyond(
     sentence: str,
     values: ArrayLike,
     bound: float = 0.0,
-    side: Literal["greater", "less"] = "greater",
+    side: Side = "greater",
 ) -> Finding:
     """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
 
@@ -107,12 +110,19 @@ def mean_beyond(
         Whether the mean lies there, the sentence, and the test, also without the task that speaks
         most for the claim, and for its opposite; ``holds`` is None with fewer than three tasks.
 
+    Raises
+    ------
+    CoarticError
+        For another side.
+
     Examples
     --------
     >>> finding = mean_beyond("Planning saves {} ticks", [4.0, 5.0, 6.0, 7.0], 1.0)
     >>> finding.holds, finding.evidence
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
+    if side not in get_args(Side):
+        raise CoarticError(unknown("side", str(side), get_args(Side)))
     there = np.asarray(values, dtype=np.float64)
     there = there[~np.isnan(there)]
     if len(there) < FEWEST:
@@ -138,12 +148,19 @@ def all_of(*findings: Finding) -> Finding:
         It holds where all of them hold, and rests on all their tests and on those of their
         opposites where all have some; where one cannot be said, it is that one.
 
+    Raises
+    ------
+    CoarticError
+        Without findings: a claim that rests on nothing has no verdict.
+
     Examples
     --------
     >>> few = mean_beyond("one {}", [1.0])
     >>> all_of(mean_beyond("two {}", [1.0, 2.0, 3.0]), few).evidence
     'fewer than 3 random tasks can be judged'
     """
+    if not findings:
+        raise CoarticError("all_of needs one finding at least: a claim cannot rest on nothing")
     for finding in findings:
         if finding.holds is None:
             return finding

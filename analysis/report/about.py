@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import traceback
 from collections import Counter
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
 
 from coartic.analysis.methods import LEARNER, LEARNERS
 from coartic.analysis.sections import SECTIONS, Section
@@ -12,8 +14,11 @@ from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.topics.published import RUNS
 from coartic.analysis.topics.scores import is_known
 from coartic.analysis.words import NO_BREAK, listed, marked
+from coartic.errors import CoarticError
 from coartic.learner.learning import TRIALS
-from coartic.text import one_line
+from coartic.text import error_line, one_line
+
+Made = TypeVar("Made")
 
 
 def shown(text: str) -> str:
@@ -27,10 +32,33 @@ def visible_sections(study: Study) -> list[Section]:
 
 
 @cached
+def failures(study: Study) -> dict[str, str]:
+    """Return the errors of :func:`attempt` so far, in words, by what failed."""
+    return {}
+
+
+def attempt(study: Study, name: str, make: Callable[[Study], Made]) -> Made | None:
+    """Make a part of a report, so that one that fails does not cost the others.
+
+    Returns None where it fails; :func:`failures` then has the error and its place by the ``name``
+    of the section. Raises CoarticError, which says that the folder is at fault.
+    """
+    try:
+        return make(study)
+    except CoarticError:
+        raise
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, line {place.lineno}"
+        failures(study).setdefault(name, f"{error_line(error)} ({where})")
+        return None
+
+
+@cached
 def finding(study: Study, section: Section) -> list[str]:
     """Lines of a section's sentence; none where the runs say nothing."""
-    text = section.sentence(study).strip() if section.sentence else ""
-    return [shown(line.strip()) for line in text.split("\n")] if text else []
+    text = attempt(study, section.short, section.sentence) if section.sentence else ""
+    return [shown(line.strip()) for line in text.strip().split("\n")] if text else []
 
 
 def answers(study: Study) -> list[tuple[Section, list[str]]]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import html
 import os
+from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from shlex import quote
 from typing import Any, get_args
 
+import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
@@ -18,7 +20,7 @@ from coartic.analysis.report import about
 from coartic.analysis.report.player import player
 from coartic.analysis.report.render import IN_LATEX, MOST_ROWS, TONES, html_table, latex_table
 from coartic.analysis.report.trace import stamp
-from coartic.analysis.sections import SECTIONS, TABLES
+from coartic.analysis.sections import SECTIONS, TABLES, Section
 from coartic.analysis.study import Study, cached
 from coartic.analysis.topics.ranking import differences
 from coartic.analysis.words import id_of, listed, number
@@ -26,6 +28,8 @@ from coartic.files import check_inside, make_folder, publish
 from coartic.play.page import text_of
 
 HERE = Path(__file__).parent
+NO_PARTS: dict[str, Any] = {"rows": 0, "claims": [], "finding": [], "figure": None}
+"""Parts of a section that failed."""
 
 
 def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[str]:
@@ -50,53 +54,75 @@ def write_report(study: Study, folder: Path, *, for_paper: bool = True) -> list[
     ):
         raise CoarticError(f"{folder} holds the report of other results: choose another folder")
     files = {"report.html": page(study, home).encode()}
-    captions = {id_of(section.table): section.caption for section in SECTIONS}
-    for name, table in TABLES.items():
-        frame = table(study)
-        if len(frame):
-            files[f"tables/{name}.csv"] = frame.to_csv(lineterminator="\n").encode()
-            if for_paper and name in IN_LATEX and len(frame) <= MOST_ROWS:
-                notes = about.notes_of(study, frame.columns)
-                text = latex_table(frame, name, captions[name], notes)
-                files[f"tables/{name}.tex"] = text.encode()
-    if for_paper:
-        for name, plot in plots(study).items():
-            for ending in (".svg", ".pdf"):
-                files[f"figures/{name}{ending}"] = picture(plot.figure, ending)
-                plot.figure.set_layout_engine("none")  # the next is laid out alike
+    sections = {id_of(section.table): section for section in SECTIONS}
+    for name in TABLES:
+        where = sections[name].short if name in sections else name
+        files |= about.attempt(study, where, partial(files_of_table, name, for_paper)) or {}
+    for section in about.visible_sections(study) if for_paper else ():
+        files |= about.attempt(study, section.short, partial(files_of_figure, section)) or {}
     publish(folder, files)
     return list(files)
 
 
+def files_of_table(name: str, for_paper: bool, study: Study) -> dict[str, bytes]:
+    """Return a table as CSV, ``for_paper`` in LaTeX as well, by path; nothing without rows."""
+    frame = TABLES[name](study)
+    if not len(frame):
+        return {}
+    files = {f"tables/{name}.csv": frame.to_csv(lineterminator="\n").encode()}
+    if for_paper and name in IN_LATEX and len(frame) <= MOST_ROWS:
+        (caption,) = (each.caption for each in SECTIONS if id_of(each.table) == name)
+        text = latex_table(frame, name, caption, about.notes_of(study, frame.columns))
+        files[f"tables/{name}.tex"] = text.encode()
+    return files
+
+
+def files_of_figure(section: Section, study: Study) -> dict[str, bytes]:
+    """Return the figure of a section as SVG and PDF, by path; nothing without one."""
+    files = {}
+    if (plot := plot_of(study, section)) is not None:
+        for ending in (".svg", ".pdf"):
+            files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
+            plot.figure.set_layout_engine("none")  # the next is laid out alike
+    return files
+
+
 @cached
-def plots(study: Study) -> dict[str, Plot]:
-    """Figures of the page by id, as far as the runs allow them."""
-    drawn = [each.figure(study) for each in about.visible_sections(study) if each.figure]
-    return {plot.id: plot for plot in drawn if plot}
+def plot_of(study: Study, section: Section) -> Plot | None:
+    """Return the figure of a section; None where it has none, or the runs allow none."""
+    return section.figure(study) if section.figure else None
 
 
 def sections(study: Study) -> list[dict[str, Any]]:
-    """Sections that the runs allow, as the template wants them.
-
-    With their ``finding`` and the number of ``rows``; ``figure`` is None where the runs do not
-    allow it.
-    """
+    """Return the sections that the runs allow, as :func:`parts_of` has them, and those that
+    failed, with the ``failure`` in words."""
     allowed = []
     for section in about.visible_sections(study):
-        name, frame = id_of(section.table), section.table(study)
-        plot = plots(study).get(id_of(section.figure)) if section.figure else None
-        if plot or len(frame):
-            words = {
-                "table": name,
-                "rows": len(frame),
-                "html": html_table(frame, name, section.caption) if len(frame) else "",
-                "example": f"'{frame.index[0]}'" if len(frame) else "",
-                "finding": about.finding(study, section),
-                "figure": plot,
-                "svg": for_page(plot) if plot else "",
-            }
-            allowed.append(vars(section) | words)
+        parts = about.attempt(study, section.short, partial(parts_of, section))
+        failure = about.failures(study).get(section.short, "")
+        if failure or (parts and (parts["figure"] or parts["rows"])):
+            allowed.append({**vars(section), **NO_PARTS, **(parts or {}), "failure": failure})
     return allowed
+
+
+def parts_of(section: Section, study: Study) -> dict[str, Any]:
+    """Return a section as the template wants it, with its ``finding`` and the number of ``rows`` of
+    its table; ``figure`` is None where the runs do not allow it."""
+    name, frame, plot = id_of(section.table), section.table(study), plot_of(study, section)
+    claims = frame.reset_index(names="id") if section.id == "claims" else pd.DataFrame()
+    if len(claims):
+        by_verdict = claims.verdict.map(get_args(Verdict).index)
+        claims = claims.loc[by_verdict.sort_values(kind="stable").index]
+    return {
+        "claims": claims.to_dict("records"),
+        "table": name,
+        "rows": len(frame),
+        "html": html_table(frame, name, section.caption) if len(frame) else "",
+        "example": f"'{frame.index[0]}'" if len(frame) else "",
+        "finding": about.finding(study, section),
+        "figure": plot,
+        "svg": for_page(plot) if plot else "",
+    }
 
 
 def page(study: Study, home: str) -> str:
@@ -116,21 +142,18 @@ def page(study: Study, home: str) -> str:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
         links = []
-    verdicts, claims = list(get_args(Verdict)), TABLES["claims"](study).reset_index(names="id")
-    claims = claims.sort_values("verdict", key=lambda each: each.map(verdicts.index), kind="stable")
     made_with = study.made_with
     cards = [(section, lines[0]) for section, lines in about.answers(study)]
     return environment.get_template("page.html.jinja").render(
         title=f"Coarticulation of a simulated robot: suite {study.suite}",
         description=" ".join(text for _, text in cards),
         styles=(HERE / "page.css").read_text("utf-8") + text_of("play.css"),
-        player=player(study),
+        player=about.attempt(study, "Film", player) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         cards=cards,
-        differences=differences(study),
+        differences=about.attempt(study, "Differences of gaps", differences) or {},
         sections=sections(study),
-        claims=claims.to_dict("records"),
-        verdicts=verdicts,
+        verdicts=get_args(Verdict),
         tones=TONES,
         suite=study.suite,
         home=home,
@@ -140,5 +163,6 @@ def page(study: Study, home: str) -> str:
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         limits=about.limits(study),
+        failures=about.failures(study),
         links=dict(link.split(", ", 1) for link in links),
     )

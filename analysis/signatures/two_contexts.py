@@ -30,13 +30,17 @@ from coartic.tasks.optima import KEPT
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Pairs of tasks that differ only after their first goals, and how many they share."""
+    """Pairs of tasks that differ only after their first goals, and how many they share.
+
+    Shared goals count that are followed by another goal in both tasks.
+    """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
         if not others_differ and first.goals != second.goals:
             same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
-            pairs.append((a, b, len(list(takewhile(bool, same)))))
+            shared = len(list(takewhile(bool, same)))
+            pairs.append((a, b, min(shared, len(first.goals) - 1, len(second.goals) - 1)))
     return [pair for pair in pairs if pair[2]]
 
 

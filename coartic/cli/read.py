@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.terminal import say, say_pairs, show_frame
+from coartic.cli.terminal import complain, say, say_pairs, show_frame
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.inputs import MOST_RUNS
@@ -48,21 +47,34 @@ def report(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{counted(tables, 'table')} ({what})."
     )
-    say_pairs([*answers_in_words(study)])
+    say_answers(study)
     if not for_paper:
         say_pairs(
             [("More", "coartic report --for-paper adds figures as SVG and PDF and tables as LaTeX")]
         )
+    exit_if_parts_failed(study)
 
 
-def answers_in_words(study: Study) -> Iterator[tuple[str, str]]:
-    """The answers of a folder, and why runs failed if some did: word and text."""
+def say_answers(study: Study, *more: tuple[str, str]) -> None:
+    """Print the answers of a folder, why runs failed if some did, and pairs of word and text."""
     from coartic.analysis.report.about import answers, limits
 
-    yield from ((section.answer, " ".join(lines)) for section, lines in answers(study))
+    pairs = [(section.answer, " ".join(lines)) for section, lines in answers(study)]
     what = limits(study)
     if what["failed"]:
-        yield "Failed", f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
+        failed = f"{what['failed']} of {what['runs']} runs: {'; '.join(what['reasons'])}"
+        pairs.append(("Failed", failed))
+    say_pairs([*pairs, *more])
+
+
+def exit_if_parts_failed(study: Study) -> None:
+    """Name the parts of the report that could not be made, and exit with code 1 if there are any."""
+    from coartic.analysis.report.about import failures
+
+    for part, reason in failures(study).items():
+        complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
+    if failures(study):
+        sys.exit(1)
 
 
 def trace(

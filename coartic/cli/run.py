@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
-from coartic.cli.read import answers_in_words
+from coartic.cli.read import exit_if_parts_failed, say_answers
 from coartic.cli.terminal import Display, say, say_pairs
 from coartic.errors import CoarticError
 from coartic.files import folder_named
@@ -140,7 +140,9 @@ def run(
     say(str(progress))
     from coartic.analysis.study import load
 
-    say_pairs([*answers_in_words(load(out)), ("Next", f"coartic report {out}")])
+    study = load(out)
+    say_answers(study, ("Next", f"coartic report {out}"))
+    exit_if_parts_failed(study)
     if progress.crashed:
         sys.exit(1)
 
