@@ -434,15 +434,58 @@ def test_p_of_shared_goals_is_corrected_by_method():
     assert table.p_holm[GUESSES].tolist() == pytest.approx([2 * 2 / 70] * 2)
 
 
-@pytest.mark.parametrize("apart", [0.0, 0.5])
-def test_a_method_that_draws_nothing_needs_no_test(apart):
-    """One run a context, and no guesses."""
+def test_a_signature_stands_beside_random_search():
+    study = beside_guesses(2.0)
+    contexts = coarticulation.shared_goal(study)
+    of_guesses = guesses.guesses_beside(study, contexts)
+    first, _, _ = coarticulation.next_goal(study).partition("\n")
+    assert f"{contexts.spreads:.1f} SD apart; random search: {of_guesses.spreads:.1f})" in first
+
+
+def beside_corrective(method, apart, *, stochastic, runs):
+    """A method whose base lies ``apart`` at goal 1 by the next goal, and the corrective process."""
     cells = [
-        posed(load_task(name), "trajectory-optimisation/jerk", [posture(x)])
-        for name, x in (("ascending", 0.0), ("descending", apart))
-    ]
+        posed(load_task(name), label, [posture(shift + 0.01 * run) for run in range(count)])
+        for label, shifts, count in (
+            ("corrective-alone/every", (0.0, 0.0), 1), (method, (0.0, apart), runs)
+        )
+        for name, shift in zip(("ascending", "descending"), shifts, strict=True)
+    ]  # fmt: skip
     study = study_with(*cells)
     study.runs["trials"] = 0
-    assert not guesses.selects(study, cells[0].label)
-    answer = "Yes. Minimum-jerk plan hits the same goal" if apart else "No significant difference:"
+    study.plan.methods[method] = replace(study.plan.methods[method], stochastic=stochastic)
+    return study
+
+
+@pytest.mark.parametrize(
+    ("made_up", "answer"),
+    [
+        ({"apart": 0.0, "stochastic": False, "runs": 1}, "No. mine hits the same goal in the same"),
+        ({"apart": 0.5, "stochastic": False, "runs": 1}, "Yes. mine hits the same goal in diff"),
+        ({"apart": 0.5, "stochastic": True, "runs": 1}, "Too few runs"),
+        ({"apart": 0.5, "stochastic": True, "runs": 9}, "Yes. mine hits the same goal in clearly"),
+        ({"apart": 0.0, "stochastic": True, "runs": 9}, "No significant difference:"),
+    ],
+)
+def test_no_difference_is_significant_or_not_without_a_test(made_up, answer):
+    """A method that draws nothing takes none, and one run a context allows none."""
+    study = beside_corrective("mine", **made_up)
+    assert not guesses.selects(study, "mine")
     assert coarticulation.next_goal(study).startswith(answer)
+
+
+def test_the_sentence_is_about_the_learner_or_a_method_from_a_file():
+    """Of another method, which may coarticulate or not by construction, there is none."""
+    study = beside_corrective("trajectory-optimisation/jerk", 0.5, stochastic=False, runs=1)
+    assert coarticulation.shared_goal(study) is not None
+    assert coarticulation.next_goal(study) == ""
+
+
+def test_one_run_beside_many_is_no_test():
+    """Of the 41 divisions one is as far apart, which would be below 5 %."""
+    study = study_with(*(
+        posed(load_task(name), "mine", [posture(x + 0.01 * run) for run in range(count)])
+        for name, x, count in (("ascending", 0.0, 40), ("descending", 0.5, 1))
+    ))  # fmt: skip
+    study.runs["trials"] = 0
+    assert coarticulation.next_goal(study).startswith("Too few runs")

@@ -18,6 +18,7 @@ from coartic.analysis.methods import (
     GUESSES,
     LEARNERS,
     in_order,
+    is_built_in,
     is_learner,
     is_search,
     is_setting,
@@ -39,6 +40,9 @@ from coartic.drawing import MARKERS
 from coartic.robot import HANDS, Array
 from coartic.text import counted
 
+SAME = 1e-9
+"""Postures, length units and rad, that lie no further apart are the same: it is rounding."""
+
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
     """Every goal that two tasks share before they differ, for every hand with which a method hit it
@@ -56,12 +60,14 @@ def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @cached
 def shared_goal(study: Study) -> TwoContexts | None:
-    """The first goal that two tasks share, by the paper's learner if it ran.
+    """The first goal that two tasks share, by the paper's learner if it ran, or else by a method
+    from a file if one did.
 
     None where no method has solved runs on two such tasks.
     """
     labels = [label for _, label in study.cells]
-    order = dict.fromkeys([*LEARNERS, *main_methods(labels), *labels])
+    subjects = sorted(filter(is_subject, labels), key=lambda label: not is_built_in(label))
+    order = dict.fromkeys([*LEARNERS, *subjects, *main_methods(labels), *labels])
     return next((contexts for label in order for contexts in shared_goals(study, label)), None)
 
 
@@ -180,36 +186,50 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 def next_goal(study: Study) -> str:
-    """Whether the posture at the goal that two tasks share depends on the next goal."""
+    """Say whether the posture at the goal that two tasks share depends on the next goal.
+
+    For the learner, or else for a method from a file; of other methods there is no sentence, as
+    many coarticulate, or cannot, by construction.
+    """
     shared = shared_goal(study)
-    if shared is None:
+    if shared is None or not is_subject(shared.method):
         return ""
     # A method whose runs differ by chance takes a test, and one that selects needs guesses.
     cells = [study.cells[task.name, shared.method] for task in shared.tasks]
     drawn = study.plan.methods[cells[0].method].stochastic
-    needed = selects(study, shared.method)
-    guesses = guesses_beside(study, shared) if needed else None
-    beyond = math.nan if guesses is None else shared.p_beyond(guesses)
-    who = "The learner" if is_learner(shared.method) else capital(name_of(shared.method))
-    verb = "hit" if who.startswith("Guesses") else "hits"
+    needed, guesses = selects(study, shared.method), guesses_beside(study, shared)
+    beyond = shared.p_beyond(guesses) if needed and guesses is not None else math.nan
+    who = "The learner" if is_learner(shared.method) else name_of(shared.method)
     runs, p = counted(shared.n, "run"), p_value(shared.p)
-    apart = f"{number(shared.spreads, 1)} SD"
-    if math.isnan(shared.spreads):
-        apart = f"{number(shared.apart, 2)} length units and rad"
-    if drawn and not smallest_p(*map(len, shared.configurations)) < LEVEL:
+    in_sd = not any(math.isnan(each.spreads) for each in (shared, guesses) if each is not None)
+
+    def distance(contexts: TwoContexts) -> str:
+        return number(contexts.spreads, 1) if in_sd else number(contexts.apart, 2)
+
+    apart = f"{distance(shared)} {'SD' if in_sd else 'length units and rad'} apart"
+    beside = f"random search: {distance(guesses)}" if guesses is not None else ""
+    apart_beside = f"{apart} ({beside})" if beside else apart
+    if drawn and not (smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0):
         text = "Too few runs to tell whether the next goal changes the posture."
-    elif not (shared.p < LEVEL if drawn else shared.apart > 0):
-        text = f"No significant difference: postures before different next goals lie {apart} apart."
-    elif not needed or beyond < LEVEL:
-        text = f"Yes. {who} {verb} the same goal in clearly different postures ({apart} apart)."
-    elif guesses is None:
-        text = f"Undecided: postures lie {apart} apart, and no guesses with as many trials ran."
-    elif math.isnan(beyond):
-        text = f"Undecided: postures lie {apart} apart, and too few guesses ran to compare."
-    else:
+    elif not drawn and shared.apart <= SAME:
+        text = f"No. {who} hits the same goal in the same posture."
+    elif drawn and not shared.p < LEVEL:
         text = (
-            f"Not shown: postures lie {apart} apart, not significantly more than those of guesses."
+            "No significant difference: postures before different next goals lie "
+            f"{apart_beside}."
         )
+    elif not needed or beyond < LEVEL:
+        different = "clearly different" if drawn else "different"
+        text = (
+            f"Yes. {who} hits the same goal in {different} postures "
+            f"({'; '.join(filter(None, (apart, beside)))})."
+        )
+    elif guesses is None:
+        text = f"Undecided: postures lie {apart}, and no guesses with as many trials ran."
+    elif math.isnan(beyond):
+        text = f"Undecided: postures lie {apart}, and too few guesses ran to compare."
+    else:
+        text = f"Not shown: postures lie {apart_beside}, which is not significantly more."
     text += (
         f"\nDepending on the next goal, postures of {name_of(shared.method)} at goal {shared.goal} "
         f"lie {number(shared.apart, 2)} apart (length units and rad; "
@@ -221,6 +241,12 @@ def next_goal(study: Study) -> str:
     elif needed:
         text += f". Run method {GUESSES} as well to tell"
     return f"{text}.{failed_runs(cells, ' and are not counted')}"
+
+
+def is_subject(label: str) -> bool:
+    """Return whether a sentence may be about a method: the learner, with any parameters, or a method
+    from a file."""
+    return label.partition(" ")[0] in LEARNERS or not is_built_in(label)
 
 
 def joints_or_hand(study: Study) -> str:

@@ -61,7 +61,7 @@ def guesses_beside(study: Study, contexts: TwoContexts) -> TwoContexts | None:
         each for each in guesses_on(study, names[0]) if each in guesses_on(study, names[1])
     ):
         most, wanted = (
-            [study.cells[name, who].runs.trials.max() for name in names]
+            [study.cells[name, who].runs.trials.fillna(0).max() for name in names]
             for who in (label, contexts.method)
         )
         if all(m >= w for m, w in zip(most, wanted, strict=True)):
