@@ -30,6 +30,8 @@ ALL_GUESSES = GUESSES, "guesses/hands"
 """The same with the best hands, and with every hand sequence."""
 INITIAL = "corrective-alone/given"
 """The corrective process with a task's initial hands: the initial solution."""
+BEST_HANDS = "corrective-alone/every"
+"""The corrective process with the best of all hand sequences."""
 
 
 class KnownMethod(NamedTuple):
@@ -66,6 +68,12 @@ def most_exploring(task: Task) -> str:
 def is_learner(label: str) -> bool:
     """Whether it is the paper's learner under its own conditions, alone or several together."""
     return label.startswith((LEARNER, TOGETHER)) and not is_setting(label)
+
+
+def learns_nothing(label: str) -> bool:
+    """Return whether a method makes trials without learning from them: guesses, and the corrective
+    process alone, which tries hand sequences."""
+    return label.partition(" ")[0] in (*ALL_GUESSES, INITIAL, BEST_HANDS)
 
 
 def is_built_in(label: str) -> bool:

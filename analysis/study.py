@@ -20,6 +20,7 @@ from coartic import Execution, Movement, NotApplicableError, Task, hand_sequence
 from coartic.analysis.frames import gaps
 from coartic.analysis.optima import known_optima
 from coartic.analysis.solutions import Solutions
+from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.motion.initial import ranked_sequences
@@ -167,8 +168,8 @@ class Study:
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """The tasks as they were run, by name."""
-        return self.plan.tasks
+        """The tasks as they were run, by name; titles that several share have the name besides."""
+        return {task.name: task for task in titled_apart(self.plan.tasks.values())}
 
     @cached
     def sequences(self, task: str) -> pd.DataFrame:

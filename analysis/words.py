@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -115,15 +116,31 @@ def interval(
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 
-def marked(task: Task) -> str:
-    """Title of a task, with † where it is reconstructed (:data:`RECONSTRUCTED`).
+def titled_apart(tasks: Iterable[Task]) -> list[Task]:
+    """Return tasks with titles that differ.
 
-    Its title; one that shares the title of its task has what is particular besides.
+    A changed task, ``ascending.radius-0.2``, has what is changed behind the title of its task; of
+    other tasks that share a title each has its name behind it.
     """
-    base, _, particular = task.name.partition(".")
-    shared = particular and task.label.lower().replace(" ", "-") == base
-    name = f"{task.label}, {particular}" if shared else task.label
-    return f"{name} †" if task.reconstructed else name
+    tasks, titles = [*tasks], []
+    for task in tasks:
+        base, _, change = task.name.partition(".")
+        is_changed = change and task.label.lower().replace(" ", "-") == base
+        titles.append(f"{task.label}, {change}" if is_changed else task.label)
+    shared = Counter(titles)
+    apart = [
+        f"{title} ({task.name})" if shared[title] > 1 else title
+        for task, title in zip(tasks, titles, strict=True)
+    ]
+    return [
+        task if task.label == title else task.model_copy(update={"title": title})
+        for task, title in zip(tasks, apart, strict=True)
+    ]
+
+
+def marked(task: Task) -> str:
+    """Title of a task, with † where it is reconstructed (:data:`RECONSTRUCTED`)."""
+    return f"{task.label} †" if task.reconstructed else task.label
 
 
 def tally(counts: Mapping[Any, int]) -> str:

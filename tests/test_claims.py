@@ -119,7 +119,14 @@ def test_claims_are_counted_by_verdict():
     half = verdicts_in_words(entries)
     assert half.startswith("Too few runs to judge the paper: 2 of 4 claims are undecided")
     assert verdicts_in_words(entries[:-1]).startswith(
-        "Central claims: supported 1, undecided 1.\nSupported: the posture depends"
+        "1 of 3 claims is supported, among them one of the two central ones.\nSupported: the post"
+    )
+    both = entries.assign(verdict=["supported", "not supported", "supported", "undecided"])
+    assert verdicts_in_words(both).startswith(
+        "2 of 4 claims are supported, among them the two central ones.\n"
+    )
+    assert verdicts_in_words(both.iloc[[1, 3]].assign(verdict="not supported")).startswith(
+        "0 of 2 claims are supported.\n"
     )
 
 

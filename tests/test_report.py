@@ -267,6 +267,29 @@ grid = { noise_sd = [0.02, 0.05, 0.1] }
     assert text.count("the runs are too few, or too alike, to tell") == 2
 
 
+def test_settings_with_the_same_rewards_are_said_to_have_them(tmp_path):
+    """One arm has no hand to explore: with the same seeds ε changes nothing."""
+    block = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\ngrid = {epsilon = [0.1, 0.2]}'
+    study = run_and_write(tmp_path / "runs", cells=suite_of(tmp_path, block), runs=3, trials=30)
+    assert study.runs.groupby("seed").result.nunique().tolist() == [1, 1, 1]
+    section, (card, line) = answers(study)[0]
+    assert section.id == "settings"
+    assert card == "No setting is better than all others on any of 1 task."
+    assert "(ε 0.1) and learner EC1 (ε 0.2, default)" in line
+    assert "the same in every run" in line
+
+
+def test_a_suite_of_own_tasks_does_not_open_with_the_paper(tmp_path):
+    """Also where one task beside them is the paper's; alone it does."""
+    Task(name="mine", goals=[(6, 2), (6, 4)], hands=["right"]).save(tmp_path / "mine.toml")
+    for names, due in (["ascending", "mine.toml"], False), (["ascending"], True):
+        tasks = ", ".join(f'"{tmp_path / n if n.endswith("toml") else n}"' for n in names)
+        cells = suite_of(tmp_path, f'tasks = [{tasks}]\nmethods = ["dual-process/EC1"]')
+        study = run_and_write(tmp_path / str(due), cells=cells, runs=1, trials=30)
+        said = {section.answer: lines[0] for section, lines in answers(study)}
+        assert said.get("Paper", "").startswith("Too few runs to judge the paper") == due
+
+
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
 def test_tables_compile_and_fit_the_text(tables_by_name, tmp_path):
     """That of article at 10 pt, 345 pt wide; none of their 8 pt are made smaller than 6."""

@@ -118,6 +118,30 @@ def test_the_learners_place_is_said():
     )
 
 
+def alike(**better):
+    """Methods by their beginnings, with -300 and so many ticks more on ascending."""
+    names = {"learner": "dual-process/EC1", "cma": "cma-es/bandit", "guesses": "guesses",
+             "climbing": "random-search/climbing", "alone": "corrective-alone/given"}  # fmt: skip
+    rewards = {("ascending", names[name]): [-300 + more] * 3 for name, more in better.items()}
+    return ranking.nearest(study(rewards))
+
+
+def test_ties_are_said():
+    text = alike(learner=0, cma=0, guesses=0)
+    assert text.startswith("The learner and CMA-ES have the same gap to the optimum (2.7 %).")
+    assert "Gap of guesses: 2.7 %, the same as the learner's." in text
+    text = alike(learner=0, cma=0, climbing=-1)
+    assert "have the same gap to the optimum (2.7 %), the smallest of the three that learn" in text
+    text = alike(learner=0, cma=0, climbing=1, guesses=1)
+    assert "the learner is number 2 (2.7 %)" in text
+    assert "Gap of guesses: 2.4 %, smaller than the learner's." in text
+
+
+def test_who_tries_hands_alone_does_not_learn():
+    """Its trials are two, to choose the hands."""
+    assert "of the two that learn" in alike(learner=0, cma=1, alone=0)
+
+
 def test_the_learner_stands_by_the_form_that_explores_most():
     better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
     seen = study(LEARNER | better)

@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from coartic import load_task
+from coartic.analysis.report.render import latex_table
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.topics import costs
 from coartic.analysis.topics.scores import BY_FORMULA, BY_TRIAL
@@ -166,3 +168,22 @@ def test_of_planners_the_best_alone_has_a_curve(study):
     both = study_of(pd.concat([study.runs, more]), optima=study.optima, rewards=study.rewards)
     assert worse in TABLES["runtimes"](both).index
     assert set(FIGURES["runtimes"](both).data.method) == {BOTH, CMA, PLAN}
+
+
+def test_tasks_of_one_title_have_their_names_besides():
+    """In every table, header and figure; a changed task has its change besides."""
+    up, same = (load_task("ascending").model_copy(update=changes) for changes in
+                ({}, {"name": "copied", "radius": 0.2}))  # fmt: skip
+    changed = up.model_copy(update={"name": "ascending.radius-0.3", "radius": 0.3})
+    names = ["Ascending (ascending)", "Ascending (copied)", "Ascending, radius-0.3"]
+    tasks = up, same, changed
+    rows = [row(CMA, -300 - n, task=task.name, run=n, run_id=f"{task.name}-{n}")
+            for task in tasks for n in range(3)]  # fmt: skip
+    seen = study_of(rows, tasks, optima={}, rewards=lambda: iter(()))
+    assert [task.label for task in seen.tasks.values()] == names
+    for table in ("tasks", "methods"):
+        assert TABLES[table](seen).task.tolist() == names
+    latex = latex_table(TABLES["tasks"](seen), "tasks", "Tasks")
+    assert all(name in latex for name in names)
+    titles = [axes.get_title(loc="left") for axes in FIGURES["tasks"](seen).figure.axes]
+    assert [title[3:].replace("\n", " ").strip() for title in titles if title] == names

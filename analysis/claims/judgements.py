@@ -35,6 +35,8 @@ from coartic.analysis.table import Row, Rows, table
 from coartic.analysis.topics.rewards import beside_paper
 from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import capital, listed, number, spelled
+from coartic.tasks.families import shipped_families
+from coartic.tasks.task import shipped_tasks
 
 CLAIMS = {claim.id: claim for claim in (*CLAIMS_OF_THE_PAPER, *CLAIMS_ON_FAMILIES)}
 """Every claim by its id."""
@@ -105,37 +107,57 @@ def list_claims(study: Study) -> Rows:
         yield claim.id, {**judged, **row}
 
 
-def verdicts_in_words(judged: pd.DataFrame) -> str:
-    """Verdicts on the claims that carry the paper's point, and how many of all have each."""
-    n = counts(judged.verdict)
-    short = judged.verdict.rename(lambda name: CLAIMS[name].short)
-    central = short[short.index != ""]
+def too_few(judged: pd.DataFrame) -> bool:
+    """Return whether half of the claims are undecided, as a folder lacks runs or trials, and not
+    all of the central ones are supported."""
+    central = central_verdicts(judged)
     all_hold = bool(len(central)) and (central == "supported").all()
-    if 2 * n["undecided"] >= len(judged) and not all_hold:  # they lack runs or trials
+    return bool(2 * (judged.verdict == "undecided").sum() >= len(judged) and not all_hold)
+
+
+def central_verdicts(judged: pd.DataFrame) -> pd.Series:
+    """Return the verdicts on the claims that carry the paper's point, by their short words."""
+    short = judged.verdict.rename(lambda name: CLAIMS[name].short)
+    return short[short.index != ""]
+
+
+def verdicts_in_words(judged: pd.DataFrame) -> str:
+    """Say how many claims are supported, of all and of those that carry the paper's point, and how
+    many have each verdict."""
+    n, central = counts(judged.verdict), central_verdicts(judged)
+    if too_few(judged):
         return (
             f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
             f"undecided.\nSupported: {n['supported']}. Tasks, methods, runs or trials are missing."
         )
-    card, each = (
-        ", ".join(f"{verdict} {count}" for verdict, count in counts(verdicts).items() if count)
-        for verdicts in (central, judged.verdict)
-    )
-    card = f"Central claims: {card}"
-    if all_hold:
-        card = f"All {spelled(len(central))} central claims are supported"
+    card = f"{n['supported']} of {len(judged)} claims {'is' if n['supported'] == 1 else 'are'} supported"
+    if len(central):
+        held, of = int((central == "supported").sum()), spelled(len(central))
+        some = of if held == len(central) else f"{spelled(held)} of the {of}"
+        card += f", among them {'the ' * (some == of)}{some} central ones"
+    each = ", ".join(f"{verdict} {count}" for verdict, count in n.items() if count)
     words = [
         f"{capital(verdict)}: {listed(names.index)}."
         for verdict, names in central.groupby(central, sort=False)
     ]
     lacking = judged.evidence.str.startswith("Not judged").sum()
-    without = f" Of the undecided, {number(lacking)} lack runs here." if lacking else ""
-    return f"{card}.\n{' '.join(words)} Of all {len(judged)} claims: {each}.{without}"
+    without = f"Of the undecided, {number(lacking)} lack runs here." if lacking else ""
+    return f"{card}.\n{' '.join(filter(None, [*words, f'Of all {len(judged)} claims: {each}.', without]))}"
 
 
 def claims_hold(study: Study) -> str:
-    """Whether the paper is reproduced, by its claims."""
+    """Say whether the paper is reproduced, by its claims; nothing of too few runs where the folder
+    has tasks that no claim is about."""
     judged = papers_claims(study)
-    if judged.empty:
+    if judged.empty or (too_few(judged) and has_own_tasks(study)):
         return ""
     failed = (study.cells[key] for keys in judged.failed for key in keys)
     return verdicts_in_words(judged) + failed_runs(failed, ", which leaves claims undecided")
+
+
+def has_own_tasks(study: Study) -> bool:
+    """Return whether a task is neither the paper's, as it is or changed, nor of a shipped family."""
+    shipped = {*shipped_tasks(), *shipped_families()}
+    return any(
+        (task.family or name.partition(".")[0]) not in shipped for name, task in study.tasks.items()
+    )

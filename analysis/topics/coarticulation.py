@@ -215,8 +215,7 @@ def next_goal(study: Study) -> str:
         text = f"No. {who} hits the same goal in the same posture."
     elif drawn and not shared.p < LEVEL:
         text = (
-            "No significant difference: postures before different next goals lie "
-            f"{apart_beside}."
+            f"No significant difference: postures before different next goals lie {apart_beside}."
         )
     elif not needed or beyond < LEVEL:
         different = "clearly different" if drawn else "different"

@@ -180,7 +180,8 @@ def draw_runtimes(study: Study) -> Parts | None:
     tabled = list_runtimes(study)
     curves = list(tabled.index)
     if not compares_settings(study):  # methods that learn, guesses, the best planner, from files
-        kept = [each for each in methods.main_methods(curves) if each != "corrective-alone/every"]
+        alone = methods.INITIAL, methods.BEST_HANDS
+        kept = [each for each in methods.main_methods(curves) if each not in alone]
         plan = [each for each in kept if scores.groups(study)[each] != scores.BY_TRIAL]
         best = tabled.reached[plan].idxmax() if plan else None
         left_out = {*filter(methods.is_built_in, plan)} - {best}
@@ -236,7 +237,8 @@ def what_it_costs(study: Study) -> str:
     others = [
         label
         for label in table.index
-        if not methods.is_learner(label) and scores.groups(study)[label] == scores.BY_TRIAL
+        if not (methods.is_learner(label) or methods.learns_nothing(label))
+        and scores.groups(study)[label] == scores.BY_TRIAL
     ]
     # The other method that learns from the reward of trials and reaches most targets.
     rival = [table.reached[others].idxmax()] if others else []

@@ -18,6 +18,7 @@ from coartic.analysis.settings import compares_settings, name_in
 from coartic.analysis.statistics.estimates import (
     FEWER_RESAMPLES,
     LEVEL,
+    NEGLIGIBLE,
     Estimate,
     bootstrap_estimate,
 )
@@ -279,8 +280,8 @@ def nearest(study: Study) -> str:
     """The method with the smallest gap and whether surely so, the learner's place, the best
     planner, methods from files, and failed runs: a sentence for each that there is."""
     by_trial, by_formula, others = (leaders(study, group) for group in scores.GROUPS)
-    tries = *methods.ALL_GUESSES, "corrective-alone/every"  # which learn nothing from a trial
-    learn = by_trial[~by_trial.method.isin(tries)].reset_index(drop=True)
+    learn = by_trial[~by_trial.method.map(methods.learns_nothing).astype(bool)]
+    learn = learn.reset_index(drop=True)
     rows = next((rows for rows in (learn, by_formula, others, by_trial) if len(rows)), learn)
     if not len(rows):
         return ""
@@ -297,37 +298,46 @@ def nearest(study: Study) -> str:
         by_name = by_settings or not methods.is_learner(method)
         return name_in(study, method) if by_name else "the learner"
 
-    who, *following = map(named, rows.method)
+    first = rows.gap <= rows.gap[0] + NEGLIGIBLE
+    who, following = listed(map(named, rows.method[first])), rows.method[~first].tolist()
     gaps = [f"{number(100 * value, 1)} %" for value in rows.gap]
     to = scores.reference(study, scores.common_tasks(study))
     things = "settings" if by_settings else "that learn"
     of = f" of the {spelled(len(learn))} {things}" if len(learn) > 1 else ""
-    places = [n for n, method in enumerate(learn.method) if named(method) == "the learner"]
+    behind = [n for n, method in enumerate(learn.method) if named(method) == "the learner"]
+    behind = [n for n in behind if rows is learn and not first[n]]
     text = f"{who} came within {gaps[0]} of the {to}"  # one alone is not nearest
-    if following:
+    if first.sum() > 1:
+        text = f"{who} have the same gap to the {to} ({gaps[0]})"
+        text += f", the smallest{of}" * bool(following)
+    elif following:
         text = f"{who} comes nearest{f' to the {to}' if 'folder' in to else of} ({gaps[0]})"
-    if any(places) and "folder" not in to:
-        standing = "last" if places[0] == len(learn) - 1 else f"number {places[0] + 1}"
-        text = f"{who} comes nearest{of} ({gaps[0]}); the learner is {standing} ({gaps[places[0]]})"
+    for place in behind if "folder" not in to else ():
+        nearer = int((learn.gap < learn.gap[place] - NEGLIGIBLE).sum())
+        standing = "last" if nearer == len(learn) - 1 else f"number {nearer + 1}"
+        text += f"; the learner is {standing} ({gaps[place]})"
     text = f"{capital(text)}.\nGap of {who} to the {to}: {gap(rows.iloc[0])}"
-    if following:
-        test = paired_difference(study, *rows.method[:2])
+    if following and first.sum() == 1:
+        next_one, test = named(following[0]), paired_difference(study, *rows.method[:2])
         surely = "significantly" if test.p < LEVEL else "not significantly"
-        beside = f", {surely} less than that of {following[0]} ({p_value(test.p)})"
+        beside = f", {surely} less than that of {next_one} ({p_value(test.p)})"
         if not test.least_p <= LEVEL:
-            beside = f" (too few runs to tell it from {following[0]})"
+            beside = f" (too few runs to tell it from {next_one})"
         text += beside
     text += f"{declared(rows.method[0])}.{from_files(study)}"
-    for place in filter(None, places):
+    for place in behind:
         text += f" Gap of the learner: {gap(learn.iloc[place])}."
+    learners = learn.gap[[named(method) == "the learner" for method in learn.method]]
     for guessed in by_trial.gap[by_trial.method == methods.GUESSES] if len(learn) else ():
-        text += f" Guesses end {number(100 * guessed, 1)} % away"
-        for place in places:
-            text += f", {'behind' if learn.gap[place] < guessed else 'ahead of'} the learner"
+        text += f" Gap of guesses: {number(100 * guessed, 1)} %"
+        for learned in learners:
+            size = "larger than" if learned < guessed - NEGLIGIBLE else "smaller than"
+            size = "the same as" if abs(learned - guessed) <= NEGLIGIBLE else size
+            text += f", {size} the learner's"
         text += "."
     if len(learn) and len(by_formula):
         best = by_formula.iloc[0]
-        text += f" The best planner that knows the reward as a formula ends {gap(best)} away"
+        text += f" The best planner that knows the reward as a formula has a gap of {gap(best)}"
         text += f"{declared(best.method)}."
     cells = (cell for by_task in scores.compared(study).values() for cell in by_task.values())
     failed = scores.failed_runs(cells, ", which bars a method from the ranking")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+import numpy as np
+
 from coartic.analysis.settings import compares_settings, name_in, varied
 from coartic.analysis.statistics.estimates import LEVEL, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
-from coartic.analysis.words import capital, interval, marked, number
+from coartic.analysis.words import capital, interval, listed, marked, number
 from coartic.text import counted
 
 MOST_TASKS = 4
@@ -47,27 +49,38 @@ def list_settings(study: Study) -> Rows:
 
 
 def best_settings(study: Study) -> str:
-    """The best setting of each task, and whether it is surely better than the next."""
+    """Say which setting is best on each task, and whether it is surely better than the next."""
     rows, texts, won, sure = list_settings(study), [], Counter[str](), Counter[str]()
-    for task, of_task in rows.groupby("task", sort=False):
-        first, *others = of_task.to_dict("records")
-        best = name_in(study, first["method"])
-        won[best] += 1
-        text = f"{task}: {best}, {interval(first, 'reward')} ticks"
-        if others:
-            second = others[0]
+    for task, title in ((name, marked(task)) for name, task in study.tasks.items()):
+        of_task = rows[rows.task == title]
+        if of_task.empty:
+            continue
+        rewards = {label: study.cells[task, label].rewards for label in of_task.method}
+        best = rewards[of_task.method.iloc[0]]
+        alike = [label for label, others in rewards.items() if np.array_equal(others, best)]
+        names = listed(name_in(study, label) for label in alike)
+        text = f"{title}: {names}, {interval(of_task.iloc[0], 'reward')} ticks"
+        text += " each, the same in every run" * (len(alike) > 1)
+        won[names if len(alike) == 1 else ""] += 1
+        for second in of_task[~of_task.method.isin(alike)].head(1).to_dict("records"):
             surely = "significant" if second["p_holm"] < LEVEL else "no significant difference"
             if not of_task.p_holm.count() * second["least_p"] < LEVEL:
                 surely = "the runs are too few, or too alike, to tell"
-            else:
-                sure[best] += surely == "significant"
+            elif len(alike) == 1:
+                sure[names] += surely == "significant"
             next_best = name_in(study, second["method"])
             text += f"; next {next_best}, {number(second['reward'], 1)} ({surely})"
         texts.append(f"{text}.")
     if not texts:
         return ""
-    best, more = won.most_common(1)[0][0], len(texts) - MOST_TASKS
-    card = f"{capital(best)} is best on {won[best]} of {counted(len(texts), 'task')}"
-    told = f"significantly on {sure[best]}" if best in sure else "too few runs to tell surely"
+    more, of_tasks = len(texts) - MOST_TASKS, counted(len(texts), "task")
+    card = f"No setting is better than all others on any of {of_tasks}"
+    for best_name, count in [each for each in won.most_common() if each[0]][:1]:
+        told = (
+            f"significantly on {sure[best_name]}"
+            if best_name in sure
+            else "too few runs to tell surely"
+        )
+        card = f"{capital(best_name)} is best on {count} of {of_tasks}, {told}"
     several = f" And {more} more in the table." if more > 0 else ""
-    return f"{card}, {told}.\n{' '.join(texts[:MOST_TASKS])}{several}"
+    return f"{card}.\n{' '.join(texts[:MOST_TASKS])}{several}"

@@ -15,7 +15,7 @@ from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.optima import initial_reward
 from coartic.analysis.study import Study, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
-from coartic.analysis.words import marked, number
+from coartic.analysis.words import marked, number, titled_apart
 from coartic.drawing import MARKERS, box, draw_goals, draw_robot, number_goals
 
 
@@ -75,6 +75,7 @@ def draw_tasks(study: Study) -> Parts | None:
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     """Draw start configuration and goals of some tasks, a panel for each."""
+    tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
     rows, columns = style.grid(len(tasks))
@@ -97,10 +98,8 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         number_goals(axes, task)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
-        several = [other.label for other in tasks].count(task.label) > 1
-        name = task.name if several else task.label
         fits = int(13 * drawing.get_figwidth() / columns)  # letters
-        axes.set_title("\n".join([*textwrap.wrap(name, fits), "; ".join(remarks)]).strip())
+        axes.set_title("\n".join([*textwrap.wrap(task.label, fits), "; ".join(remarks)]).strip())
         x, y = (corners[0] + corners[1]) / 2
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)

@@ -86,6 +86,7 @@ def trace(
 ) -> None:
     """Name the runs behind a row of a report's table."""
     from coartic.analysis.report import trace as traced
+    from coartic.analysis.words import titled_apart
     from coartic.benchmarks.registry import registry
     from coartic.runs.store import RUNS_FILE, open_store
 
@@ -107,19 +108,20 @@ def trace(
         say_pairs([("Row", row), *traced.values_of(frame, row, {}), ("Runs", " ".join(ids))])
         return
     with open_store(results) as store:
-        runs, plan = store.runs(), store.plan()
+        runs, apart = store.runs(), titled_apart(store.plan().tasks.values())
+    tasks = {task.name: task for task in apart}
     behind = runs[runs.run_id.isin(ids)]
     if traced.stamp(runs) not in (tables[table].parents[1] / "report.html").read_text("utf-8"):
         again = f"coartic report {quote(str(results))}"
         raise CoarticError(f"the report is older than the runs of {results}: {again}")
-    say_pairs([("Row", row), *traced.values_of(frame, row, plan.tasks)])
+    say_pairs([("Row", row), *traced.values_of(frame, row, tasks)])
     if not len(behind):
         say("No runs stand behind this row.")
         return
     known = {*registry(), "dual-process"}
     file = "" if known >= {*behind.method} else " --method-file FILE"
     say(f"{counted(len(behind), 'run')}, the lowest reward of a task first:")
-    show_frame(traced.runs_behind(runs, ids, plan.tasks))
+    show_frame(traced.runs_behind(runs, ids, tasks))
     where = f"--in {quote(str(results))}"
     say_pairs(
         [
