@@ -130,7 +130,8 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
             f"Too few runs to judge the paper: {n['undecided']} of {len(judged)} claims are "
             f"undecided.\nSupported: {n['supported']}. Tasks, methods, runs or trials are missing."
         )
-    card = f"{n['supported']} of {len(judged)} claims {'is' if n['supported'] == 1 else 'are'} supported"
+    verb = "is" if n["supported"] == 1 else "are"
+    card = f"{n['supported']} of {len(judged)} claims {verb} supported"
     if len(central):
         held, of = int((central == "supported").sum()), spelled(len(central))
         some = of if held == len(central) else f"{spelled(held)} of the {of}"
@@ -141,8 +142,9 @@ def verdicts_in_words(judged: pd.DataFrame) -> str:
         for verdict, names in central.groupby(central, sort=False)
     ]
     lacking = judged.evidence.str.startswith("Not judged").sum()
-    without = f"Of the undecided, {number(lacking)} lack runs here." if lacking else ""
-    return f"{card}.\n{' '.join(filter(None, [*words, f'Of all {len(judged)} claims: {each}.', without]))}"
+    words.append(f"Of all {len(judged)} claims: {each}.")
+    words += [f"Of the undecided, {number(lacking)} lack runs here."] * bool(lacking)
+    return f"{card}.\n{' '.join(words)}"
 
 
 def claims_hold(study: Study) -> str:
@@ -156,7 +158,7 @@ def claims_hold(study: Study) -> str:
 
 
 def has_own_tasks(study: Study) -> bool:
-    """Return whether a task is neither the paper's, as it is or changed, nor of a shipped family."""
+    """Return whether a task is neither the paper's, also changed, nor of a shipped family."""
     shipped = {*shipped_tasks(), *shipped_families()}
     return any(
         (task.family or name.partition(".")[0]) not in shipped for name, task in study.tasks.items()

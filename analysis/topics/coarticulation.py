@@ -35,7 +35,7 @@ from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
 from coartic.analysis.topics.guesses import context_beyond_p, guesses_beside, selects
 from coartic.analysis.topics.scores import failed_runs
-from coartic.analysis.words import capital, marked, number, p_value
+from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
 from coartic.robot import HANDS, Array
 from coartic.text import counted
@@ -243,8 +243,7 @@ def next_goal(study: Study) -> str:
 
 
 def is_subject(label: str) -> bool:
-    """Return whether a sentence may be about a method: the learner, with any parameters, or a method
-    from a file."""
+    """Return whether a sentence may be about a method: the learner, or a method from a file."""
     return label.partition(" ")[0] in LEARNERS or not is_built_in(label)
 
 

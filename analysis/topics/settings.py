@@ -56,10 +56,10 @@ def best_settings(study: Study) -> str:
         if of_task.empty:
             continue
         rewards = {label: study.cells[task, label].rewards for label in of_task.method}
-        best = rewards[of_task.method.iloc[0]]
+        first, best = of_task.iloc[0].to_dict(), rewards[of_task.method.iloc[0]]
         alike = [label for label, others in rewards.items() if np.array_equal(others, best)]
         names = listed(name_in(study, label) for label in alike)
-        text = f"{title}: {names}, {interval(of_task.iloc[0], 'reward')} ticks"
+        text = f"{title}: {names}, {interval(first, 'reward')} ticks"
         text += " each, the same in every run" * (len(alike) > 1)
         won[names if len(alike) == 1 else ""] += 1
         for second in of_task[~of_task.method.isin(alike)].head(1).to_dict("records"):

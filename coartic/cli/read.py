@@ -68,7 +68,7 @@ def say_answers(study: Study, *more: tuple[str, str]) -> None:
 
 
 def exit_if_parts_failed(study: Study) -> None:
-    """Name the parts of the report that could not be made, and exit with code 1 if there are any."""
+    """Name the parts of the report that could not be made; with any, exit with code 1."""
     from coartic.analysis.report.about import failures
 
     for part, reason in failures(study).items():
