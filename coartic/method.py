@@ -108,9 +108,12 @@ class Meter:
     """Counts of the trials, evaluations and seconds that a method spent."""
 
     trials: int = 0
-    """Physical trials, those that failed included."""
+    """Physical trials, failed trials included."""
+    initial_trials: int = 0
+    """Trials of the search for the initial hands, where the task names a policy in their place.
+    They are not among ``trials``; their ticks, corrections and evaluations are counted below."""
     movement_ticks: int = 0
-    """Control ticks of those trials."""
+    """Control ticks of all trials."""
     forward_kinematics: int = 0
     """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
     cannot end a movement; a robot would sense its hand on every one of the ticks."""
@@ -468,9 +471,9 @@ class Session:
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """The hand sequence of a first trial, for a robot with these hands (all by default).
 
-        Where the task names a policy in place of a sequence, the trials that it takes are
-        counted, but no reward is kept of them. Raises NotApplicableError where no sequence
-        completes the task, or there are too many.
+        Where the task names a policy in place of a sequence, the trials of the search are counted
+        as ``initial_trials``: neither the trials of the method nor the budget include them.
+        Raises NotApplicableError where no sequence completes the task, or there are too many.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         with inside(self._of_run):

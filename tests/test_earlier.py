@@ -17,8 +17,9 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_again
 from coartic.benchmarks.run import perform
-from coartic.runs.plan import Specification
-from coartic.runs.store import _VIEWS_1, RUNS_FILE, open_store
+from coartic.runs.plan import Cell, Specification
+from coartic.runs.store import _EARLIER_VIEWS, RUNS_FILE, open_store
+from tests.support.strategies import tiny_task
 from tests.support.suites import InProcess, paper_cells, run_and_write
 
 READ = (
@@ -36,13 +37,16 @@ OF_1_1 = (
 )
 
 
-def edited(folder, out, *statements):
-    """A copy of a results folder as version 1.1 wrote it, in which tables are updated so."""
+def edited(folder, out, *statements, version=1):
+    """A copy of a results folder as an earlier version wrote it, in which tables are updated so."""
     shutil.copytree(folder, out)
     with closing(sqlite3.connect(out / RUNS_FILE, isolation_level=None)) as db:
+        db.execute("DROP VIEW runs")
+        db.execute("UPDATE results SET trials = trials + initial_trials")
+        db.execute("ALTER TABLE results DROP COLUMN initial_trials")
         for statement in statements:
             db.execute(f"UPDATE {statement}")
-        db.executescript(f"{_VIEWS_1}PRAGMA user_version = 1")
+        db.executescript(f"{_EARLIER_VIEWS[version]}PRAGMA user_version = {version}")
     return out
 
 
@@ -92,6 +96,25 @@ def test_runs_of_1_1_count_as_runs_of_now(now, tmp_path):
     assert perform(load(now).plan, then, executor=InProcess()).done == 0
     with closing(sqlite3.connect(then / RUNS_FILE)) as db:  # as this version writes it
         assert db.execute("SELECT run_id, setting FROM runs LIMIT 1").fetchone() == (run_id, "")
+
+
+def test_folders_of_2_0_count_the_search_for_hands_among_trials(tmp_path):
+    task = tiny_task(initial_hands="best-of-all", goals=[[5.0, 1.0], [5.0, 2.0]])
+    names = ["dual-process/EC4", "corrective-alone/given", "nullspace-qp/none"]
+    cells = [Cell(task, built_in()[name]) for name in names]
+    run_and_write(tmp_path / "now", cells, runs=1, trials=20)
+    then = edited(tmp_path / "now", tmp_path / "then", version=2)
+    assert check_runs(then).wrong == []
+    runs = load(then).runs
+    assert list(runs.trials) == [24, 5, 0]
+    assert runs.initial_trials.isna().all()
+    with open_store(then) as store, open_store(tmp_path / "now") as now:
+        for run_id in runs.run_id:
+            assert store.run(run_id).to_row() == now.run(run_id).to_row()
+    more = run_and_write(then, cells, runs=2, trials=20).runs  # one more of the learner
+    assert more.trials.tolist() == [24, 20, 5, 0]
+    assert more.initial_trials.isna().tolist() == [True, False, True, True]
+    assert check_runs(then).wrong == []
 
 
 def test_a_run_with_a_parameter_that_is_gone_is_not_performed(now, tmp_path):

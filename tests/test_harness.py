@@ -44,6 +44,8 @@ from tests.support.suites import (
     suite_of,
 )
 
+EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
+
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
@@ -236,19 +238,23 @@ def test_learner_columns_are_the_learners(tmp_path):
     assert study.runs[["replay_reward", "best_trial"]].isna().all(axis=None)
 
 
-def test_a_policys_search_counts_and_is_bounded(tmp_path):
-    task = tiny_task(initial_hands="best-of-all", goals=[[5.0, 1.0], [5.0, 2.0], [4.0, 3.0]])
-    names = ("dual-process/EC4", "corrective-alone/given")
-    cells = [Cell(task, KNOWN[name]) for name in names]
-    runs = run_and_write(tmp_path / "free", cells, runs=1, trials=20).runs
-    assert list(runs.trials) == [8 + 20, 8 + 1]
-    bounded = run_and_write(
-        tmp_path / "bounded", cells[:1], runs=1, trials=20, trial_budget=11
-    ).runs
-    assert list(bounded.trials) == [11]
-    none_left = run_and_write(tmp_path / "none", cells[:1], runs=1, trials=20, trial_budget=8).runs
-    assert list(none_left.status) == ["infeasible"]
-    assert "the trial budget ends with the search" in none_left.reason[0]
+@pytest.mark.parametrize("budget", [None, 11])
+@pytest.mark.parametrize(
+    ("goals", "policy", "searched"),
+    [(3, "best-of-all", 8), (3, "best-single-hand", 2), (13, "best-single-hand", 2)],
+)
+def test_every_method_makes_the_trials_that_it_is_told(tmp_path, goals, policy, searched, budget):
+    """The search for the first hands is counted apart, by the methods that need it. There are more
+    sequences of 13 hands than are tried one by one."""
+    task = tiny_task(initial_hands=policy, goals=[[5.0, 1.0 + 0.2 * g] for g in range(goals)])
+    begin_there = ["dual-process/EC4", "random-search/climbing", "cma-es/goal-by-goal"]
+    try_all = ["guesses", "guesses/hands", "cma-es/bandit", "differential-evolution"]
+    methods = registry([EXAMPLES / "differential_evolution.py"])
+    cells = [Cell(task, methods[name]) for name in (*begin_there, *try_all)]
+    runs = run_and_write(tmp_path, cells, runs=1, trials=20, trial_budget=budget).runs
+    assert runs.status.unique().tolist() == ["ok"]
+    assert runs.trials.unique().tolist() == [budget or 20]
+    assert list(runs.initial_trials) == [searched] * 3 + [searched if goals > 3 else 0] * 4
 
 
 def test_a_session_counts_per_configuration():

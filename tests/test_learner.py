@@ -244,12 +244,13 @@ def test_what_a_policy_spends_is_counted():
     told = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     session = Session(parse_task(content, "x"), 0, told)
     assert session.find_initial_hands() == "LRLR"
-    assert (session.meter.trials, session.meter.failed_trials) == (16, 0)
+    meter = session.meter
+    assert (meter.trials, meter.initial_trials, meter.failed_trials) == (0, 16, 0)
     assert session.meter.movement_ticks > 16 * 532
     assert session.meter.corrections == 64
     assert session.meter.jacobians == session.meter.corrective_iterations > 0
     named = Session(load_task("two-armed-1"), 0, told)
-    assert (named.find_initial_hands(), named.meter.trials) == ("RRRR", 0)
+    assert (named.find_initial_hands(), named.meter.initial_trials) == ("RRRR", 0)
 
 
 @pytest.mark.parametrize(

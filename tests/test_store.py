@@ -349,7 +349,7 @@ def journal_of_several(path):
             "this version.*reads.*update coartic",
         ),
         (
-            sql(f"PRAGMA user_version = {FORMAT - 2}"),
+            sql("PRAGMA user_version = 0"),
             "this version.*reads.*another --out",
         ),
         (foreign, "is not a file of coartic"),

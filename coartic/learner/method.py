@@ -98,9 +98,6 @@ class DualProcess(Method):
             session.find_initial_hands(condition.hands)  # counts what that takes
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
-        if trials < 1:
-            spent = "the trial budget ends with the search for initial hands"
-            return [MethodError("infeasible", spent) for _ in sessions]
         runs = learn_many(
             task,
             condition,

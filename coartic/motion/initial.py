@@ -232,11 +232,10 @@ def search_by_policy(
     trials = [trial for _, trial in ranked]
     iterations = sum(trial.iterations for trial in trials)
     return best, {
-        "trials": len(trials),
+        "initial_trials": len(trials),
         "movement_ticks": sum(trial.ticks for trial in trials),
         "forward_kinematics": sum(trial.evaluations for trial in trials),
         "jacobians": iterations,
         "corrective_iterations": iterations,
         "corrections": sum(trial.corrections for trial in trials),
-        "failed_trials": sum(not trial.completed for trial in trials),
     }

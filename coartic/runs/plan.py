@@ -95,7 +95,7 @@ class Specification:
     parameters: dict[str, Any]
     """All parameters of the method."""
     trial_budget: int | None
-    """Most physical trials of one run."""
+    """Most trials of one run, without the search for initial hands."""
 
     @cached_property
     def definition(self) -> dict[str, Any]:
@@ -174,7 +174,7 @@ class Plan:
     time_limit_s: Annotated[float, Field(allow_inf_nan=False)] | None
     """CPU time of one run."""
     trial_budget: int | None
-    """Physical trials of one run."""
+    """Trials of one run, without the search for initial hands."""
     cells: tuple[Cell, ...]
 
     @cached_property

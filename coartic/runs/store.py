@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 2
-"""Raised when a table changes its meaning, or a table or a view its text. Format 1, of versions 1.0
-and 1.1, has other columns in view ``runs`` and is read as well."""
+FORMAT = 3
+"""Raised when a table changes its meaning, or a table or a view its text. Formats 1, of versions
+1.0 and 1.1, and 2, of version 2.0, are read as well: see :data:`_EARLIER_VIEWS`."""
 _APPLICATION = 0x636F6172  # "coar"
 FAILED_TRIAL = -(2**31)
 """Stored in place of the reward of a trial that did not hit every goal."""
@@ -78,7 +78,7 @@ CREATE TABLE settings (id INTEGER PRIMARY KEY, asked TEXT NOT NULL, code TEXT NO
     task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, parameters TEXT NOT NULL,
     model TEXT NOT NULL, trial_budget INTEGER, told TEXT NOT NULL, UNIQUE (asked, code));
 CREATE TABLE results (id INTEGER PRIMARY KEY,
-    {", ".join(f"{name} {kind}" for name, kind in RESULTS.items())},
+    {", ".join(f"{name} {kind}" for name, kind in RESULTS.items() if name != "initial_trials")},
     UNIQUE (setting, suite_seed, run));
 CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL, "order" INTEGER NOT NULL,
     goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL, ticks INTEGER NOT NULL,
@@ -113,8 +113,13 @@ CREATE VIEW paths AS SELECT results.run_id, waypoints.* {_ASKED_FOR}
     JOIN waypoints ON waypoints.result_id = results.id
     ORDER BY cells.position, results.run, "order", waypoint;
 """
-_VIEWS_1 = _VIEWS.replace("variant AS setting", "variant, trim(method || ' ' || variant) AS label")
-
+_ADD_INITIAL_TRIALS = "ALTER TABLE results ADD COLUMN initial_trials INTEGER;\n"
+_VIEWS_2 = _VIEWS.replace("results.initial_trials, ", "")
+_EARLIER_VIEWS = {
+    1: _VIEWS_2.replace("variant AS setting", "variant, trim(method || ' ' || variant) AS label"),
+    2: _VIEWS_2,
+}
+"""Views of earlier formats, which count the search for initial hands among ``trials``."""
 
 _SURROUNDINGS: dict[str, Any] = {
     **dict.fromkeys(("coartic", "model_code", "python", "platform", "processor", "date"), str),
@@ -168,6 +173,7 @@ class Store:
                     self._insert(table, row)
             robots = [task.robot for task in plan.tasks.values()]
             add_joints(self._db, (name for robot in robots for name in robot.joint_names))
+            bring_up_to_date(self._db)
 
     def plan(self) -> Plan:
         """The plan of the folder. Raises CoarticError where there is none yet."""
@@ -278,8 +284,12 @@ class Store:
                 rows[each["part"]].append(each)
             points = waypoints.fetchall()
             rewards = [] if blob is None else unpack(blob["rewards"], row["trials"]).tolist()
+            facts = {"initial_trials": None, **row}
+            if facts["trials"] is not None and facts["initial_trials"] is None:  # format 1 or 2
+                facts["initial_trials"] = facts["trials"] - len(rewards)
+                facts["trials"] = len(rewards)
             return Run.from_row(
-                row,
+                facts,
                 specification,
                 json.loads(environment["content"]),
                 {part: movements_from(specification.task, rows[part], points) for part in PARTS},
@@ -288,8 +298,12 @@ class Store:
 
     def runs(self) -> pd.DataFrame:
         """View ``runs`` as a data frame, with nullable types."""
+        import pandas as pd
+
         with explain_errors(self.folder):
             runs = self._frame("runs").rename(columns={"variant": "setting"})
+            if "initial_trials" not in runs:  # of formats 1 and 2
+                runs["initial_trials"] = pd.array([None] * len(runs), "Int64")
             return check_runs(runs.drop(columns="label", errors="ignore"))
 
     def solutions(self) -> pd.DataFrame:
@@ -481,7 +495,7 @@ def writing(folder: Path) -> Iterator[Store]:
                 # No write-ahead log: it is unsafe on network disks, and a second file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 if not is_there:
-                    connection.executescript(f"BEGIN;{_SCHEMA}{_VIEWS}COMMIT;")
+                    connection.executescript(f"BEGIN;{_SCHEMA}{_ADD_INITIAL_TRIALS}{_VIEWS}COMMIT;")
             yield Store(folder, connection)
 
 
@@ -560,15 +574,17 @@ def has_tables(connection: sqlite3.Connection) -> bool:
         if there:
             raise CoarticError("it is not a file of coartic; move it away")
         return False
-    if version not in (1, FORMAT):
+    if version not in (*_EARLIER_VIEWS, FORMAT):
         do = "update coartic" if version > FORMAT else "run the suite again with another --out"
         raise CoarticError(f"it has format {version}; this version of coartic reads {FORMAT}: {do}")
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
         columns = [column[1] for column in connection.execute("PRAGMA table_info(movements)")]
         add_joints(ours, filter(_JOINT.fullmatch, columns))
-        if version == 1:
-            ours.executescript(_VIEWS_1)
+        if version == FORMAT:
+            bring_up_to_date(ours)
+        else:
+            ours.executescript(_EARLIER_VIEWS[version])
         for kind, name, _ in sorted(there ^ schema(ours)):
             raise CoarticError(
                 f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
@@ -578,14 +594,20 @@ def has_tables(connection: sqlite3.Connection) -> bool:
 
 
 def add_joints(connection: sqlite3.Connection, names: Iterable[str]) -> None:
-    """Columns for these joints, and the views anew, which show them."""
+    """Add columns for these joints."""
     names = list(dict.fromkeys(names))
     for table in ("movements", "waypoints"):
         there = {column[1] for column in connection.execute(f"PRAGMA table_info({table})")}
         for name in names:
             if name not in there:
                 connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} REAL")
-    for statement in _VIEWS.split(";\n"):
+
+
+def bring_up_to_date(connection: sqlite3.Connection) -> None:
+    """Add the column that earlier formats lack, and make the views anew, which show all columns."""
+    there = {column[1] for column in connection.execute("PRAGMA table_info(results)")}
+    statements = _VIEWS if "initial_trials" in there else _ADD_INITIAL_TRIALS + _VIEWS
+    for statement in statements.split(";\n"):
         connection.execute(statement)
 
 
