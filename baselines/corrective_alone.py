@@ -6,12 +6,9 @@ try all 2^G hand sequences, each target from **A**, and no further exploration.
 
 from __future__ import annotations
 
-import itertools
-
 from coartic import Execution
 from coartic.method import Information, Method, MethodError, Outline, Result, Session
-from coartic.motion.initial import changes_of_hand, corrective_movements
-from coartic.tasks.task import letters_of
+from coartic.motion.initial import changes_of_hand, corrective_movements, sequences_with
 
 
 class GivenHands(Method):
@@ -53,13 +50,11 @@ class EverySequence(Method):
     def solve(self, session: Session) -> Result:
         """One trial per sequence; of equal ones the one with the fewest changes of hand."""
         completed: list[tuple[int, int, Execution]] = []
-        for hands in itertools.product(
-            letters_of(sorted(session.hands)), repeat=session.goals_count
-        ):
+        for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:
                 break
             with session.solving():
-                execution = session.trial(corrective_movements("".join(hands)))
+                execution = session.trial(corrective_movements(hands))
             if execution.reward is not None:
                 changes = changes_of_hand(execution.hands)
                 completed.append((-execution.reward, changes, execution))

@@ -17,6 +17,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from threading import RLock
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -213,7 +214,8 @@ class Session:
     The declaration is enforced, and calls are counted. This is no sandbox.
     ``trusted`` methods, this project's own, may also take the task to their compiled
     kernels and state the counts themselves. Trials that a process makes outside the
-    sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`).
+    sessions ``of_run`` are counted as well (:mod:`coartic.motion.outside`). Threads can share
+    a session: they make trials one after the other, of one budget.
     """
 
     def __init__(
@@ -238,6 +240,8 @@ class Session:
         self._trial_budget = trial_budget
         self._meter = Meter()
         self._rewards = array("q")
+        self.lock = RLock()
+        """Held from the look at the budget until trials are counted."""
 
     # Open to every method: the robot, not the goals.
 
@@ -370,13 +374,19 @@ class Session:
         """
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
-        self._affordable(1)
-        with inside(self._of_run):
-            (execution,) = execute_many(self._bench, [solution])
-        if isinstance(execution, Exception):
-            raise execution
-        spent = execution.ticks, execution.corrections, execution.iterations, execution.evaluations
-        self._count(pack_rewards([execution.reward]), *spent)
+        with self.lock:
+            self._affordable(1)
+            with inside(self._of_run):
+                (execution,) = execute_many(self._bench, [solution])
+            if isinstance(execution, Exception):
+                raise execution
+            self._count(
+                pack_rewards([execution.reward]),
+                execution.ticks,
+                execution.corrections,
+                execution.iterations,
+                execution.evaluations,
+            )
         if Information.CORRECTIVE_PROCESS in self._told:
             return execution
         return replace(
@@ -389,7 +399,8 @@ class Session:
         ``hands`` is one hand sequence for all (``"RRLR"``), or one each. ``targets`` has shape
         ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
         keeps its value, and for a goal without any target the corrective process acts alone, which
-        has to be declared. Goals that are missed are corrected, and paid for.
+        has to be declared. Goals that are missed are corrected, and paid for. A trial with a target
+        beyond 100,000 fails without a movement.
 
         Where the budget has fewer trials left, only the first are made: what comes back is as
         long as trials were made. With ``until``, shape ``(N,)``, the last trial is the first
@@ -405,8 +416,9 @@ class Session:
         if np.isnan(given.min(initial=0.0)) and np.isnan(given).all(axis=2).any():
             self._use(Information.CORRECTIVE_PROCESS)
         codes = hand_codes(self._task, hands, len(given))
-        left = self._affordable(len(given))
-        trials = self.unchecked_trials(codes[:left], given[:left], until=until)
+        with self.lock:
+            left = self._affordable(len(given))
+            trials = self.unchecked_trials(codes[:left], given[:left], until=until)
         if Information.CORRECTIVE_PROCESS in self._told:
             return trials
         return trials._replace(

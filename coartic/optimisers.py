@@ -6,15 +6,17 @@ method of the benchmark that consists of such a function and of what minimises i
 
 from __future__ import annotations
 
-import itertools
+import os
 from abc import abstractmethod
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from coartic.errors import CoarticError
 from coartic.inputs import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
 from coartic.learner.learning import TRIALS
 from coartic.method import (
@@ -28,10 +30,11 @@ from coartic.method import (
     UndeclaredError,
 )
 from coartic.model import PAPER, MotionModel
-from coartic.motion.initial import too_many_sequences
+from coartic.motion.initial import sequences_with, too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
+from coartic.motion.reach import bench_of
 from coartic.motion.solution import Movement
-from coartic.motion.trials import HandSequences, movements_of
+from coartic.motion.trials import HandSequences, movements_of, trials_on
 from coartic.robot import HANDS, Array
 from coartic.tasks.families import instance_names
 from coartic.tasks.optima import KnownOptimum, best_shipped
@@ -46,8 +49,15 @@ TOLD = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
+Vector = np.ndarray[tuple[int], np.dtype[Any]]
+Matrix = np.ndarray[tuple[int, int], np.dtype[Any]]
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
+NO_COPIES = (
+    "an objective is neither copied nor sent to another process, where its trials would not be "
+    "counted: in place of workers use vectorized=True or objective.many(points), and for another "
+    "run objective.fresh()"
+)
 
 
 def explored_joints(session: Session, hands: str) -> NDArray[np.bool_]:
@@ -72,8 +82,7 @@ def sequences_of(session: Session) -> list[str]:
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
-    letters = letters_of(sorted(session.hands))
-    sequences = map("".join, itertools.product(letters, repeat=session.goals_count))
+    sequences = sequences_with(session.hands, session.goals_count, session.task_name)
     return sorted(sequences, key=lambda hands: hands != session.initial_hands)
 
 
@@ -83,6 +92,7 @@ class Objective:
     A point holds the targets of all joints that are worth moving (:func:`explored_joints`), goal
     by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
     ``FAILED`` where the trial fails. Goals that a movement misses are corrected, and paid for.
+    A point with an entry beyond 100,000 is a trial that fails.
 
     Where all entries of a goal are NaN, no movement is made to a target: the corrective process
     acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
@@ -93,8 +103,17 @@ class Objective:
     with it: the lowest cost is that of the best solution with these hands, which other hands may
     better.
 
+    Threads can share an objective, which makes their trials one after the other. A copy is refused,
+    in another process as well: it would not count for the budget.
+
     Raises MethodError where the corrective process completes no sequence.
     """
+
+    __slots__ = (
+        *("joints", "configurations", "dim", "bounds", "evaluations", "best_cost", "best_hands"),
+        *("_asked", "_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_hands"),
+        *("_no_targets", "_process", "_session", "_task"),
+    )  # no others are set by mistake, such as a budget
 
     def __init__(
         self,
@@ -106,7 +125,7 @@ class Objective:
         task: Task | None = None,
     ) -> None:
         check_limits("half_width", half_width, *WIDTHS)
-        self._session, self._task = session, task
+        self._session, self._task, self._process = session, task, os.getpid()
         self._asked: dict[str, Any] = {"hands": hands, "half_width": half_width, "trials": trials}
         self._end = None if trials is None else session.meter.trials + trials
         sequences = sequences_of(session) if hands is None else [hands]
@@ -116,13 +135,13 @@ class Objective:
         best = int(alone.rewards.argmax())
         if not alone.completed[best]:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
-        self.hands = sequences[best]
-        """The hand sequence."""
+        self._hands = sequences[best]
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""
         self.configurations: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
+        self._no_targets = np.full((1, *self.joints.shape), np.nan)
         self._entries = np.flatnonzero(self.joints)
         self.dim = len(self._entries)
         """Number of parameters."""
@@ -138,6 +157,9 @@ class Objective:
         self._best_targets = alone.targets[best].copy()
         self._better = [(0, self.best_cost)]
 
+    def __reduce__(self) -> Any:
+        raise CoarticError(NO_COPIES)
+
     def __repr__(self) -> str:
         facts = [
             f"Objective({self._session.task_name}, hands {self.hands}, {self.dim} parameters",
@@ -147,6 +169,11 @@ class Objective:
         if (known := self._known) is not None:
             facts.append(f"best known {-known.reward} with hands {known.hands}")
         return ", ".join(facts) + ")"
+
+    @property
+    def hands(self) -> str:
+        """The hand sequence."""
+        return self._hands
 
     # What is known of the task; nothing of this is for a method.
 
@@ -177,6 +204,15 @@ class Objective:
         """Whether it is proven that no solution costs less than ``best_known``."""
         self.task  # noqa: B018 (refused in a method)
         return self._known is not None and self._known.proven
+
+    @property
+    def hand_sequences(self) -> list[str]:
+        """All hand sequences of the task, in alphabetical order, such as ``"LLLR"``.
+
+        Raises NotApplicableError where there are more than 4096.
+        """
+        session = self._session
+        return sequences_with(session.hands, session.goals_count, session.task_name)
 
     # What was found so far.
 
@@ -214,6 +250,41 @@ class Objective:
         """The movements of the best trial, for :func:`coartic.execute`."""
         return movements_of(self.best_hands, self._best_targets)
 
+    def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
+        """The movements of the trial of a point, for :func:`coartic.execute`, which then takes as
+        many ticks as the point costs. No trial is counted.
+
+        Parameters
+        ----------
+        x : array_like, shape (dim,)
+            The point.
+        hands : str, optional
+            Its hand sequence, where that is not ``hands`` of this problem.
+
+        Returns
+        -------
+        tuple of Movement
+            A movement for each goal, whose target has all joints: those without an entry are where
+            they keep still.
+
+        Raises
+        ------
+        UndeclaredError
+            In a method, which has :attr:`solution`.
+        ValueError
+            The point or its hands do not fit.
+        """
+        task, point = self.task, real_array("x", x)
+        if point.shape != (self.dim,):
+            raise ValueError(f"x has shape {point.shape}; needed is ({self.dim},)")
+        self._check(point[None])
+        chosen = self.hands if hands is None else hands
+        codes, targets = self._trials_of(point[None], self._session.hand_codes(chosen, 1))
+        given = ~np.isnan(targets[0]).all(axis=1)
+        trials_on(bench_of(task, self._session.model), codes, targets)  # fills in joints
+        after = np.isnan(targets[0]) & given[:, None]  # goals after one where the trial failed
+        return movements_of(chosen, np.where(after, task.q0, targets[0]))
+
     def fresh(self) -> Objective:
         """The same problem with nothing evaluated and its whole budget: for another run.
 
@@ -224,25 +295,41 @@ class Objective:
 
     # Evaluation.
 
+    @overload
+    def __call__(self, x: Sequence[float] | Vector, hands: str | None = None) -> float: ...
+
+    @overload
+    def __call__(
+        self, x: Sequence[Sequence[float]] | Matrix, hands: str | None = None
+    ) -> Array: ...
+
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """The cost of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)`` as scipy has
-        them; see :meth:`many`, which takes rows, for as many points as they have entries."""
+        them. Of as many points as they have entries rows could be meant: :meth:`many` takes
+        rows."""
         point = real_array("x", x)
-        if point.ndim not in (1, 2) or len(point) != self.dim:
+        if point.ndim == 2 and len(point) == self.dim:
+            if point.shape[1] == self.dim:
+                raise ValueError(
+                    f"x has shape {point.shape}, in which points can be rows or columns: use "
+                    "many(x) for rows, many(x.T) for columns"
+                )
+            return self.many(point.T, hands)
+        if point.shape != (self.dim,):
             raise ValueError(
                 f"x has shape {point.shape}; needed is ({self.dim},) or ({self.dim}, N)"
             )
-        if point.ndim == 2:
-            return self.many(point.T, hands)
         if hands is not None or not point @ point <= LARGEST_ENTRY:  # NaN, or far: to be looked at
             return float(self.many(point[None], hands)[0])
-        self._trials_left(1)
-        codes, targets = self._trials_of(point[None], None)
-        reward = self._session.unchecked_trial(codes, targets)
-        cost = float(FAILED if reward is None else min(-reward, FAILED))
-        self.evaluations += 1
-        if cost < self.best_cost:
-            self._keep(cost, self.evaluations, point, codes[0], targets[0])
+        with self._session.lock:
+            self._trials_left(1)
+            targets = self._no_targets.copy()
+            targets.put(self._entries, point)
+            reward = self._session.unchecked_trial(self._codes, targets)
+            cost = float(FAILED if reward is None else min(-reward, FAILED))
+            self.evaluations += 1
+            if cost < self.best_cost:
+                self._keep(cost, self.evaluations, point, self._codes[0], targets[0])
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
@@ -251,7 +338,8 @@ class Objective:
         Parameters
         ----------
         points : array_like, shape (N, dim)
-            Entries are finite, or NaN for all joints of a goal (the corrective process alone).
+            Entries are finite, or NaN for all joints of a goal (the corrective process alone). An
+            entry beyond 100,000 makes the trial fail.
         hands : str or sequence of str, optional
             The hand sequence of all points (``"RRLR"``), or of each, whatever the hands of this
             problem are. Joints that have no entries keep still.
@@ -274,23 +362,28 @@ class Objective:
             raise ValueError(f"points of shape {array.shape}: needed is (N, {self.dim})")
         self._check(array)
         codes = None if hands is None else self._session.hand_codes(hands, len(array))
-        left, costs = self._trials_left(len(array)), np.empty(len(array))
-        for first in range(0, left, CHUNK):
-            part = slice(first, min(first + CHUNK, left))
-            some, ours = array[part], costs[part]
-            chosen, targets = self._trials_of(some, None if codes is None else codes[part])
-            trials = self._session.unchecked_trials(chosen, targets)
-            np.minimum(-trials.rewards, FAILED, out=ours)
-            best = int(ours.argmin())
-            if ours[best] < self.best_cost:
-                lowest = np.minimum.accumulate(ours)
-                for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
-                    at = self.evaluations + n + 1
-                    self._keep(float(ours[n]), at, some[n], chosen[n], targets[n])
-            self.evaluations += len(some)
+        costs = np.empty(len(array))
+        with self._session.lock:
+            left = self._trials_left(len(array))
+            for first in range(0, left, CHUNK):
+                part = slice(first, min(first + CHUNK, left))
+                of_part = None if codes is None else codes[part]
+                self._evaluate(array[part], of_part, costs[part])
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
+
+    def _evaluate(self, points: Array, codes: Any, costs: Array) -> None:
+        """Fill in the costs of points, and note the best one."""
+        codes, targets = self._trials_of(points, codes)
+        trials = self._session.unchecked_trials(codes, targets)
+        np.minimum(-trials.rewards, FAILED, out=costs)
+        if costs.min() < self.best_cost:
+            lowest = np.minimum.accumulate(costs)
+            for n in np.flatnonzero(lowest < np.append(self.best_cost, lowest[:-1])).tolist():
+                at = self.evaluations + n + 1
+                self._keep(float(costs[n]), at, points[n], codes[n], targets[n])
+        self.evaluations += len(points)
 
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Any, targets: Array
@@ -303,16 +396,13 @@ class Objective:
 
     def _trials_of(self, points: Array, codes: Any) -> tuple[NDArray[np.int64], Array]:
         """Hands ``(N, G)``, and targets ``(N, G, dof)``, NaN for joints that have none."""
-        targets = np.empty((len(points), *self.joints.shape))
-        targets[:] = np.nan
+        targets = np.repeat(self._no_targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
-        if codes is None:
-            codes = self._codes if len(points) == 1 else np.repeat(self._codes, len(points), axis=0)
+        codes = np.repeat(self._codes, len(points), axis=0) if codes is None else codes
         return codes, targets
 
     def _check(self, points: Array) -> None:
-        """Raises ValueError for goals that are NaN in part, and for entries that are infinite or
-        beyond what a trial takes."""
+        """Raises ValueError for goals that are NaN in part, and for infinite entries."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
         _, targets = self._trials_of(points, self._codes)
@@ -326,11 +416,11 @@ class Objective:
             )
         if np.isinf(points).any():
             raise ValueError("points have infinite entries; needed are finite ones")
-        if (np.abs(points) > LARGEST_ENTRY).any():
-            raise ValueError(f"a point has an entry beyond {LARGEST_ENTRY:g}")
 
     def _trials_left(self, wanted: int) -> int:
         """How many of so many trials are left."""
+        if os.getpid() != self._process:
+            raise CoarticError(NO_COPIES)
         left = self._session.trials_left
         if self._end is not None:
             own = self._end - self._session.meter.trials

@@ -1,11 +1,16 @@
 """The objective function, the optima through it, and the examples of methods."""
 
+import copy
+import multiprocessing
+import pickle
 import re
 import runpy
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 import coartic
 from coartic import MotionModel, corrective_trial, execute, load_task
@@ -83,6 +88,127 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
             cost.many(wrong)
 
 
+def test_a_point_that_is_far_away_is_a_trial_that_fails():
+    cost, near = (coartic.objective("two-armed-2", "RLRR") for _ in range(2))
+    points = cost.x0 + 0.05 * np.random.default_rng(0).standard_normal((9, cost.dim))
+    points[4, 3] = 2e5
+    assert cost(points[4]) == FAILED
+    costs, others = cost.many(points), near.many(np.delete(points, 4, axis=0))
+    np.testing.assert_array_equal(costs, np.insert(others, 4, FAILED))
+    np.testing.assert_array_equal(cost.best_x, near.best_x)
+    assert (cost.evaluations, near.evaluations) == (10, 8)
+
+
+@pytest.mark.parametrize("method", ["L-BFGS-B", "SLSQP"])
+def test_unbounded_searches_that_step_far_away_go_on(method):
+    cost, far = coartic.objective("ascending"), []
+
+    def steep(x):
+        far.append(np.abs(x).max() > 1e5)
+        return cost(x) - 1e9 * x[0]  # downhill without end, but for trials that fail
+
+    optimize.minimize(steep, cost.x0, method=method, options={"maxiter": 20})
+    assert any(far)
+    assert cost.evaluations == len(far)
+
+
+def test_threads_share_a_budget():
+    cost = coartic.objective("two-armed-2", budget=300)
+    points = cost.x0 + 0.02 * np.random.default_rng(0).standard_normal((600, cost.dim))
+
+    def evaluate(n):
+        try:
+            return cost(points[n]) if n % 3 else cost.many(points[n : n + 1])[0]
+        except BudgetError:
+            return np.inf
+
+    with ThreadPoolExecutor(8) as pool:
+        costs = np.array([*pool.map(evaluate, range(600))])
+    assert np.isfinite(costs).sum() == cost.evaluations == 300 - 16
+    assert cost.best_cost == costs.min() == -execute(cost.task, cost.solution).reward
+
+
+def test_a_session_is_shared_by_threads():
+    task = load_task("ascending")
+    session = Session(task, 0, TOLD, trial_budget=100)
+    solution = corrective_trial(task, "RRR").movements
+
+    def work(n):
+        try:
+            return session.trial(solution).reward
+        except BudgetError:
+            return None
+
+    with ThreadPoolExecutor(8) as pool:
+        rewards = [*pool.map(work, range(300))]
+    assert rewards.count(-319) == session.meter.trials == len(session.rewards) == 100
+
+
+SHARED = []
+"""An objective that processes inherit."""
+
+
+def evaluate_shared(x):
+    return SHARED[0](x)
+
+
+def test_copies_are_refused_with_another_way():
+    cost = coartic.objective("ascending", budget=50)
+    for copied in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(coartic.CoarticError, match="use vectorized=True or objective.many"):
+            copied(cost)
+    assert (cost.evaluations, cost(cost.x0)) == (0, 320)
+
+
+@pytest.mark.process
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of fork, beside threads
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_other_processes_are_refused(start):
+    """One that is sent, and one that is inherited."""
+    cost = coartic.objective("ascending", budget=50)
+    SHARED[:] = [cost]
+    functions = [cost, evaluate_shared] if start == "fork" else [cost]
+    with multiprocessing.get_context(start).Pool(1) as pool:
+        for function in functions:
+            with pytest.raises(coartic.CoarticError, match="sent to another process"):
+                pool.map(function, [cost.x0])
+    assert cost.evaluations == 0
+
+
+def test_points_become_movements():
+    task = load_task("two-armed-2")
+    cost = coartic.objective(task, "RLRR")
+    points = cost.x0 + 0.3 * np.random.default_rng(2).standard_normal((30, cost.dim))
+    points[3, np.argwhere(cost.joints)[:, 0] == 1] = np.nan  # the corrective process alone
+    for hands in (None, "RRRR", "LLRL"):
+        costs = cost.many(points, hands)
+        for point, due in zip(points, costs, strict=True):
+            assert execute(task, cost.movements(point, hands)).reward == -due
+    assert cost.evaluations == 90
+    model = MotionModel(max_iterations=100)
+    fails = coartic.objective("ascending", model=model)
+    points = fails.x0 + np.random.default_rng(0).standard_normal((200, fails.dim))
+    failed = points[fails.many(points) == FAILED]
+    assert not execute("ascending", fails.movements(failed[0]), model=model).completed
+    for wrong, words in ((cost.x0[1:], "needed is"), (np.inf * cost.x0, "infinite")):
+        with pytest.raises(ValueError, match=words):
+            cost.movements(wrong)
+
+
+def test_a_square_array_is_refused_as_rows_and_columns_look_alike():
+    cost = coartic.objective("ascending")
+    points = cost.x0 + 0.1 * np.random.default_rng(1).standard_normal((cost.dim, cost.dim))
+    with pytest.raises(ValueError, match=r"use many\(x\) for rows, many\(x.T\) for columns"):
+        cost(points)
+    np.testing.assert_array_equal(cost(points.T[:, :5]), cost.many(points[:5]))
+
+
+@pytest.mark.parametrize("name", ["budget", "hands", "half_width"])
+def test_what_would_change_nothing_cannot_be_set(name):
+    with pytest.raises(AttributeError):
+        setattr(coartic.objective("ascending"), name, 5)
+
+
 @pytest.mark.parametrize(
     ("budget", "trials", "before"), [(30, None, 0), (None, 30, 0), (30, 50, 0), (40, 30, 2)]
 )
@@ -119,6 +245,25 @@ def test_the_examples_are_methods(path, in_this_process):
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute(load_task("ascending"), solution).reward
     assert reward == max(session.rewards)
+
+
+def test_hands_are_chosen_by_a_method():
+    """It comes nearer to the optimum than any point with the hands that are chosen by default."""
+    task, name = load_task("two-armed-2"), "halving"
+    entry = registry([EXAMPLES / f"{name}.py"])[name]
+    session = Session(task, 0, map(Information, entry.told))
+    reward = execute(task, entry.configure({}).solve(session).solution).reward
+    assert reward == max(filter(None, session.rewards)) > -340
+    assert session.meter.trials == 10_000
+
+
+def test_a_method_is_told_which_hands_there_are():
+    for name in ("ascending", "two-armed-2"):
+        cost = Objective(Session(load_task(name), 0, TOLD))
+        assert cost.hand_sequences == coartic.hand_sequences(name)
+    task = tiny_task(goals=[[5.0, 1.0]] * 13, initial_hands="R" * 13)
+    with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):
+        _ = coartic.objective(task, "R" * 13).hand_sequences
 
 
 def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):

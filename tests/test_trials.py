@@ -64,13 +64,33 @@ def test_what_was_given_is_left_alone():
         ("ascending", ["RRR"], (2, 3, 10), 0.0, "hand"),
         ("ascending", np.zeros((2, 3), int), (2, 3, 10), 0.0, "hand"),
         ("ascending", "RRR", (1, 3, 9), 0.0, "have shape"),
-        ("ascending", "RRR", (1, 3, 10), np.inf, "beyond"),
+        ("ascending", "RRR", (1, 3, 10), np.inf, "infinite"),
         ("two-armed-1", "RRRR", (1, 4, 10), 0.1, "moves the base in y"),
     ],
 )
 def test_trials_that_cannot_be_made(name, hands, shape, value, message):
     with pytest.raises(ValueError, match=message):
         make_trials(load_task(name), hands, np.full(shape, value))
+
+
+def test_a_target_that_is_far_away_fails_its_trial_alone():
+    task, rng = load_task("two-armed-2"), np.random.default_rng(0)
+    hands, targets = sample(task, 12)
+    targets[:, 2, 3:6] = np.nan
+    session, others = Session(task, 0, TOLD), Session(task, 0, TOLD)
+    far = np.isin(np.arange(12), [0, 5, 11])
+    given = targets.copy()
+    given[far, rng.integers(4, size=3), rng.integers(6, 10, size=3)] = [1.1e5, -3e5, 1e300]
+    trials = session.trials(hands, given)
+    due = others.trials(
+        [each for each, is_far in zip(hands, far, strict=True) if not is_far], targets[~far]
+    )
+    for rows, expected in zip(trials, due, strict=True):
+        np.testing.assert_array_equal(rows[~far], expected)
+    assert np.isneginf(trials.rewards[far]).all()
+    assert [session.rewards[n] for n in (0, 5, 11)] == [None] * 3
+    assert session.meter.failed_trials == others.meter.failed_trials + 3
+    assert session.meter.movement_ticks == others.meter.movement_ticks
 
 
 def test_no_number_of_threads_changes_a_trial(monkeypatch):

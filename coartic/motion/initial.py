@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
 
 from coartic.errors import NotApplicableError
@@ -101,11 +101,18 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     """
     task = as_task(task)
     allowed = task.hands if hands is None else hands_among(task, hands)
-    ordered = [hand for hand in HANDS if hand in allowed]
-    reason = too_many_sequences(task.name, len(task.goals), len(ordered))
-    if reason is not None:
+    return sequences_with(allowed, len(task.goals), task.name)
+
+
+def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
+    """All sequences of some hands for so many goals, in alphabetical order.
+
+    Raises NotApplicableError, which names the task, where there are too many.
+    """
+    ordered = [hand for hand in HANDS if hand in hands]
+    if reason := too_many_sequences(task, goals, len(ordered)):
         raise NotApplicableError(reason)
-    return [letters_of(s) for s in itertools.product(ordered, repeat=len(task.goals))]
+    return [letters_of(sequence) for sequence in itertools.product(ordered, repeat=goals)]
 
 
 def hands_among(task: Task, hands: Iterable[Hand]) -> tuple[Hand, ...]:

@@ -53,8 +53,11 @@ def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
     """Make N trials of a task that is checked, as nothing else is.
 
     ``hands`` has shape ``(N, G)``, indices into HANDS, ``targets`` ``(N, G, dof)``, in which joints
-    without one are filled in.
+    without one are filled in. A trial with a target beyond :data:`LARGEST_ENTRY` fails without a
+    movement.
     """
+    if (far := are_far(targets)) is not None:
+        return trials_but(far, bench, hands, targets)
     reached = reach_all(bench, hands, targets[:, :, None])
     if not reached.hit.all():
         reached.q[~reached.hit] = np.nan
@@ -67,6 +70,27 @@ def trials_on(bench: Bench, hands: NDArray[np.int64], targets: Array) -> Trials:
         targets=targets,
         reached=reached.q,
     )
+
+
+def are_far(targets: Array) -> NDArray[np.bool_] | None:
+    """Which trials ``(N,)`` have a target beyond :data:`LARGEST_ENTRY`; None where none has."""
+    most, least = (of.reduce(targets, axis=None, initial=0.0) for of in (np.fmax, np.fmin))
+    if most <= LARGEST_ENTRY and least >= -LARGEST_ENTRY:  # whatever is NaN
+        return None
+    return np.asarray((np.abs(targets) > LARGEST_ENTRY).any(axis=(1, 2)))
+
+
+def trials_but(
+    far: NDArray[np.bool_], bench: Bench, hands: NDArray[np.int64], targets: Array
+) -> Trials:
+    """Make all trials but those ``far`` ones, which fail without a movement."""
+    made = trials_on(bench, hands[~far], targets[~far])
+    blank = (np.zeros((len(far), *each.shape[1:]), each.dtype) for each in made)
+    trials = Trials._make(blank)._replace(targets=targets)
+    trials.reached[far] = np.nan
+    for rows, some in zip(trials, made, strict=True):
+        rows[~far] = some
+    return trials
 
 
 def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
@@ -132,7 +156,6 @@ def check_targets(task: Task, targets: Array) -> Array:
         raise ValueError(
             f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
         )
-    within = copy.max(initial=0.0) <= LARGEST_ENTRY and copy.min(initial=0.0) >= -LARGEST_ENTRY
-    if not within and np.any(np.abs(copy) > LARGEST_ENTRY):  # or some are NaN
-        raise ValueError(f"a target has a number beyond {LARGEST_ENTRY:g}")
+    if are_far(copy) is not None and np.isinf(copy).any():
+        raise ValueError("targets have infinite entries; needed are finite ones")
     return hold_base(task, copy)

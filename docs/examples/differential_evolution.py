@@ -12,7 +12,7 @@ class DifferentialEvolution(Optimiser):
 
     def optimise(self, objective, rng):
         differential_evolution(
-            objective,
+            lambda points: objective.many(points.T),  # scipy has them in columns
             objective.bounds,
             x0=objective.x0,
             rng=rng,
