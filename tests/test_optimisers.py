@@ -190,7 +190,7 @@ def test_points_become_movements():
     points = fails.x0 + np.random.default_rng(0).standard_normal((200, fails.dim))
     failed = points[fails.many(points) == FAILED]
     assert not execute("ascending", fails.movements(failed[0]), model=model).completed
-    for wrong, words in ((cost.x0[1:], "needed is"), (np.inf * cost.x0, "infinite")):
+    for wrong, words in ((cost.x0[1:], "needed is"), (np.full(cost.dim, np.inf), "infinite")):
         with pytest.raises(ValueError, match=words):
             cost.movements(wrong)
 
