@@ -30,6 +30,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
+from threading import RLock
 from typing import Any, Literal
 
 import casadi
@@ -52,6 +53,8 @@ MODEL_BASED = frozenset(
 
 Cost = Literal["path-length", "squared-changes", "acceleration", "jerk"]
 
+_ONE_AT_A_TIME = RLock()
+"""Held while CasADi builds a programme and IPOPT solves it, as two threads cannot do so at once."""
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
 # goals at once. Acceleration on two-armed-2 gets -322, -317, -315, -314 with 0.1, 0.05, 0.02,
@@ -242,15 +245,18 @@ class TrajectoryProblem:
         chosen[[] if deep is None else list(deep)] = 1.0
         right = [float(hand == "right") for hand in instance.hands]
         weights = [1.0, 0.0] if deep is None else [0.0, 1.0]
-        solution = self._solver(
-            x0=first,
-            lbx=least,
-            ubx=most,
-            lbg=self._lower,
-            ubg=self._upper,
-            p=np.concatenate([instance.q0, instance.goals.ravel(), right, [rim], chosen, weights]),
-        )
-        return self.plan_from(instance, solution)
+        with _ONE_AT_A_TIME:
+            solution = self._solver(
+                x0=first,
+                lbx=least,
+                ubx=most,
+                lbg=self._lower,
+                ubg=self._upper,
+                p=np.concatenate(
+                    [instance.q0, instance.goals.ravel(), right, [rim], chosen, weights]
+                ),
+            )
+            return self.plan_from(instance, solution)
 
     def plan_from(self, instance: Instance, solution: dict[str, Any]) -> PathPlan:
         """The plan of a solution; it has converged only if every constraint holds as well."""
@@ -303,12 +309,15 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     return quadratic / time**3 + mixed / time**2 + bending / time
 
 
-@lru_cache(maxsize=32)
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
     """The compiled problem, built once per process."""
-    return TrajectoryProblem(robot, hands, goals, cost)
+    with _ONE_AT_A_TIME:
+        return _built(robot, hands, goals, cost)
+
+
+_built = lru_cache(maxsize=32)(TrajectoryProblem)
 
 
 def segment_lengths(configurations: Array) -> Array:
