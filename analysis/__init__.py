@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from coartic.analysis.signatures.context_tests import beyond_p
     from coartic.analysis.signatures.measures import SIGNATURES
     from coartic.analysis.signatures.two_contexts import TwoContexts
-    from coartic.analysis.statistics.estimates import mean
     from coartic.analysis.statistics.instances import other_tasks
     from coartic.analysis.study import Study, load
     from coartic.analysis.topics.costs import runtimes
     from coartic.analysis.words import interval
+    from coartic.estimates import mean
 
 __all__ = [
     "SIGNATURES", "Study", "TwoContexts", "all_of", "beyond_p", "ecdf", "fill_page", "gaps",
@@ -26,17 +26,17 @@ __all__ = [
 ]  # fmt: skip
 
 _HOMES = {
-    "claims.judging": ("all_of", "judge", "mean_beyond"),
-    "frames": ("ecdf", "gaps", "means", "ranking"),
-    "pages": ("fill_page", "write_study"),
-    "topics.costs": ("runtimes",),
-    "signatures.context_tests": ("beyond_p",),
-    "signatures.measures": ("SIGNATURES",),
-    "signatures.two_contexts": ("TwoContexts",),
-    "statistics.estimates": ("mean",),
-    "statistics.instances": ("other_tasks",),
-    "study": ("Study", "load"),
-    "words": ("interval",),
+    "analysis.claims.judging": ("all_of", "judge", "mean_beyond"),
+    "analysis.frames": ("ecdf", "gaps", "means", "ranking"),
+    "analysis.pages": ("fill_page", "write_study"),
+    "analysis.topics.costs": ("runtimes",),
+    "analysis.signatures.context_tests": ("beyond_p",),
+    "analysis.signatures.measures": ("SIGNATURES",),
+    "analysis.signatures.two_contexts": ("TwoContexts",),
+    "estimates": ("mean",),
+    "analysis.statistics.instances": ("other_tasks",),
+    "analysis.study": ("Study", "load"),
+    "analysis.words": ("interval",),
 }
 
 
@@ -44,5 +44,5 @@ def __getattr__(name: str) -> Any:
     """Import a name when it is asked for: not every command needs all of them."""
     for home, names in _HOMES.items():
         if name in names:
-            return getattr(import_module(f"coartic.analysis.{home}"), name)
+            return getattr(import_module(f"coartic.{home}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

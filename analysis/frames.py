@@ -14,9 +14,9 @@ import pandas as pd
 
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.estimates import Estimate, mean
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
+from coartic.estimates import Estimate, mean
 
 
 def check_columns(frame: pd.DataFrame, *names: str) -> None:

@@ -12,7 +12,7 @@ from coartic.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task
-    from coartic.analysis.statistics.estimates import Estimate
+    from coartic.estimates import Estimate
 
 NONE = "–"
 """Shown where there is no value."""

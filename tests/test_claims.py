@@ -24,10 +24,10 @@ from coartic.analysis.claims.paper import CLAIMS_OF_THE_PAPER, shortest_reach, s
 from coartic.analysis.claims.reader import Measurement, MissingError
 from coartic.analysis.sections import TABLES
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.study import Study
 from coartic.benchmarks.suites import Cell
+from coartic.estimates import Estimate
 from tests.support.made_up import MadeUp, made, plan_for, row, study_of
 from tests.support.strategies import AS_RELEASED
 from tests.support.suites import KNOWN, InProcess, run_and_write

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from coartic.analysis.statistics.estimates import Estimate
 from coartic.analysis.statistics.hypotheses import difference_to_printed, equivalence
+from coartic.estimates import Estimate
 
 
 def test_interval_against_an_exact_value_is_students():

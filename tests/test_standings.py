@@ -14,11 +14,11 @@ from coartic.analysis.report import about
 from coartic.analysis.report.render import columns_of
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.estimates import RESAMPLES, SEED
 from coartic.analysis.topics import costs, ranking, scores
 from coartic.analysis.topics.ranking import leaders, paired_difference
 from coartic.analysis.topics.rewards import changed_hands
 from coartic.analysis.topics.scores import BY_TRIAL
+from coartic.estimates import RESAMPLES, SEED
 from tests.support.made_up import MadeUp, made_up_optima, row, study_of
 
 

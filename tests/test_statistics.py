@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from coartic.analysis.statistics import estimates as statistics
+from coartic import estimates as statistics
 from coartic.analysis.statistics import hypotheses
 
 # Survival times of mice in days: Efron & Tibshirani (1993), table 2.1.

@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 
 from coartic.analysis.claims.judging import Finding
 from coartic.analysis.claims.reader import Measurement, Reader
-from coartic.analysis.statistics.estimates import Estimate, difference_of_means
 from coartic.analysis.statistics.hypotheses import bootstrap_test
 from coartic.analysis.words import capital, estimate, number
+from coartic.estimates import Estimate, difference_of_means
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from coartic.analysis.signatures.context_tests import dependence_below
 from coartic.analysis.signatures.measures import ticks_slower
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.estimates import SEED, Estimate, difference_of_means
 from coartic.analysis.statistics.hypotheses import share_test
 from coartic.analysis.words import estimate, number
+from coartic.estimates import SEED, Estimate, difference_of_means
 from coartic.robot import HANDS, Array
 from coartic.tasks.task import hands_of
 

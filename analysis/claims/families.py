@@ -12,9 +12,9 @@ from coartic.analysis.claims.claim import Claim, Higher, all_positive, no_trial_
 from coartic.analysis.claims.judging import Finding, all_of, mean_beyond
 from coartic.analysis.claims.reader import MissingError, Reader, who_is
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, GUESSES, LEARNER, LEARNERS, most_exploring
-from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.topics.instances import best_of_instances
 from coartic.analysis.words import estimate
+from coartic.estimates import FEWEST, mean
 from coartic.tasks.optima import KnownOptimum
 
 OF_ONE_ARM = ("one-armed/v1",)

@@ -17,10 +17,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.words import capital, estimate, p_value
 from coartic.errors import CoarticError
+from coartic.estimates import FEWEST, LEVEL, Estimate, mean
 from coartic.text import unknown
 
 RESAMPLES_OF_CLAIMS = 99_999

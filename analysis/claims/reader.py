@@ -13,7 +13,6 @@ from coartic import Execution, Task
 from coartic.analysis.methods import ALL_GUESSES, GUESSES, LEARNER, name_of
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions, initial_solution
-from coartic.analysis.statistics.estimates import FEWEST, mean
 from coartic.analysis.study import CellKey, Study
 from coartic.analysis.topics.guesses import guesses_on, most_guessed, signature_of
 from coartic.analysis.topics.published import (
@@ -22,6 +21,7 @@ from coartic.analysis.topics.published import (
     published_cell,
 )
 from coartic.analysis.words import estimate, number
+from coartic.estimates import FEWEST, mean
 from coartic.learner.learning import TRIALS
 from coartic.robot import Array
 

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, NullFormatter
 
+from coartic import estimates
 from coartic.analysis.methods import KNOWN_METHODS, is_built_in, look_alike
-from coartic.analysis.statistics import estimates
 
 INCH = 25.4  # mm
 ONE = 89 / INCH

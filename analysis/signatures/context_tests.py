@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.analysis.statistics.estimates import RESAMPLES, centred, slices
+from coartic.estimates import RESAMPLES, centred, slices
 from coartic.robot import Array
 
 IN_MEMORY = 500

@@ -24,7 +24,7 @@ from coartic.analysis.signatures.context_tests import (
     permutation_p,
 )
 from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.estimates import SEED
+from coartic.estimates import SEED
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import KEPT
 

@@ -3,7 +3,7 @@
 A mean is tested against a number or another mean by the bootstrap, paired differences by flips of
 their signs, a share by the exact binomial test, counts by Fisher's exact test. Postures have
 permutation tests of their own, in :mod:`coartic.analysis.signatures`. Samples, numbers taken as
-known, and seeds: as in :mod:`coartic.analysis.statistics.estimates`.
+known, and seeds: as in :mod:`coartic.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics.estimates import (
+from coartic.estimates import (
     IN_CACHE,
     NEGLIGIBLE,
     RESAMPLES,

@@ -20,8 +20,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coartic.analysis.statistics import estimates
-from coartic.analysis.statistics.estimates import FEWER_RESAMPLES, Estimate
+from coartic import estimates
+from coartic.estimates import FEWER_RESAMPLES, Estimate
 from coartic.robot import Array
 
 Runs = tuple[Array, ...]

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.analysis.statistics.estimates import (
+from coartic.estimates import (
     FEWER_RESAMPLES,
     FEWEST,
     IN_CACHE,

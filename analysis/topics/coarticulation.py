@@ -29,7 +29,6 @@ from coartic.analysis.settings import compares_settings
 from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import as_in_isolation, preshaping_of_the_other_arm
 from coartic.analysis.signatures.two_contexts import TwoContexts, context_pairs
-from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import holm
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -37,6 +36,7 @@ from coartic.analysis.topics.guesses import context_beyond_p, guesses_beside, se
 from coartic.analysis.topics.scores import failed_runs
 from coartic.analysis.words import marked, number, p_value
 from coartic.drawing import MARKERS
+from coartic.estimates import LEVEL
 from coartic.robot import HANDS, Array
 from coartic.text import counted
 

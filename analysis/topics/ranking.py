@@ -15,13 +15,6 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, spoken
 from coartic.analysis.optima import gap_share
 from coartic.analysis.settings import compares_settings, name_in
-from coartic.analysis.statistics.estimates import (
-    FEWER_RESAMPLES,
-    LEVEL,
-    NEGLIGIBLE,
-    Estimate,
-    bootstrap_estimate,
-)
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm, sign_flip_test
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import Row, Rows, runs_of, table
@@ -35,6 +28,13 @@ from coartic.analysis.words import (
     number,
     p_value,
     spelled,
+)
+from coartic.estimates import (
+    FEWER_RESAMPLES,
+    LEVEL,
+    NEGLIGIBLE,
+    Estimate,
+    bootstrap_estimate,
 )
 from coartic.robot import Array
 from coartic.text import counted

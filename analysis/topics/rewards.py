@@ -11,12 +11,12 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure
 from coartic.analysis.methods import LEARNER, LEARNERS, name_of
-from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.statistics.hypotheses import MARGIN, difference_to_printed, equivalence
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.topics.published import RUNS, published_alone, published_cell
 from coartic.analysis.words import interval, listed, marked
+from coartic.estimates import standard_deviation
 from coartic.learner.learning import TRIALS
 
 _MARKS = {

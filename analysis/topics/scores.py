@@ -17,10 +17,10 @@ from coartic.analysis import methods
 from coartic.analysis.methods import EC1, EC3, EC4, is_search, is_setting, name_of
 from coartic.analysis.optima import gap_share, initial_reward, locks_base
 from coartic.analysis.settings import compares_settings
-from coartic.analysis.statistics.estimates import standard_deviation
 from coartic.analysis.study import CellRuns, Study, cached, one_by_one, typical_run
 from coartic.analysis.table import SHORT_ID, Rows, runs_of, table
 from coartic.analysis.words import marked, number, tally
+from coartic.estimates import standard_deviation
 from coartic.method import Information
 from coartic.tasks.optima import best_shipped
 

@@ -8,11 +8,11 @@ from collections import Counter
 import numpy as np
 
 from coartic.analysis.settings import compares_settings, name_in, varied
-from coartic.analysis.statistics.estimates import LEVEL, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
 from coartic.analysis.study import Study
 from coartic.analysis.table import Rows, runs_of, table
 from coartic.analysis.words import capital, interval, listed, marked, number
+from coartic.estimates import LEVEL, mean
 from coartic.text import counted
 
 MOST_TASKS = 4

@@ -17,11 +17,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pandas as pd
 
+from coartic import estimates
 from coartic.analysis.claims import margins
 from coartic.analysis.methods import GUESSES
 from coartic.analysis.signatures.context_tests import beyond_p, context_dependence, permutation_p
-from coartic.analysis.statistics import estimates
-from coartic.analysis.statistics.estimates import LEVEL
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
     difference_to_printed,
@@ -30,6 +29,7 @@ from coartic.analysis.statistics.hypotheses import (
 )
 from coartic.analysis.statistics.instances import other_tasks
 from coartic.analysis.study import Study, load
+from coartic.estimates import LEVEL
 from coartic.robot import Array
 
 SIMULATIONS, RESAMPLES = 500, 999
