@@ -1,6 +1,7 @@
 """The planner with a receding horizon."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial import KDTree
 from coartic import PAPER, Robot, load_task
 from coartic.baselines.optimum import Optimum
 from coartic.baselines.receding_horizon import RecedingHorizon
+from tests.support.processes import apart
 from tests.support.strategies import solve, tiny_task
 
 FEW = {"graphs": 1, "chains": 1}
@@ -27,6 +29,23 @@ def solved(task, method=RecedingHorizon, **parameters):
 def planned(name, **parameters):
     """The same on a task by its name, once for all tests."""
     return solved(load_task(name), nodes=100, **parameters)
+
+
+def in_threads():
+    """Targets of plans that threads make at once; a crash of IPOPT would end the process."""
+    tasks = list(map(load_task, ["ascending", "descending", "two-armed/v1/d006"])) * 2
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        plans = pool.map(lambda task: solved(task, nodes=20)[0].solution, tasks)
+        return [[m.target.tobytes() for m in plan] for plan in plans]
+
+
+@pytest.mark.process
+def test_plans_are_those_of_one_thread_in_several():
+    together, half = apart(in_threads), 3
+    assert together[:half] == together[half:]
+    for name, plan in zip(("ascending", "descending"), together, strict=False):
+        alone = solved(load_task(name), nodes=20)[0].solution
+        assert plan == [movement.target.tobytes() for movement in alone]
 
 
 @pytest.mark.parametrize("name", ["descending", "two-armed/v1/d006"])
