@@ -9,24 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
 import pandas as pd
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
+from coartic.errors import NotApplicableError
+from coartic.estimates import Estimate, mean
 from coartic.inputs import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, Session
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.initial import corrective_trial, initial_hands
+from coartic.motion.initial import initial_reward
 from coartic.motion.lanes import LANES, lanes_for, runs_for
 from coartic.motion.setup import setup_for
 from coartic.motion.solution import execute
@@ -35,7 +39,7 @@ from coartic.optimisers import FAILED
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.families import LOCKED, instance_names, shipped_families
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import MOST_GOALS, Split, Task, as_task
+from coartic.tasks.task import MOST_GOALS, Split, Task, as_task, parse_task
 from coartic.text import unknown
 
 if TYPE_CHECKING:
@@ -44,9 +48,35 @@ if TYPE_CHECKING:
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
 Rows = NDArray[np.int64] | slice
+MOST_SEED = 2**128 - 1
 
 
-class TaskVectorEnv(VectorEnv):
+class Recorded:
+    """An environment whose specification JSON can hold, as recorders of episodes do."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How it was made: a task, its name or its path, as plain data."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and replace(spec, kwargs=plain_options(spec.kwargs))
+
+
+def plain_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of an environment as plain data, of which the same environment can be made."""
+    plain = dict(options)
+    if isinstance(task := plain.get("task"), Task | Path):
+        plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
+    if isinstance(model := plain.get("model"), MotionModel):
+        plain["model"] = model._asdict()
+    return plain
+
+
+class TaskVectorEnv(Recorded, VectorEnv):
     """N robots side by side, which takes a fraction of the time of N :class:`TaskEnv`.
 
     An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
@@ -110,6 +140,9 @@ class TaskVectorEnv(VectorEnv):
     ) -> None:
         check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
+        # As a specification has them.
+        task = parse_task(task, "task") if isinstance(task, dict) else task
+        model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
         self.options = {"task": task, "ahead": ahead, "model": model}
         if isinstance(task, str) and task in shipped_families():
@@ -216,7 +249,8 @@ class TaskVectorEnv(VectorEnv):
         self.fleet.actions[rows] = chosen
         refused = step_robots(self.fleet)
         if refused >= 0:
-            raise ValueError(f"the action of robot {refused} has NaN; it must be numbers")
+            which = f" of robot {refused}" if self.num_envs > 1 else ""
+            raise ValueError(f"the action{which} has NaN; it must be numbers")
 
     def infos(self) -> dict[str, Any]:
         """Names of tasks, and whether all goals are hit."""
@@ -231,11 +265,14 @@ class TaskVectorEnv(VectorEnv):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin all trials, with a seed for each robot, or for the first, which others follow."""
         check_no_options(options)
-        if seed is None or isinstance(seed, int):
-            seed = [None if seed is None else seed + row for row in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
-        for row, each in enumerate(seed):
+        if isinstance(seed, Iterable):
+            seeds = [*map(whole_seed, seed)]
+        else:
+            first = whole_seed(seed)
+            seeds = [None if first is None else first + row for row in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+        for row, each in enumerate(seeds):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]
         self._begin_anew(np.ones(self.num_envs, np.bool_))
@@ -270,7 +307,7 @@ class TaskVectorEnv(VectorEnv):
         return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
 
 
-class TaskEnv(gymnasium.Env):
+class TaskEnv(Recorded, gymnasium.Env):
     """One robot. Options, observations, actions and rewards are those of :class:`TaskVectorEnv`,
     without new beginnings; ``render_mode`` may be ``"rgb_array"``."""
 
@@ -279,6 +316,11 @@ class TaskEnv(gymnasium.Env):
     def __init__(
         self, task: Task | str | Path, *, render_mode: str | None = None, **options: Any
     ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(
+                f"render_mode is {brief_value(render_mode)}; it must be 'rgb_array' or None. "
+                "gymnasium.make knows others, such as 'human' for a window"
+            )
         self.robots = TaskVectorEnv(1, task, **options)
         self.action_space = self.robots.single_action_space
         self.observation_space = self.robots.single_observation_space
@@ -288,7 +330,7 @@ class TaskEnv(gymnasium.Env):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial."""
-        super().reset(seed=seed)
+        super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots.begin(slice(None), self.np_random.integers(len(self.robots.tasks), size=1))
         return self.robots.fleet.seen[0].copy(), self._info()
@@ -331,6 +373,14 @@ def check_no_options(options: Mapping[str, Any] | None) -> None:
     """Raises ValueError for options of a reset: there are none."""
     if options:
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
+
+
+def whole_seed(seed: Any) -> int | None:
+    """A seed as Gymnasium takes it. Raises ValueError for anything else."""
+    if seed is None:
+        return None
+    check_limits("seed", seed, 0, MOST_SEED)
+    return int(seed)
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
@@ -384,7 +434,8 @@ def score(
     Parameters
     ----------
     env : str, Env or VectorEnv
-        An environment of this package, or its id. Of a family the instances of the test split
+        An environment of this package without wrappers, or its id. Of a family the instances of
+        the test split
         are scored, or those of the ``split`` that is given here.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
@@ -403,9 +454,9 @@ def score(
         A row for each policy, for uniformly random actions, for the corrective process alone with
         the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
         over tasks, ticks; ``gap`` to the best known reward, per cent, with its 95 % interval
-        ``gap_low`` to ``gap_high`` over tasks, or of one task over trials; ``completed``, the share
-        of trials that hit all goals. The others are left out of the means. NaN where nothing is
-        known, or too few trials for an interval.
+        ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of one task over trials;
+        ``completed``, the share of trials that hit all goals. The others are left out of the means.
+        NaN where nothing is known, or too few trials for an interval.
 
     Raises
     ------
@@ -413,15 +464,7 @@ def score(
         The environment is none of coartic's, an option is wrong, or the policy is no policy.
     """
     check_limits("episodes", episodes, 1, MOST_CELLS)
-    if isinstance(env, str):
-        given = known_env(env)
-    elif isinstance(own := getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
-        given = (own.robots if isinstance(own, TaskEnv) else own).options
-    else:
-        raise TypeError(
-            f"env is {brief_value(env)}; it must be an environment of coartic or its id"
-        )
-    given = given | options
+    given = (known_env(env) if isinstance(env, str) else options_of(env)) | options
     if given.get("task") in [*shipped_families()]:  # a Task has no hash
         given = {"split": "test", **given}
     setting = TaskVectorEnv(1, **given)
@@ -447,45 +490,66 @@ def score(
             rows = np.flatnonzero(robots.fleet.going)
         return np.where(totals > -FAILED, totals, np.nan).reshape(-1, trials)
 
-    def solve(method: Method, task: Task) -> float | None:
-        """Reward of its solution; None where it has none."""
-        with suppress(MethodError):
-            session = Session(task, seed, method.told, model=model, trusted=True)
-            return execute(task, method.solve(session).solution, model=model).reward
-        return None
-
     def column(values: Iterable[float | None]) -> Array:
         return np.array([[np.nan if each is None else each] for each in values])
 
     rewards = {}
     for name, each in policies.items():
         if isinstance(each, Method):
-            rewards[name] = column(solve(each, task) for task in tasks)
+            rewards[name] = column(reward_of(each, task, seed, model) for task in tasks)
         elif hasattr(each, "predict"):
             rewards[name] = run(lambda seen, each=each: each.predict(seen, deterministic=True)[0])
         else:
             rewards[name] = run(each)
     rng = np.random.default_rng(seed)
-    hands = [initial_hands(task, model=model) for task in tasks]
-    alone = [corrective_trial(*each, model=model).reward for each in zip(tasks, hands, strict=True)]
     shipped = [best_shipped(task) if model == PAPER else None for task in tasks]
     best = column(None if each is None else each.reward for each in shipped)
     rewards["random actions"] = run(lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), episodes)
-    rewards |= {"corrective process": column(alone), "best known": best}
+    rewards["corrective process"] = column(initial_reward(task, model) for task in tasks)
+    rewards["best known"] = best
     rows = {}
     for name, earned in rewards.items():
         gaps = pd.DataFrame(100.0 * (best - earned) / np.abs(best))
         values = (gaps.iloc[0] if len(gaps) == 1 else gaps.mean(axis=1)).dropna()
-        half = stdtrit(len(values) - 1, 0.975) * values.sem() if len(values) > 2 else np.nan
         rows[name] = {
             "reward": pd.DataFrame(earned).mean(axis=1).mean(),
-            "gap": values.mean(),
-            "gap_low": values.mean() - half,
-            "gap_high": values.mean() + half,
+            **(mean(values) if len(values) else Estimate(np.nan)).columns("gap"),
             "completed": float(np.isfinite(earned).mean()),
         }
     rows["best known"]["completed"] = np.nan
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("policy")
+
+
+def options_of(env: Any) -> dict[str, Any]:
+    """The options of an environment of this package. Raises TypeError for anything else."""
+    if not isinstance(getattr(env, "unwrapped", env), TaskEnv | TaskVectorEnv):
+        raise TypeError(
+            f"env is {brief_value(env)}; it must be an environment of coartic or its id"
+        )
+    while isinstance(env, gymnasium.Wrapper | VectorWrapper):
+        if not isinstance(env, OrderEnforcing | PassiveEnvChecker):  # which make adds
+            raise TypeError(
+                f"env is wrapped in {type(env).__name__}, which score would leave out: give the "
+                "environment without wrappers (env.unwrapped), and a policy that does to "
+                "observations and actions what they do"
+            )
+        env = env.env
+    options: dict[str, Any] = (env.robots if isinstance(env, TaskEnv) else env).options
+    return options
+
+
+def reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
+    """Reward of a method's solution of a task; None where it has none.
+
+    Methods of this project are trusted, as in a suite; any other is told what it declares.
+    """
+    trusted = type(method).__module__.startswith(("coartic.baselines.", "coartic.learner."))
+    session = Session(task, seed, method.told, model=model, trusted=trusted)
+    with suppress(MethodError, NotApplicableError):
+        solution = method.solve(session).solution
+        session.check_solution(solution)
+        return execute(task, solution, model=model).reward
+    return None
 
 
 IDS: dict[str, dict[str, Any]] = {

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from coartic.motion.initial import corrective_trial, initial_hands
+from coartic.motion.initial import initial_reward
 from coartic.optimisers import FAILED
 from coartic.robot import Array
 
@@ -20,7 +20,8 @@ class RobotEnvs(VecEnv):
     ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
     ticks. Rewards are ticks as a share of what the corrective process takes for the whole trial
     with the task's initial hands: all rewards of a trial that is like it add up to -1. No step
-    loses more than 2, such as one in which the corrective process fails.
+    loses more than 2, such as one in which the corrective process fails. On a task that the
+    corrective process cannot do alone, they are shares of ``coartic.optimisers.FAILED``.
 
     Parameters
     ----------
@@ -80,9 +81,8 @@ class RobotEnvs(VecEnv):
         return [False] * self.num_envs
 
     def _cost(self, number: int) -> float:
-        """Ticks of the corrective process alone on a task, or of a failure."""
+        """Ticks of the corrective process alone on a task, one at least, or of a failure."""
         if number not in self._costs:
-            task, model = self._envs.task_at(number), self._envs.model
-            reward = corrective_trial(task, initial_hands(task, model=model), model=model).reward
-            self._costs[number] = float(FAILED if reward is None else -reward)
+            reward = initial_reward(self._envs.task_at(number), self._envs.model)
+            self._costs[number] = float(FAILED if reward is None else max(-reward, 1))
         return self._costs[number]

@@ -4,15 +4,28 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
 import coartic
-from coartic import MotionModel, correct, corrective_trial, execute, initial_hands, load_task
+import coartic.method as coartic_method
+from coartic import (
+    MotionModel,
+    Movement,
+    Robot,
+    correct,
+    corrective_trial,
+    execute,
+    initial_hands,
+    load_task,
+)
 from coartic.baselines.corrective_alone import METHODS as ALONE
+from coartic.learner.method import METHODS as LEARNERS
 from coartic.motion.trials import movements_of
 from coartic.optimisers import FAILED
 from coartic.tasks import families
@@ -21,6 +34,9 @@ from coartic.tasks.task import address_of
 from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
+
+from gymnasium import wrappers  # noqa: E402
+from gymnasium.envs.registration import EnvSpec  # noqa: E402
 
 import coartic.gym  # noqa: E402
 from coartic.gym import TaskEnv, TaskVectorEnv  # noqa: E402
@@ -184,7 +200,7 @@ def test_actions_that_are_none():
     missing[1, 3] = np.nan
     with pytest.raises(ValueError, match="the action of robot 1 has NaN"):
         vector.step(missing)
-    with pytest.raises(ValueError, match="the action of robot 0 has NaN"):
+    with pytest.raises(ValueError, match="the action has NaN"):
         env.step(np.full(10, np.nan))
     with pytest.raises(ValueError, match=r"shape \(1, 3\); it must be \(1, 10\)"):
         env.step(np.zeros(3))
@@ -202,6 +218,7 @@ def test_actions_that_are_none():
         ({"task": "two-armed/v9"}, coartic.TaskError, "two-armed/v9"),
         ({"task": "ascending", "count": 3}, ValueError, "are for families, not 'ascending'"),
         ({"task": 3}, TypeError, "task is 3; it must be a Task, the name of one"),
+        ({"task": {"goals": 3}}, coartic.TaskError, "goals is 3; it should be a list of points"),
     ],
 )
 def test_a_wrong_option_is_refused_with_a_sentence(options, error, words):
@@ -221,6 +238,42 @@ def test_what_else_is_refused():
         TaskEnv("ascending").reset(options={"task": "long"})
     with pytest.raises(ValueError, match="2 seeds for 3 environments"):
         TaskVectorEnv(3, "ascending").reset(seed=[1, 2])
+    for seed in (-1, 1.5, "1"):
+        for env in (TaskEnv("ascending"), TaskVectorEnv(3, "ascending")):
+            with pytest.raises(ValueError, match="seed is .*; it must be a whole number from 0"):
+                env.reset(seed=seed)
+    for mode in ("human", "ansi"):
+        with pytest.raises(ValueError, match=f"render_mode is '{mode}'; it must be 'rgb_array'"):
+            TaskEnv("ascending", render_mode=mode)
+
+
+def test_seeds_of_numpy_are_seeds():
+    single, vector = TaskEnv("two-armed/v1"), TaskVectorEnv(3, "two-armed/v1")
+    assert single.reset(seed=np.int64(5))[1] == single.reset(seed=5)[1]
+    due = vector.reset(seed=[5, 6, 7])[1]["task"].tolist()
+    for seeds in (5, np.uint8(5), np.arange(5, 8), [np.int32(5), 6, 7]):
+        assert vector.reset(seed=seeds)[1]["task"].tolist() == due
+
+
+@pytest.mark.parametrize("number", [None, 3])
+def test_a_specification_is_kept_as_json(number, tmp_path):
+    """From which the same environment is made; of a task, its file and its name."""
+    task = tiny_task(
+        name="own",
+        robot=Robot((1.0, 0.9), (1.0,) * 3),
+        start={"left": [0.3, 0], "right": [0, 0.1, 0]},
+    )
+    task.save(tmp_path / "own.toml")
+    make = gymnasium.make if number is None else partial(gymnasium.make_vec, num_envs=number)
+    again = gymnasium.make if number is None else gymnasium.make_vec
+    for given in (task, tmp_path / "own.toml", str(tmp_path / "own.toml")):
+        options = {"task": given, "ahead": 2, "model": MotionModel(gain=0.04)}
+        spec = EnvSpec.from_json(make("coartic/Task-v2", **options).spec.to_json())
+        env = again(spec).unwrapped
+        robots = env if number else env.robots
+        assert (robots.num_envs, robots.model) == (number or 1, MotionModel(gain=0.04))
+        assert robots.task_at(0) == task
+        assert robots.single_observation_space == TaskEnv(**options).observation_space
 
 
 @pytest.mark.process
@@ -258,7 +311,10 @@ def test_a_family_is_scored_on_its_test_instances():
     zeros = {"zeros": lambda seen: np.zeros((len(seen), 11)), "method": ALONE[0]()}
     table = coartic.gym.score(env, zeros, episodes=2)
     gaps = 100 * (alone - best) / best
-    due = [alone.mean(), gaps.mean(), *stats.t.interval(0.95, 9, gaps.mean(), stats.sem(gaps)), 1]
+    interval = stats.bootstrap(
+        (gaps,), np.mean, n_resamples=9_999, method="BCa", rng=np.random.default_rng(0)
+    ).confidence_interval
+    due = [alone.mean(), gaps.mean(), *interval, 1]
     for name in ("method", "corrective process"):
         np.testing.assert_allclose(table.loc[name], due, rtol=1e-9)
     assert table.gap["best known"] == 0 < table.gap["zeros"] < table.gap["random actions"]
@@ -282,6 +338,84 @@ def test_a_single_task_is_scored():
     fails = coartic.gym.score(TWO, lambda seen: np.ones((1, 10)), model=model)
     assert fails.completed["policy"] == 0
     assert fails.reward[["policy", "best known"]].isna().all()
+
+
+BEHIND = {"name": "behind", "goals": [(-2.0, 0.1), (2.0, 2.0)], "hands": ["right"]}
+
+
+def test_policies_are_scored_where_the_corrective_process_fails():
+    """From a straight arm that points away from the goal."""
+    task = coartic.Task(locked_base=("x", "y"), **BEHIND)
+    policies = {"turns": lambda seen: np.full((len(seen), 4), 0.5), "planner": ALONE[1]()}
+    table = coartic.gym.score("coartic/Task-v2", policies, task=task)
+    env, total, ended = TaskEnv(task), 0.0, False
+    env.reset()
+    while not ended:
+        reward, ended = env.step(np.full(4, 0.5))[1:3]
+        total += reward
+    assert table.reward["turns"] == total > -FAILED
+    assert table.completed[["turns", "planner", "corrective process"]].tolist() == [1, 0, 0]
+    assert table.reward[["planner", "corrective process"]].isna().all()
+    with pytest.raises(coartic.NotApplicableError):
+        initial_hands(task)
+
+
+class Peeping(coartic_method.Method):
+    """Reads the task by the door of this project's compiled methods."""
+
+    name = "test/peeping"
+    title, citation = "Peeping", "None."
+    told = frozenset({coartic_method.Information.CORRECTIVE_PROCESS})
+    peeps = True
+
+    def solve(self, session):
+        if self.peeps:
+            session.hand_over(*self.told)
+        movements = [Movement(n + 1, "right", "corrective") for n in range(session.goals_count)]
+        return coartic_method.Result(tuple(movements))
+
+
+class Honest(Peeping):
+    peeps = False
+
+
+class Untold(Honest):
+    told = frozenset()
+
+
+def test_methods_of_others_are_told_what_they_declare():
+    for method in (Peeping(), Untold()):
+        with pytest.raises(coartic_method.UndeclaredError):
+            coartic.gym.score("coartic/Ascending-v2", method)
+    assert coartic.gym.score("coartic/Ascending-v2", Honest()).reward["policy"] == -319
+    learner = LEARNERS[0](LEARNERS[0].Parameters(trials=20))  # which the task is handed over to
+    assert coartic.gym.score("coartic/Ascending-v2", learner).reward["policy"] >= -319
+
+
+def test_wrappers_are_refused_by_name():
+    """But for those that Gymnasium adds by itself: what a wrapper does, score would leave out."""
+    made, vector = gymnasium.make(TWO), gymnasium.make_vec(TWO, num_envs=2)
+    two = np.float32([-2.0, 2.0])
+    wrapped = {
+        "RescaleAction": [
+            wrappers.RescaleAction(made, *two),
+            wrappers.vector.RescaleAction(vector, *two),
+            wrappers.OrderEnforcing(wrappers.RescaleAction(made.unwrapped, *two)),
+        ],
+        "TimeLimit": [gymnasium.make(TWO, max_episode_steps=2)],
+        "RecordEpisodeStatistics": [
+            wrappers.RecordEpisodeStatistics(made),
+            wrappers.vector.RecordEpisodeStatistics(vector),
+        ],
+    }
+    for name, environments in wrapped.items():
+        for env in environments:
+            with pytest.raises(TypeError, match=f"env is wrapped in {name}, which score would"):
+                coartic.gym.score(env)
+    zeros = {"zeros": lambda seen: np.zeros((len(seen), 10))}
+    due = coartic.gym.score(TWO, zeros)
+    for env in (made, made.unwrapped, vector):
+        pd.testing.assert_frame_equal(coartic.gym.score(env, zeros), due)
 
 
 def test_what_cannot_be_scored():
@@ -314,6 +448,15 @@ def test_robots_for_stable_baselines():
         sums[ended] = 0
         names = vector.step(nothing)[4]["task"]
     assert ends > 12
+    at_once = tiny_task(
+        goals=[[4.5, 0.1]], initial_hands="R"
+    )  # of 0 ticks for the corrective process
+    for own in (at_once, coartic.Task(locked_base=("x", "y"), **BEHIND)):
+        envs = coartic.gym.sb3("coartic/Task-v2", 2, task=own)
+        envs.reset()
+        rewards = envs.step(np.full((2, envs.action_space.shape[0]), 0.5))[1]
+        assert np.isfinite(rewards).all()
+        assert (rewards < 0).all()
     fails = coartic.gym.sb3("coartic/TwoArmed2-v2", 50, model=MotionModel(max_iterations=100))
     fails.reset()
     steps = map(fails.step, np.random.default_rng(0).choice([-1.0, 1.0], (4, 50, 11)))

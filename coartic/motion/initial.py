@@ -207,6 +207,16 @@ def initial_hands(
     return search_initial_hands(task, chosen, model=model)[0]
 
 
+def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
+    """Reward of the corrective process alone with a task's initial hands; None where it fails with
+    them, or there are none with which it completes the task."""
+    try:
+        hands = initial_hands(task, model=model)
+    except NotApplicableError:
+        return None
+    return corrective_trial(task, hands, model=model).reward
+
+
 def search_initial_hands(
     task: Task, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> tuple[str, Mapping[str, int]]:
@@ -233,8 +243,8 @@ def search_by_policy(
     best, execution = ranked[0]
     if not execution.completed:
         raise NotApplicableError(
-            f"task {task.name!r}: the corrective process completes it with none of the "
-            f"{len(candidates)} hand sequences of initial_hands = {task.initial_hands!r}"
+            f"task {task.name!r}: the corrective process completes it with no hand sequence that "
+            f"initial_hands = {task.initial_hands!r} allows; with {best}, {execution.reason}"
         )
     trials = [trial for _, trial in ranked]
     iterations = sum(trial.iterations for trial in trials)
