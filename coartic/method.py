@@ -33,7 +33,7 @@ from coartic.motion.outside import inside, note_trials
 from coartic.motion.reach import Bench, bench_of, reach_all
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trials import HandSequences, Trials, check_targets, hand_codes, trials_on
-from coartic.robot import Array, Hand
+from coartic.robot import Array, Hand, Robot
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
 
@@ -297,6 +297,15 @@ class Session:
         """θ^g. Needs ``goals``."""
         self._use(Information.GOALS)
         return self._task.radius
+
+    @property
+    def robot(self) -> Robot:
+        """The robot, with lengths of links and places of shoulders. Needs ``kinematic model``.
+
+        Evaluations of it, or of another library's model of it, are counted with :meth:`spend`.
+        """
+        self._use(Information.KINEMATIC_MODEL)
+        return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Hand position as a CasADi expression. Needs ``kinematic model``.

@@ -30,7 +30,7 @@ from coartic.method import (
     UndeclaredError,
 )
 from coartic.model import PAPER, MotionModel
-from coartic.motion.initial import sequences_with, too_many_sequences
+from coartic.motion.initial import corrective_trial, sequences_with, too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.reach import bench_of
 from coartic.motion.solution import Movement
@@ -134,7 +134,11 @@ class Objective:
         alone = session.trials(sequences, np.full(shape, np.nan))
         best = int(alone.rewards.argmax())
         if not alone.completed[best]:
-            raise MethodError("infeasible", "the corrective process completes no hand sequence")
+            reason = "the corrective process completes no hand sequence"
+            if task is not None:  # outside of a method
+                alone_again = corrective_trial(task, sequences[best], model=session.model)
+                reason += f"; with {sequences[best]}, {alone_again.reason}"
+            raise MethodError("infeasible", reason)
         self._hands = sequences[best]
         self.joints = explored_joints(session, self.hands)
         """Joints that have a target in a point, shape ``(G, dof)``."""

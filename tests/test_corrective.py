@@ -1,15 +1,28 @@
 """The corrective process against its definition, and what it must leave alone."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coartic import PAPER, MotionModel, Robot, correct, execute, load_task
+from coartic import (
+    PAPER,
+    MotionModel,
+    NotApplicableError,
+    Robot,
+    Task,
+    correct,
+    corrective_trial,
+    execute,
+    initial_hands,
+    load_task,
+    objective,
+)
 from coartic.baselines.corrective_alone import EverySequence
-from coartic.method import Session
+from coartic.method import MethodError, Session
 from coartic.motion.compiled import entry, joint_lever
 from coartic.motion.movement import largest_square
 from coartic.motion.trigonometry import joint_chain
@@ -107,6 +120,64 @@ def test_stationary_point_ends_the_descent():
     assert not correction.converged
     assert correction.iterations == 1
     np.testing.assert_array_equal(correction.q, np.zeros(10))
+
+
+def arm_of(*links, locked_base=("x", "y"), scale=1.0, radius=0.1):
+    """A task of one arm, a little bent, with a goal at two thirds of its reach."""
+    links = tuple(scale * link for link in links)
+    place = 0.0, 0.0
+    robot = Robot((1.0,), links, left_shoulder=place, right_shoulder=place)
+    goals = [(2 / 3 * sum(links) * math.cos(1.0), 2 / 3 * sum(links) * math.sin(1.0))]
+    bent = {"radius": radius, "q0": [0, 0, 0, *[0.3] * len(links)]}
+    return Task(goals=goals, robot=robot, hands=["right"], locked_base=locked_base, **bent)
+
+
+LONG = {
+    "ten unit links": ([1] * 10, ("x", "y")),
+    "twenty unit links": ([1] * 20, ("x", "y")),
+    "15, 15, 5 and 5 cm": ([15, 15, 5, 5], ("x", "y")),
+    "239 and 317 mm": ([239, 317], ("x", "y")),
+    "seven unit links": ([1] * 7, ("x", "y")),
+    "ten unit links on a rail": ([1] * 10, ("y",)),
+    "15, 15, 5 and 5 cm on wheels": ([15, 15, 5, 5], ()),
+}
+
+
+@pytest.mark.parametrize(("links", "locked_base"), LONG.values(), ids=LONG)
+def test_a_long_arm_is_named_with_a_factor_that_helps(links, locked_base):
+    """The largest singular value of all postures is below the limit then, and not much."""
+    options = {"locked_base": locked_base, "radius": 0.1 * min(links)}
+    reason = corrective_trial(arm_of(*links, **options), "R").reason
+    numbers = re.search(r"is (\S+), and above 2 .* by ([0-9.]+),", reason).groups()
+    said, factor = map(float, numbers)
+    free = [k for k in (0, 1) if "xy"[k] not in locked_base]
+
+    def largest(scale):
+        robot = arm_of(*links, scale=scale, **options).robot
+        straight = robot.jacobian(np.zeros(robot.dof), "right")[:, [*free, *range(3, robot.dof)]]
+        return 0.05 * np.linalg.norm(straight, 2) ** 2
+
+    assert said == pytest.approx(largest(1.0), rel=0.01)
+    assert 1.7 < largest(1.0 / factor) < 2.0
+    helped = arm_of(*links, scale=1.0 / factor, locked_base=locked_base)
+    assert corrective_trial(helped, "R").completed
+
+
+@pytest.mark.parametrize("links", [(3, 2, 1), (0.309, 0.333), (0.1, 0.11), (0.05,) * 20])
+def test_arms_of_others_that_are_not_too_long_are_corrected(links):
+    assert corrective_trial(arm_of(*links, radius=min(0.1, sum(links) / 20)), "R").completed
+
+
+def test_a_straight_arm_that_points_at_its_goal_is_named():
+    for goal in ((-2.0, 0.1), (2.5, 0.1)):
+        task = Task(goals=[goal], hands=["right"], locked_base=("x", "y"))
+        assert "straight and points at the goal; bend it" in corrective_trial(task, "R").reason
+        with pytest.raises(NotApplicableError, match="with R, goal 1: .* bend it"):
+            initial_hands(task)
+        with pytest.raises(MethodError, match="with R, goal 1: .* bend it"):
+            objective(task)
+    few = corrective_trial(load_task("ascending"), "RRR", model=MotionModel(max_iterations=2))
+    assert few.reason.endswith("in 2 iterations")
 
 
 def test_too_large_a_gain_is_an_outcome():

@@ -106,6 +106,8 @@ def test_a_task_is_saved_as_toml(tmp_path):
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
         ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
+        ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}; needed are real numbers"),
+        ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
     ],
 )
 def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):

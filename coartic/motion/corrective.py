@@ -12,6 +12,8 @@ import math
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.compiled import entry, inlined, inner, joint_lever, shared
 from coartic.motion.lanes import (
@@ -186,3 +188,36 @@ def correct(
     setup = setup_for(robot, locked_base=tuple(locked_base), model=check_model(model))
     correct_kernel(setup, lanes_for(robot), runs)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
+
+
+def explain_failure(
+    robot: Robot,
+    q: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    locked_base: Collection[str],
+    model: MotionModel,
+) -> str:
+    """Why the corrective process may have failed from ``q``, as the end of a sentence; empty where
+    neither cause that users can mend is there.
+
+    One is a hand whose joints all lie on the line to the goal: none of them moves it nearer. The
+    other is a long arm. Near a goal, errors shrink by ``1 - gain σ²``, with the singular values σ
+    of the Jacobian J; so the descent is stable while gain × |J|² is below 2, for the largest σ,
+    which is that of the stretched arm.
+    """
+    free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
+    arm = robot.joints(hand)
+    error = np.subtract(goal, robot.forward_kinematics(q, hand))
+    slopes = error @ robot.jacobian(q, hand)[:, [*free, *range(arm.start, arm.stop)]]
+    reaches = np.cumsum(robot.arm(hand).links[::-1])
+    square = float(reaches @ reaches)
+    if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
+        return ": the arm is straight and points at the goal; bend it"
+    if (largest := model.gain * (square + bool(free))) < 2.0:
+        return ""
+    factor = math.ceil(10.0 * math.sqrt(model.gain * square / (2.0 - model.gain * bool(free)))) / 10
+    return (
+        f": gain × |J|² of the stretched arm is {largest:.3g}, and above 2 the descent can be "
+        f"unstable; divide all lengths by {factor:g}, those of links, goals and radius"
+    )

@@ -9,6 +9,7 @@ says of its own solution, its score is what comes out here.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -19,16 +20,18 @@ import numpy as np
 from coartic.errors import SolutionError
 from coartic.inputs import brief_value
 from coartic.model import PAPER, MotionModel
-from coartic.motion.corrective import correct
+from coartic.motion.corrective import correct, explain_failure
 from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
 from coartic.motion.outside import note_trials
 from coartic.motion.reach import Bench, bench_of, reach_all
-from coartic.robot import HANDS, Array, Hand
+from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task, TaskLike, as_task, letters_of
-from coartic.text import short_repr
+from coartic.text import counted, short_repr
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
+WHOLE_TURNS = 20.0
+"""Angle of a target, rad, beyond which it may be meant in degrees."""
 HELD = 1e-6
 """How far from its value a target may have a locked base coordinate, length unit; solvers leave
 less."""
@@ -148,7 +151,7 @@ def execute(
     Execution
         What happened: movements as made, configurations at the hits, control ticks and reward.
         Where the corrective process does not converge, the execution ends: ``completed`` is False
-        and ``reason`` says so.
+        and ``reason`` says so, and why that may be.
 
     Raises
     ------
@@ -170,7 +173,23 @@ def execute(
     (execution,) = execute_many(bench_of(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
+    if execution.ticks > WHOLE_TURNS / model.step:
+        hint_at_degrees(execution.movements)
     return execution
+
+
+def hint_at_degrees(movements: Iterable[Movement]) -> None:
+    """Warn of a target that turns a joint so far as degrees would."""
+    for movement in movements:
+        if movement.kind != "corrective" and movement.target is not None:
+            angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
+            if abs(angle) > WHOLE_TURNS:
+                warnings.warn(
+                    f"goal {movement.goal}: the target has the angle {angle:.4g}; angles are in "
+                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?",
+                    stacklevel=3,
+                )
+                return
 
 
 def execute_many(
@@ -195,9 +214,9 @@ def execute_many(
         if not isinstance(plan, list):
             executions.append(plan)
         elif has_path(plan):
-            executions.append(execution_of(plan, make_one_by_one(bench, plan)))
+            executions.append(execution_of(bench, plan, make_one_by_one(bench, plan)))
         else:
-            executions.append(execution_of(plan, next(outcomes)))
+            executions.append(execution_of(bench, plan, next(outcomes)))
     return executions
 
 
@@ -332,7 +351,7 @@ def make_one_by_one(bench: Bench, plan: ByGoal) -> list[Subtask]:
     return subtasks
 
 
-def execution_of(plan: ByGoal, subtasks: list[Subtask]) -> Execution:
+def execution_of(bench: Bench, plan: ByGoal, subtasks: list[Subtask]) -> Execution:
     """The execution of a plan, of whose goals these were attempted."""
     movements: list[Movement] = []
     hits: list[Array] = []
@@ -352,9 +371,11 @@ def execution_of(plan: ByGoal, subtasks: list[Subtask]) -> Execution:
                 movements.append(Movement(goal, hand, "corrective", subtask.q.copy(), 0))
     reason = ""
     if not subtask.hit:
+        task, where = bench.task, (hand, bench.task.goals[goal - 1])
+        why = explain_failure(task.robot, subtask.q, *where, task.locked_base, bench.model)
         reason = (
             f"goal {goal}: the corrective process did not converge with the {hand} hand in "
-            f"{subtask.iterations} iterations"
+            f"{counted(subtask.iterations, 'iteration')}{why}"
         )
     return Execution(
         movements=tuple(movements),

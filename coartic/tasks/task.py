@@ -210,6 +210,8 @@ class Task(FileData):
         if isinstance(content, dict) and "penalty" in content:
             reads = "version 1.1.0 of coartic reads tasks with a penalty"
             raise error_saying(f"{reads}; here a reward is minus the ticks")
+        if isinstance(content, dict) and {"start", "q0"} <= content.keys():
+            raise error_saying("q0 and start both say where a trial begins: give one of them")
         if not isinstance(content, dict) or "start" in content:
             return content
         robot = content.get("robot", Robot())
@@ -218,7 +220,10 @@ class Task(FileData):
         except (TypeError, ValueError):
             robot = Robot()  # the table [robot] is wrong, and is said to be
         content = dict(content)
-        q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
+        try:
+            q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
+        except ValueError as error:
+            raise error_saying(str(error)) from None
         if q.shape != (robot.dof,):
             raise error_saying(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
