@@ -81,12 +81,11 @@ def cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Cosine and sine of angles in rad: less k quarters of a turn (π/2), by the Taylor series."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
-    z = x * x
+    z, k = x * x, quarters.astype(np.int64)
     z2, z4 = z * z, (z * z) * (z * z)
     odd = (S3 + z * S5) + z2 * (S7 + z * S9) + z4 * ((S11 + z * S13) + z2 * (S15 + z * S17))
     even = (C4 + z * C6) + z2 * (C8 + z * C10) + z4 * ((C12 + z * C14) + z2 * C16)
     sine, cosine = x + (x * z) * odd, 1.0 - (0.5 * z - z2 * even)
-    k = quarters.astype(np.int64)
     cosine, sine = np.where(k & 1, sine, cosine), np.where(k & 1, cosine, sine)
     cosine, sine = np.where((k + 1) & 2, -cosine, cosine), np.where(k & 2, -sine, sine)
     far = np.abs(angles) >= 1e5  # rad; three parts of π/2 are too few: the C library's
@@ -153,8 +152,7 @@ def path(q: Floats, waypoints: list[Floats], model: Any, most: int = MOST_TICKS)
     """The points of a path, in columns; ``most`` of them and one more. Point k lies k steps along
     it, the last at its end."""
     corners = np.array([q, *waypoints])
-    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
     last = math.ceil(ends[-1] / model.step)
     along = np.append(np.arange(min(last, most + 1)) * model.step, ends[-1])
     points = np.array([np.interp(along, ends, joint) for joint in corners.T])
@@ -340,7 +338,9 @@ def check_identity(row: Any) -> None:
 
 
 def check_cells(db: sqlite3.Connection) -> Iterator[str]:
-    """Cells that show other runs than they say, a sentence each."""
+    """Cells that show other runs than they say, and runs that none shows, a sentence each."""
+    for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
+        yield f"Row {number} of table {table} names a row of {missing} that is not there."
     query = """SELECT position, variant, defaults, cells.parameters AS chosen,
         settings.parameters AS complete, settings.definition AS executed, tasks.definition AS shown,
         settings.code = methods.code AS same_code FROM cells
@@ -369,13 +369,14 @@ def hash_of(content: Any) -> str:
 
 
 def fingerprint(row: Any, parts: dict[str, list[MoveRow]]) -> str:
-    """Hash of status, bound, rewards of trials and solutions, as it was when the run was kept."""
+    """Hash of status, bound, rewards and solutions. Raises ValueError for another best trial."""
     size = 4 * min(row["trials"] or 0, MOST_TRIALS)
     unpacked = zlib.decompressobj().decompress(row["rewards"] or zlib.compress(b""), size + 1)
     need(len(unpacked) <= size, f"it has more rewards than {row['trials']} trials")
-    rewards = np.frombuffer(unpacked, "<i4").astype(object)
-    rewards[rewards == -(2**31)] = None
-    content = [row["status"], row["proven_bound"], rewards.tolist()]
+    kept = [None if r == -(2**31) else r for r in np.frombuffer(unpacked, "<i4").tolist()]
+    best = kept.index(row["reward"]) if row["reward"] in kept and row["status"] == "ok" else None
+    need(row["best_trial"] == best, f"best_trial is {best}, not {row['best_trial']}")
+    content = [row["status"], row["proven_bound"], kept]
     for part, moves in parts.items():
         for _, *facts, q, waypoints in moves:
             content.append([part, *facts, q.tolist(), [p.tolist() for p in waypoints] or None])

@@ -36,14 +36,15 @@ _SCORED = (
 
 
 def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
-    """The plan with all that other folders hold, whose runs are copied into ``out``.
+    """Return the plan with the runs that other folders hold, which are copied into ``out``.
 
-    ``shipped`` names the shipped results. Performed in ``out``, the plan makes the runs that no
-    folder has. A warning names a folder that has fewer runs of a cell than are asked for.
+    ``shipped`` names the shipped results. Performed in ``out``, the plan makes those of its own
+    runs that no folder has, and no others: of what it does not ask for, a folder gives what it has.
+    A warning names a folder that is not finished, and one that has fewer runs than are asked for.
 
-    Raises CoarticError where the folders do not go together, where one lacks runs that cannot be
-    performed here, where a stored solution does not do what is stored of it, and where two folders
-    have different results of a run. Then nothing is copied but shipped results.
+    Raises CoarticError where the folders do not go together, where a stored solution does not do
+    what is stored of it, and where two folders have different results of a run. Then nothing is
+    copied but shipped results.
     """
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
@@ -70,48 +71,49 @@ def put_beside(plan: Plan, folders: Sequence[str | Path], out: Path) -> Plan:
 
 
 def join(plan: Plan, sources: Mapping[str, Store]) -> Plan:
-    """Return the plan with all cells of the sources. Raises CoarticError where sources contradict
-    each other, and for runs that no source has and that are not performed here."""
+    """Return the plan with the cells of the sources, each with the runs that the plan asks for and
+    those that follow in the sources without a gap. Raises CoarticError where sources contradict
+    each other, or the plan where it asks for runs that no source has."""
     plans = {name: source.plan() for name, source in sources.items()}
     held = {
         (plans[name].specifications[position].asked, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
-
-    def lacks(asked: str, cell: Cell) -> bool:
-        return any((asked, number) not in held for number in range(cell.runs))
-
+    own = dict(cells_of(plan))
     # What a source has is not performed here, where the code of its method may be another.
-    missing = [cell for asked, cell in cells_of(plan) if lacks(asked, cell)]
+    missing = [
+        cell for asked, cell in own.items() if not held.issuperset((asked, n) for n in range(cell.runs))
+    ]
     parts = plans | {"this command": replace(plan, cells=tuple(missing))}
     check_together(parts)
     methods = {name: method for part in parts.values() for name, method in part.methods.items()}
     cells: dict[str, Cell] = {}
-    for part in parts.values():
-        for asked, cell in cells_of(part):
-            runs = max(cell.runs, cells[asked].runs if asked in cells else 0)
-            cells[asked] = replace(cell, method=methods[cell.method.name], runs=runs)
-    own = dict(cells_of(plan))
+    for asked, cell in (pair for part in (plan, *plans.values()) for pair in cells_of(part)):
+        runs = own[asked].runs if asked in own else 0
+        while (asked, runs) in held:
+            runs += 1
+        if runs:
+            cells.setdefault(asked, replace(cell, method=methods[cell.method.name], runs=runs))
     for name, part in plans.items():
-        theirs = [(asked, cells[asked]) for asked, _ in cells_of(part)]
-        if left := [cell for asked, cell in theirs if not cell.method.where and lacks(asked, cell)]:
-            raise CoarticError(
-                f"{name} is not finished: it lacks runs of {named(left)}. Finish it first, or "
-                "perform them here: add --methods or --method-file"
-            )
-        few = [c for a, c in theirs if a not in own and c.method.stochastic and c.runs < plan.runs]
+        lacking, few = list[Cell](), list[Cell]()
+        for asked, cell in cells_of(part):
+            there = cells[asked].runs if asked in cells else 0
+            if there < cell.runs:
+                lacking.append(cell)
+            elif asked not in own and cell.method.stochastic and there < plan.runs:
+                few.append(cell)
+        if lacking:
+            words = f"{name} is not finished: it lacks runs of {named(lacking)}"
+            warnings.warn(f"{words}, and gives those before the first that is missing", stacklevel=3)
         if few:
-            theirs_and_ours = (
-                f"{counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked"
-            )
-            warnings.warn(f"{name} has {theirs_and_ours} for here", stacklevel=3)
-    order = dict.fromkeys(asked for part in (plan, *plans.values()) for asked, _ in cells_of(part))
+            words = f"{counted(few[0].runs, 'run')} of {named(few)}; {plan.runs} are asked for here"
+            warnings.warn(f"{name} has {words}", stacklevel=3)
     return replace(
         plan,
-        runs=max(part.runs for part in parts.values()),
+        runs=max(plan.runs, *(cell.runs for cell in cells.values())),
         trials=max(part.trials for part in parts.values()),
-        cells=tuple(cells[asked] for asked in order),
+        cells=tuple(cells.values()),
     )
 
 

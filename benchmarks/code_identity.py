@@ -2,8 +2,8 @@
 
 It is that of the method's file, of the session and the execution of solutions, and of the modules
 that these import, from the method's folder or package and from this one. Comments, docstrings,
-imports for type checkers, ``__version__`` and the place of a file do not count: a changed number
-makes a result stale, a better sentence or a release does not.
+imports for type checkers, ``__version__``, the place of a file and the version of Python do not
+count: a changed number makes a result stale, a better sentence or a release does not.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import ast
 import hashlib
 import os
 import re
-from collections import deque
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 import coartic
+from coartic.benchmarks.syntax import statements_in, text_of
 from coartic.motion.sources import PACKAGE
 
 _API = PACKAGE / "__init__.py"
@@ -25,7 +25,6 @@ _API = PACKAGE / "__init__.py"
 _EVERY_RUN = PACKAGE / "method.py", PACKAGE / "motion" / "solution.py"
 _AROUND = tuple(Path(__file__).with_name(name) for name in ("worker.py", "scoring.py"))
 """Modules that perform and score a run. Of their imports, only the above change results."""
-_WITHIN_STATEMENTS = ast.stmt | ast.excepthandler | ast.match_case
 
 
 def code_of(method: Path, data: tuple[Path, ...] = ()) -> str:
@@ -67,19 +66,12 @@ def imported_files(path: Path, places: Iterable[tuple[Path, Path]]) -> Iterator[
 
 @cache
 def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]], ...]]:
-    """The syntax tree of a module without docstrings and ``__version__``, as text, and its imports:
-    level, module, names."""
+    """The code of a module as text (:mod:`coartic.benchmarks.syntax`), and its imports: level,
+    module, names."""
     tree, imports = ast.parse(content), []
-    waiting = deque[ast.AST]([tree])
-    while waiting:
-        node, of_api = waiting.popleft(), list[str]()
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            node.body = []
-        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            node.value.value = None
-        elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__version__":
-            node.value = ast.Constant(None)
-        elif isinstance(node, ast.Import):
+    for node in statements_in(tree):
+        of_api = list[str]()
+        if isinstance(node, ast.Import):
             names = tuple(alias.name for alias in node.names)
             imports.append((0, "", names))
             if "coartic" in names:
@@ -91,6 +83,4 @@ def syntax(content: bytes) -> tuple[str, tuple[tuple[int, str, tuple[str, ...]],
                 of_api = [*names]
         homes = {coartic.HOME[name] for name in of_api if name in coartic.HOME}
         imports += [(0, home, ("",)) for home in homes]
-        # As ast.walk, but without expressions, which are most of a tree.
-        waiting += [n for n in ast.iter_child_nodes(node) if isinstance(n, _WITHIN_STATEMENTS)]
-    return ast.dump(tree), tuple(imports)
+    return text_of(tree), tuple(imports)

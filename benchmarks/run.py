@@ -21,6 +21,7 @@ from coartic.benchmarks.provenance import command, current_environment, now
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.worker import Job
+from coartic.errors import CoarticError
 from coartic.files import folder_named
 from coartic.runs.plan import Plan, Specification, trials_in
 from coartic.runs.run import Run
@@ -215,7 +216,7 @@ def perform(
 def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
     """The runs to perform, a job for each cell; those that are there are counted. What crashed is
     performed again, and what took too long where it may now take longer, unless the code of its
-    method is not here."""
+    method is not here. Raises CoarticError where that is so of a method whose runs are missing."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         longer = had_s is not None and (plan.time_limit_s is None or plan.time_limit_s > had_s)
@@ -227,6 +228,11 @@ def missing_jobs(plan: Plan, store: Store, progress: Progress) -> list[Job]:
     jobs = []
     for p, (cell, specification) in enumerate(zip(plan.cells, plan.specifications, strict=True)):
         numbers = tuple(number for number in range(cell.runs) if (p, number) not in there)
+        if numbers and not cell.method.where:
+            raise CoarticError(
+                f"{store.folder} lacks runs of {cell.label} on {cell.task.name}, and the code of "
+                "this method is not here: plan them with its method file"
+            )
         if numbers:
             jobs.append(Job(specification, cell.method, plan.seed, numbers, plan.time_limit_s))
     return jobs

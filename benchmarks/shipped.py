@@ -1,15 +1,18 @@
 """Results that are shipped: ``shipped/SUITE.sqlite.xz``, each a results folder of one file.
 
-``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder. The rewards of
-trials are thinned (:meth:`coartic.runs.run.Run.thin`), which takes it from 30 to 2 MB.
+``python -m coartic.benchmarks.shipped FOLDER`` makes one of a results folder whose runs have the
+results that are shipped already. The rewards of trials are thinned
+(:meth:`coartic.runs.run.Run.thin`), which takes it from 30 to 2 MB.
 """
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import lzma
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -22,6 +25,7 @@ SHIPPED = "shipped"
 _FOLDER = Path(__file__).with_name("shipped")
 _HASHES = "SHA256SUMS"
 _ENDING = ".sqlite.xz"
+_SHOWN = 20  # differences of a folder
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
@@ -35,9 +39,12 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
         raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
         raise CoarticError(f"no results of suite {suite!r} are shipped, but of {', '.join(hashes)}")
-    if hashlib.sha256(content).hexdigest() != hashes[suite]:
-        raise CoarticError(f"{path} is not as it was shipped: install coartic again")
-    return open_content(lzma.decompress(content), SHIPPED)
+    try:
+        if hashlib.sha256(content).hexdigest() != hashes[suite]:
+            raise ValueError
+        return open_content(lzma.decompress(content), SHIPPED)
+    except (ValueError, lzma.LZMAError):
+        raise CoarticError(f"{path} is not as it was shipped: install coartic again") from None
 
 
 def shipped_hashes() -> dict[str, str]:
@@ -45,6 +52,28 @@ def shipped_hashes() -> dict[str, str]:
     lines = (_FOLDER / _HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(_ENDING): digits for digits, name in pairs}
+
+
+def differences(folder: Path) -> Iterator[str]:
+    """Yield a sentence for each shipped run that a folder lacks or has another result of, whichever
+    code made them, and for each method of the folder whose code is not that of this version."""
+    from coartic.benchmarks.registry import built_in
+    from coartic.benchmarks.reproduce import compare_runs
+
+    with open_store(folder) as made:
+        for name, card in made.plan().methods.items():
+            if name not in built_in() or built_in()[name].code != card.code:
+                yield f"the code of method {name} is not {card.code} now: run the suite again"
+        if (suite := made.plan().suite) not in shipped_hashes():
+            return
+        ids = {run_id.partition("-")[0]: run_id for run_id in made.runs().run_id}
+        with open_shipped(suite) as before:
+            for run_id in before.runs().run_id:
+                if (asked := run_id.partition("-")[0]) not in ids:
+                    yield f"run {run_id} is missing"
+                    continue
+                for change in compare_runs(before.run(run_id), made.run(ids[asked])):
+                    yield f"run {run_id}: {change}"
 
 
 def pack(folder: Path, out: Path) -> None:
@@ -62,5 +91,24 @@ def pack(folder: Path, out: Path) -> None:
     (out / _HASHES).write_text("".join(lines), encoding="ascii")
 
 
+def main() -> int:
+    """Pack the folders that the command names, unless a shipped result would change."""
+    parser = argparse.ArgumentParser(prog="python -m coartic.benchmarks.shipped")
+    parser.add_argument("--changed", action="store_true", help="pack results that have changed")
+    parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
+    given = parser.parse_args()
+    changes = {folder: list(differences(folder)) for folder in given.folders}
+    for folder, sentences in changes.items():
+        print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
+        for sentence in sentences[:_SHOWN]:
+            print(f"- {sentence}")
+    if any(changes.values()) and not given.changed:
+        print("Nothing is packed. If results change on purpose, add --changed.")
+        return 1
+    for folder in given.folders:
+        pack(folder, _FOLDER)
+    return 0
+
+
 if __name__ == "__main__":
-    pack(folder_named(sys.argv[1]), _FOLDER)
+    sys.exit(main())

@@ -69,9 +69,48 @@ def test_what_no_folder_has_is_performed(parts, tmp_path):
     assert joined(parts[:1], tmp_path / "more", more, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
     same_results(load(tmp_path / "whole"), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
-    with pytest.raises(CoarticError, match=f"left is not finished: it lacks runs of {EC1} on asc"):
-        put_beside(planned(RIGHT[2:], **OPTIONS), [left], tmp_path / "other")
-    assert not (tmp_path / "other").exists()
+
+
+def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, tmp_path):
+    """Whatever it was asked for itself: nobody else's plan says how much is performed here."""
+    left = shutil.copytree(parts[0], tmp_path / "left")
+    edit(left, "UPDATE cells SET runs = 1000000 WHERE position = 0")
+    with pytest.warns(UserWarning, match=f"left is not finished: it lacks runs of {EC1} on asc"):
+        progress = joined([left], tmp_path / "more", RIGHT[2:])
+    assert (progress.present, progress.done, progress.total) == (2 + 1, 1, 4)
+    edit(left, f"DELETE FROM results WHERE id = {OF_EC1}")  # the second one follows a gap
+    with pytest.warns(UserWarning, match="lacks runs of"):
+        progress = joined([left], tmp_path / "less", RIGHT[2:])
+    assert (progress.present, progress.done, progress.total) == (1, 1, 2)
+    assert check_runs(tmp_path / "more").wrong == check_runs(tmp_path / "less").wrong == []
+
+
+def test_a_run_that_views_would_not_show(parts, tmp_path):
+    left = shutil.copytree(parts[0], tmp_path / "left")
+    edit(left, f"UPDATE results SET environment = 99 WHERE id = {OF_EC1}")
+    for read in (load, lambda folder: joined([folder], tmp_path / "out")):
+        with pytest.raises(CoarticError, match="names a row of environments that is not there"):
+            read(left)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_is_read_in_one_state(parts, tmp_path):
+    """A suite that begins in it meanwhile waits until it is read."""
+    left = shutil.copytree(parts[0], tmp_path / "left")
+    with open_store(left) as store:
+        before = store.ids()
+        with (
+            closing(sqlite3.connect(left / RUNS_FILE, timeout=0)) as other,
+            pytest.raises(sqlite3.OperationalError, match="locked"),
+        ):
+            other.execute("DELETE FROM results")
+            other.commit()
+        assert store.ids() == before
+
+
+def test_runs_of_a_method_that_is_not_here_are_refused(parts, tmp_path):
+    with open_store(parts[0]) as store, pytest.raises(CoarticError, match="with its method file"):
+        perform(store.plan(), tmp_path / "out", executor=InProcess())
 
 
 def edit(folder, statement):

@@ -1,11 +1,17 @@
 """Which code the results of a method come from."""
 
+import ast
 import importlib
 import inspect
+import json
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from coartic.benchmarks import syntax
 from coartic.benchmarks.code_identity import code_of, files_of
 from coartic.benchmarks.registry import MODULES
 from coartic.motion.sources import PACKAGE
@@ -82,3 +88,96 @@ def test_names_of_the_package_count_where_they_are_at_home(tmp_path):
     assert PACKAGE / "learner" / "kernel.py" in files_of(tmp_path / "mine.py")
     (tmp_path / "mine.py").write_text("from coartic import load_task")
     assert PACKAGE / "learner" / "kernel.py" not in files_of(tmp_path / "mine.py")
+
+
+SOURCES = {
+    "878d399f25ee": '''
+"""A docstring."""
+from __future__ import annotations
+import coartic, numpy as np
+if TYPE_CHECKING:
+    from somewhere import Thing
+__version__ = "1.2"
+
+class Mine(coartic.Method, kind=None):
+    name = u"mine" "-é\\U0001fae8"
+    def solve(self, session: Thing, /, *rest, a=1, b: int | None = None, **more) -> None:
+        """Another."""
+        total: float = -1e-3 + 0x_FF * 2j
+        match rest:
+            case [1, *others] if (first := others) and first is not None:
+                return lambda x=None: {**more, "x": [*others], None: ...}
+            case {"a": None, **kept} | Point(x=0) as point:
+                yield from (x async for x in kept)
+            case _:
+                pass
+        try:
+            del self.x[1:, ::2]
+        except* (ValueError, OSError) as error:
+            raise RuntimeError from error
+''',
+    "cca2e0208c72": r'''
+def words(x, width, who=None):
+    """None of these counts."""
+    a = "one " f"two {x}" " three" u" four" f"{x!r:>{width}}" ""
+    b = f"{{{x}}}" + f"{x=}" + f"{ x = !s:^{width}.{3}}" + f"" + f"{x:}" + rf"\{x}\d"
+    c = f"""{x
+        } and {'nested ' + f"{width}"}
+""" f'\N{BULLET}{x:%H:%M {{}}}'
+    return a, b"\x00" b"bytes", c % (who,), f"{x:{'>'}{width}}"
+''',
+}  # fmt: skip
+"""Two sources by the beginning of the hash of what they compute."""
+HASH = """
+import ast, hashlib, json, runpy, sys
+text_of = runpy.run_path(sys.argv[1])["text_of"]
+for source in json.load(sys.stdin):
+    print(hashlib.sha256(text_of(ast.parse(source)).encode()).hexdigest()[:12])
+"""
+
+
+def pythons(minor):
+    """Every Python of a minor version on this machine that starts; a shim of pyenv may not."""
+    installed = (Path.home() / ".pyenv" / "versions").glob(f"3.{minor}.*/bin/python")
+    places = {shutil.which(f"python3.{minor}"), *map(str, installed)} - {None}
+    places |= {sys.executable} if sys.version_info[1] == minor else set()
+    return [place for place in places if not subprocess.run([place, "-c", ""]).returncode]
+
+
+@pytest.mark.parametrize("minor", range(11, 16))
+def test_every_version_of_python_reads_the_same_code(minor):
+    sources = json.dumps([*SOURCES.values()])
+    for python in (found := pythons(minor)):
+        command = [python, "-I", "-W", "ignore", "-c", HASH, syntax.__file__]
+        done = subprocess.run(command, input=sources, capture_output=True, text=True)
+        assert done.stdout.split() == [*SOURCES], done.stderr
+    if not found:
+        pytest.skip(f"Python 3.{minor} is not installed")
+
+
+def test_what_runs_counts_and_words_do_not():
+    def text(source):
+        return syntax.text_of(ast.parse(source))
+
+    for same, other in (
+        ('"""A."""\nx = 1  # one', '"""B."""\nx = 1'),
+        ('__version__ = "1"', '__version__ = "2"'),
+        ("if TYPE_CHECKING: import a", "if TYPE_CHECKING: import b"),
+        ("if typing.TYPE_CHECKING: import a", "if typing.TYPE_CHECKING: import b"),
+        ('f"a" "b" f"{x}"', 'f"ab{x}"'),
+        ('x = u"a"', "x = 'a'"),
+    ):
+        assert text(same) == text(other)
+    for one, another in (
+        ("x = 1", "x = 1.0"),
+        ("x = True", "x = 1"),
+        ("x = None", "x = ()"),
+        ("return", "return []"),
+        ("f(a, b)", "f(a, b=b)"),
+        ("if not TYPE_CHECKING: import a", "if not TYPE_CHECKING: import b"),
+        ("def f(a, /, b): pass", "def f(a, b): pass"),
+        ("def f(*, a): pass", "def f(*, a=None): pass"),
+        ('f"{x}"', 'f"{{x}}"'),
+        ("x = 'None'", "x = None"),
+    ):
+        assert text(one) != text(another)

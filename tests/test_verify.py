@@ -94,6 +94,25 @@ def edited(true_folder, tmp_path, statement):
     return folder
 
 
+@pytest.mark.parametrize("damage", ["zeros", "no UTF-8"])
+def test_a_damaged_file_is_told_from_a_wrong_one(true_folder, tmp_path, coartic, damage):
+    """The command says what is the matter, whichever page or text it is."""
+    whole, size = (true_folder / RUNS_FILE).read_bytes(), 4096
+    if damage == "zeros":
+        starts = range(size, len(whole), 2 * size)
+        damaged = [whole[:at] + bytes(size) + whole[at + size :] for at in starts]
+    else:
+        damaged = [whole.replace(text, b"\xff" * len(text)) for text in (b"right", b"tiny")]
+    for number, content in enumerate(damaged):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / RUNS_FILE).write_bytes(content)
+        code, out, error = coartic("verify", folder)
+        assert (code, out) == (2, "")
+        assert f"{folder / RUNS_FILE} is damaged" in error
+        assert error.count("\n") == 1
+
+
 def test_nothing_is_wrong_with_what_was_not_edited(true_folder):
     report = checker.check_runs(true_folder)
     assert report.wrong == []
@@ -116,11 +135,13 @@ def movement(run, change, part="solution", order=0):
 STANDING = "base_x = 0, base_y = 0, right_1 = 0, right_2 = 0, right_3 = 0, right_4 = 0, ticks = 1"
 EDITS = {  # what is said: of which run, and what was edited
     "reward is ": result(0, "reward = reward + 1"),
+    "best_trial is ": result(0, "best_trial = 301"),
     "hands is RR, not LL": result(2, "hands = 'LL'"),
     "solution_corrections is 1": result(2, "solution_corrections = 2"),
     "other_arm_travel is": result(3, "other_arm_travel = 1e-8"),
     "status is ok": result(5, "status = 'ok'"),
     "must be str": (2, "DELETE FROM settings WHERE task = 'tiny'"),
+    "of environments that is not there": (None, "UPDATE results SET environment = 99"),
     " ticks, not ": movement(0, "right_2 = right_2 + 0.02", order=1),
     "other_arm_travel": movement(1, "left_2 = left_2 + 0.02", order=1),
     "moves a locked base": movement(1, "base_y = base_y + 0.02", part="replay"),

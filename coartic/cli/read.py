@@ -138,9 +138,9 @@ def verify(
 ) -> None:
     """Execute every stored solution again and compare."""
     from coartic.analysis.verify import check_runs
-    from coartic.runs.store import open_store
+    from coartic.runs.store import explain_errors, open_store
 
-    with open_store(folder):  # or it says what is the matter
+    with open_store(folder), explain_errors(folder):  # which say what is the matter
         report = check_runs(folder)
     say(
         f"{counted(report.runs, 'run')} checked, {counted(report.movements, 'movement')} executed.",

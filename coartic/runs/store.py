@@ -126,6 +126,7 @@ _SURROUNDINGS: dict[str, Any] = {
     **{"command": list, "packages": dict, "cores": int, "commit": str},
 }
 """Of what kind the facts are that reports show of the surroundings of a suite."""
+_LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # how the names of errors begin
 WAIT_S = 1.0  # for another program, before more is done about it
 
 
@@ -433,7 +434,7 @@ class Store:
                 self._db.execute(statement)
                 return
             except sqlite3.OperationalError as error:
-                if "locked" not in str(error):
+                if not error.sqlite_errorname.startswith(_LOCKED):
                     raise
 
 
@@ -455,6 +456,7 @@ def open_store(folder: Path) -> Iterator[Store]:
     with closing(connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
+            connection.execute("BEGIN")  # whatever is read in this block is of one state
             if not has_tables(connection):
                 raise CoarticError("it is not finished; repeat the `coartic run` command")
             with lock(folder, shared=True):  # or somebody is writing
@@ -561,7 +563,8 @@ def check_files(folder: Path) -> None:
 
 
 def has_tables(connection: sqlite3.Connection) -> bool:
-    """Whether the file has our tables; False for an empty one. Raises CoarticError for others."""
+    """Whether the file has our tables; False for an empty one. Raises CoarticError for others, and
+    ValueError where a run names what is not there: views would not show it."""
 
     def schema(of: sqlite3.Connection) -> set[tuple[str, str, str]]:
         rows = of.execute("SELECT type, name, sql FROM sqlite_master")
@@ -590,6 +593,8 @@ def has_tables(connection: sqlite3.Connection) -> bool:
                 f"it is not as coartic makes it: {kind} {plain(name, 80)} is missing or is not "
                 "ours. Restore a copy, or run the suite again with another --out."
             )
+    for table, row, missing, _ in connection.execute("PRAGMA foreign_key_check"):
+        raise ValueError(f"row {row} of {table} names a row of {missing} that is not there")
     return True
 
 
@@ -632,13 +637,14 @@ def explain(path: Path, error: Exception) -> str:
     if isinstance(error, CoarticError):
         said = one_line(str(error))
         return said if str(path.parent) in said else f"{path}: {said}"
-    if isinstance(error, sqlite3.OperationalError):
-        if getattr(error, "sqlite_errorname", "") == "SQLITE_READONLY_DBMOVED":
+    kind, is_text = getattr(error, "sqlite_errorname", ""), "decode to UTF-8" in str(error)
+    if isinstance(error, sqlite3.OperationalError) and not is_text:
+        if kind == "SQLITE_READONLY_DBMOVED":
             return (
                 f"{path.parent} was removed, renamed or replaced while the suite ran: put it back, "
                 "or repeat the command to begin anew"
             )
-        if "locked" in str(error):
+        if kind.startswith(_LOCKED):
             return f"another program has {path} open; close it there, or wait for it"
         if "readonly" in str(error) and path.with_name(f"{path.name}-journal").exists():
             return (
@@ -648,7 +654,7 @@ def explain(path: Path, error: Exception) -> str:
         return f"cannot use {path}: {error}"
     wrong = explain_inline(error, []) if isinstance(error, ValidationError) else str(error)
     wrong = plain(wrong, 200) or type(error).__name__
-    if type(error) is sqlite3.DatabaseError:  # malformed, or no database
+    if type(error) is sqlite3.DatabaseError or is_text:  # malformed, no database, or no UTF-8
         return (
             f"{path} is damaged ({wrong}). Move it away and repeat the `coartic run` command, or "
             "restore a copy."
